@@ -12,8 +12,8 @@ help:  ## list the targets
 demo: $(VENV)/.installed  ## solve the ball throw with four solvers and write the report
 	$(BIN)/symphys solve problems/ball_throw.toml --solver gradient,least_squares,ipopt,cma --out reports
 
-demo-walk: $(VENV)/.installed  ## a quadruped learns to walk, in two minutes; Ctrl-C stops it, and the same command goes on
-	$(BIN)/symphys solve quadruped_walk --set solver.stochastic.iterations=120 --unexamined --out reports/walk
+demo-walk: $(VENV)/.installed  ## a quadruped learns to walk, in half a minute; Ctrl-C stops it, and the same command goes on
+	$(BIN)/symphys solve quadruped_walk --unexamined --out reports/walk
 
 test: $(VENV)/.developing  ## run the tests; ARGS="-m 'not slow'" passes options to pytest
 	$(BIN)/pytest -n auto --dist loadfile $(ARGS)
@@ -138,7 +138,7 @@ gallery: $(VENV)/.installed  ## make the figures of the README again
 	    build/gallery/figures/knock-motion.svg build/gallery/figures/putt-motion.svg \
 	    build/gallery/figures/cart_pole-strip.svg reports/gallery/
 	cp build/gallery/sled/least_squares-seed0/figures/convergence.svg reports/gallery/sled-stages.svg
-	$(BIN)/symphys solve quadruped_walk --set solver.stochastic.iterations=120 --unexamined --out build/walk
+	$(BIN)/symphys solve quadruped_walk --unexamined --out build/walk
 	cp build/walk/figures/quadruped_walk-strip.svg reports/gallery/
 
 clean:  ## remove what the other targets made, reports aside

@@ -2,7 +2,7 @@
 
     python benchmarks/lessons.py [ITERATIONS [SEEDS]]
 
-Shorter lessons than the shipped problem's, so that differences show. Then 500 samples that were not seen.
+From ``walking.LONG``, over fewer batches, so that differences show. Then 500 samples that were not seen.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from walking import SEED, UNSEEN, Walks
+from walking import LONG, SEED, UNSEEN, Walks
 
 from symphys.problem import load_problem
 from symphys.problems import find
@@ -48,7 +48,7 @@ def main() -> None:
     for change, values in CHANGES.items():
         for seed in range(seeds):
             began = perf_counter()
-            asked = replace(options, **{"iterations": iterations, **values})
+            asked = replace(options, **{**LONG, "iterations": iterations, **values})
             found = SOLVERS["stochastic"].solve(shooting, shooting.start(seed), asked, seed)
             spent = perf_counter() - began
             unseen = walks.scenario.draw(np.random.default_rng(SEED), UNSEEN)

@@ -2,7 +2,7 @@
 
     python benchmarks/robustness.py [FOLDER [SEEDS]]
 
-The conjecture of Degrave et al. Each seed learns ``quadruped_walk`` twice, with the same work of the processor: in
+The conjecture of Degrave et al. Each seed learns ``quadruped_walk`` twice (``walking.LONG``), with the same work: in
 batches of samples that are drawn anew, and in the problem's own sample alone, a gradient an iteration, which
 costs what eight cost. Then each gait walks in 500 samples that neither has seen, drawn half, once, one and a half
 times and twice as widely as the problem's tables say. It succeeds where it stays within 30 degrees of upright for 10 s
@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from walking import LEAST, UNSEEN, Walks
+from walking import LEAST, LONG, UNSEEN, Walks
 
 from symphys.problem import load_problem
 from symphys.problems import find
@@ -52,7 +52,7 @@ def main() -> None:
 
 def measured(walks: Walks, way: str, seed: int) -> Array:
     """(widths,) the share that succeeds."""
-    options = solver_options(walks.problem, "stochastic")
+    options = replace(solver_options(walks.problem, "stochastic"), **LONG)
     if way == "nominal":
         blocks = options.iterations * options.samples // walks.scenario.kernels[0].report.lanes
         options = replace(options, iterations=blocks, samples=1, width=0.0, validation=1, validation_width=0.0)

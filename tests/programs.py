@@ -40,7 +40,7 @@ def pendulum() -> Program:
     )
 
 
-def chain() -> Program:
+def chain(steps: int = STEPS) -> Program:
     """Masses on a line that push their neighbours away, in sweeps; z are the knots of a force on all of them."""
     f = _chain_functions()
     at = MemoryLayout()
@@ -62,7 +62,7 @@ def chain() -> Program:
         size=at.size,
         z=z,
         parameters=Place(0, 0),
-        steps=STEPS,
+        steps=steps,
         zeroed=(nothing, work),
         constants=tuple((x.still(), (0.8 * i, 0.1 * i)) for i, x in enumerate(states)),
         prologue=(
@@ -70,7 +70,7 @@ def chain() -> Program:
             FunctionCall(f["forces"], (z,), (Place(force.offset, STEPS),)),
         ),
         body=tuple(body),
-        epilogue=(FunctionCall(f["end"], (states[0].later(STEPS), states[-1].later(STEPS)), (errors,)),),
+        epilogue=(FunctionCall(f["end"], (states[0].later(steps), states[-1].later(steps)), (errors,)),),
         outputs={"merit": merit, "errors": errors, "work": work},
     )
 

@@ -57,11 +57,16 @@ static void rested(const program *p, word steps, V *b) {
     for (word w = 0; w < x[1]; w++) b[x[0] + steps * x[2] + w] += b[x[0] + k * x[2] + w];
 }
 
+/* Whether what adjoints read is put on the tape as the values are computed: a program of one step has room for it. */
+static int taped_at_once(const program *p) {
+  return p->steps == 1 && !p->calls.count && p->again.count == p->body.count;
+}
+
 static void roll(const program *p, word steps, V *m, int gradient) {
   run(&p->prologue, m, 0, 0);
   for (word k = 0; k < steps; k++)
     if (p->calls.count) step_left(p, m, k, gradient);
-    else run(&p->body, m, 0, k);
+    else run(gradient && taped_at_once(p) ? &p->again : &p->body, m, 0, k);
   if (steps < p->steps) rest(p, steps, m);
   run(&p->epilogue, m, 0, 0);
 }
@@ -81,7 +86,7 @@ static void pull(const program *p, word steps, double discount, V *m, V *b) {
   for (word k = steps - 1; k >= 0; k--) {
     if (p->calls.count) back_left(p, m, b, k);
     else {
-      run(&p->again, m, 0, k);
+      if (!taped_at_once(p)) run(&p->again, m, 0, k);
       run(&p->back_body, m, b, k);
     }
     if (discount > 0) discount_adjoint(p, discount, m, b, k);

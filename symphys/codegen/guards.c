@@ -13,12 +13,18 @@ static int LOWEST(unsigned long long bits) {
 }
 #endif
 
+#ifndef PREFETCH
+#define PREFETCH(place) ((void)(place))
+#endif
+
+#define AHEAD 16 /* calls, of which it is asked before they are noted */
 #define SOON 2 /* steps to come of which lists have all that is needed, backwards: fewer lists, and few calls more */
 
 typedef struct {
   word forward, backward;   /* whether the lists of a direction have what is on */
   char *on, *needed, *seen; /* by guard: in the lists, needed in a step; by step and guard: needed */
   unsigned long long *runs; /* a bit for each call */
+  word *listed;             /* numbers of the calls that run */
   word *tables, *current;   /* entries of all tables; by chain: offset and stride of its newest */
   word *jumps, *copied;     /* by table and section: 6; by table: offset, source and its stride, size */
   const word **items[3];
@@ -54,6 +60,8 @@ API void prepare(const program *p, V *m) {
   free += (2 + p->steps) * guards / 8 + 1;
   x->runs = (unsigned long long *)free;
   free += calls / 64 + 1;
+  x->listed = free;
+  free += calls + AHEAD;
   x->tables = free;
   for (word i = 0; i < 3; i++) {
     word length = length_of(tables[i]);
@@ -71,14 +79,35 @@ API void prepare(const program *p, V *m) {
   x->copied = free + 3 * 6 * sections;
 }
 
-/* Which calls run: those without a guard, and those whose guard is on. */
-static void mark_runs(const program *p, left_out *x) {
+/* Which calls run: those without a guard, and those whose guard is on; their numbers, in order. */
+static word list_runs(const program *p, left_out *x) {
   const word *end = p->groups.places, *call = end + p->guards.count + 1, *calls = call;
+  word count = 0;
   memset(x->runs, 0, (p->calls.count / 64 + 1) * sizeof(*x->runs));
   for (word g = 0; g <= p->guards.count; g++)
     if (g < p->guards.count && !x->on[g]) call = calls + end[g];
     else
       for (; call < calls + end[g]; call++) x->runs[*call / 64] |= 1ull << (*call % 64);
+  for (word block = 0; block <= p->calls.count / 64; block++)
+    for (unsigned long long left = x->runs[block]; left; left &= left - 1)
+      x->listed[count++] = 64 * block + LOWEST(left);
+  for (word i = 0; i < AHEAD; i++) x->listed[count + i] = p->calls.count - 1;
+  return count;
+}
+
+/* What is noted of a call lies here and there in a memory of many calls: it is asked for some calls before. */
+static void ask(const program *p, const left_out *x, const word *next, int backward) {
+  const word *far = p->calls.places + 7 * next[AHEAD - 1], *near = p->calls.places + 7 * next[AHEAD / 2 - 1];
+  PREFETCH(far);
+  PREFETCH(far + 13);
+  word from = backward ? near[4] : near[3], to = near[backward ? 10 : 4];
+  for (word i = from; i < to && i < from + 12; i += 4) PREFETCH(p->reads.places + 2 * i);
+  const word *soon = p->calls.places + 7 * next[AHEAD / 4 - 1];
+  for (word i = soon[backward ? 4 : 3]; i < soon[backward ? 10 : 4]; i++) {
+    const word *r = p->reads.places + 2 * i;
+    PREFETCH(x->tables + r[0]);
+    PREFETCH(x->current + 2 * r[1]);
+  }
 }
 
 static void place(const left_out *x, const word *source, word *to) {
@@ -132,24 +161,25 @@ static void end_section(const program *p, left_out *x, word table, word s) {
 static void note(const program *p, left_out *x, int backward) {
   word from = backward ? 1 : 0, to = backward ? 3 : 1, s = 0, inside = 0;
   memcpy(x->current, p->chains.places, 2 * p->chains.count * sizeof(word));
-  mark_runs(p, x);
   for (word t = from; t < to; t++) x->counts[t] = x->copies[t] = 0;
-  for (word block = 0; block <= p->calls.count / 64; block++)
-    for (unsigned long long left = x->runs[block]; left; left &= left - 1) {
-      word k = 64 * block + LOWEST(left);
-      const word *call = p->calls.places + 7 * k, *section = p->sections.places + 5 * s;
-      for (; s < p->sections.count && k >= section[1]; inside = 0, s++, section += 5)
-        for (word t = from; inside && t < to; t++) end_section(p, x, t, s);
-      if (s < p->sections.count && !inside && k >= section[0]) {
-        for (word t = from; t < to; t++) begin_section(p, x, t, s);
-        inside = 1;
-      }
-      if (!backward && k < p->first) continue;
+  word count = list_runs(p, x);
+  for (word i = 0; i < count; i++) {
+    word k = x->listed[i];
+    ask(p, x, x->listed + i + 1, backward);
+    const word *call = p->calls.places + 7 * k, *section = p->sections.places + 5 * s;
+    for (; s < p->sections.count && k >= section[1]; inside = 0, s++, section += 5)
+      for (word t = from; inside && t < to; t++) end_section(p, x, t, s);
+    if (s < p->sections.count && !inside && k >= section[0]) {
+      for (word t = from; t < to; t++) begin_section(p, x, t, s);
+      inside = 1;
+  }
+    if (backward || k >= p->first) {
       redirect(p, x, backward ? call[4] : call[3], backward ? call[10] : call[4]);
       for (word t = from; t < to; t++) append(p, x, t, call);
-      const word *w = p->writes.places + 2 * call[5];
-      for (word i = call[5]; i < call[12]; i++, w += 2) x->current[2 * w[0]] = w[1], x->current[2 * w[0] + 1] = 0;
-    }
+  }
+    const word *w = p->writes.places + 2 * call[5];
+    for (word i = call[5]; i < call[12]; i++, w += 2) x->current[2 * w[0]] = w[1], x->current[2 * w[0] + 1] = 0;
+  }
   if (inside)
     for (word t = from; t < to; t++) end_section(p, x, t, s);
   for (word t = from; t < to; t++) x->starts[t] = t < 2 ? 0 : p->calls.count + p->sections.count - x->counts[2];
@@ -197,12 +227,26 @@ static void take_in(const program *p, left_out *x, const char *needed, word soon
   x->forward = x->backward = 0;
 }
 
+/* Which guards are on. The last of the first calls run where their own guard is on, or listed: the lists read them. */
+static void look(const program *p, left_out *x, char *needed, V *m, word k) {
+  const word *late = p->late.places, *parent = p->parents.places;
+  phase first = {p->late.count ? late[0] : p->first, p->body.entries};
+  run(&first, m, 0, k);
+  for (word i = 0; i < p->guards.count; i++)
+    needed[i] = parent[i] < 0 && any(m + p->guards.places[i]);
+  for (word i = 0; i < p->late.count; i++, late += 2)
+    if (needed[late[1]] || x->on[late[1]]) {
+      const word *t = p->body.entries + p->calls.places[7 * late[0]];
+      FUNCTIONS[t[0]](m, 0, t + 2, k);
+    }
+  for (word i = 0; i < p->guards.count; i++)
+    if (parent[i] >= 0 && needed[parent[i]]) needed[i] = (char)any(m + p->guards.places[i]);
+}
+
 static void step_left(const program *p, V *m, word k, int gradient) {
   left_out *x = left_of(p, m);
-  phase first = {p->first, p->body.entries};
   char *needed = gradient ? x->seen + k * p->guards.count : x->needed;
-  run(&first, m, 0, k);
-  for (word i = 0; i < p->guards.count; i++) needed[i] = (char)any(m + p->guards.places[i]);
+  look(p, x, needed, m, k);
   take_in(p, x, needed, 0);
   if (!x->forward) note(p, x, 0);
   x->forward = 1;

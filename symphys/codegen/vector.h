@@ -49,6 +49,7 @@ static inline __attribute__((unused)) V fma_(V x, V y, V z) {
 #endif
 #define NAN __builtin_nan("")
 #define INFINITY __builtin_inf()
+#define PREFETCH(place) __builtin_prefetch(place)
 #define LOWEST(x) __builtin_ctzll(x) /* of the bits that are set */
 #define NOINLINE __attribute__((noinline, unused))
 #define API __attribute__((visibility("default")))

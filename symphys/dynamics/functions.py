@@ -27,6 +27,10 @@ MOST_INSTRUCTIONS = 100_000
 """Of a step in which what several parts compute alike is looked for: that saves a tenth, but takes its time."""
 
 
+PAIRS_TOGETHER = 32
+"""Pairs whose forces one call hands on to the next state, in worlds of many pairs: most are 0."""
+
+
 def step_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
@@ -134,10 +138,25 @@ def trace_step(
     for name in layout.names():
         owners.setdefault(name.rpartition(".")[0], []).append(name)
     results = {}
-    for names in owners.values():
+    for names in _together(world, owners, bool(recorder.guards)):
         slot = recorder.give("next", [after[name] for name in names])
         results[slot] = slice(layout[names[0]].start, layout[names[-1]].stop)
     return TracedStep(with_guards(without_dead_code(recorder.calls), recorder.guards, recorder.sections), results)
+
+
+def _together(world: World, owners: Mapping[str, list[str]], many: bool) -> list[list[str]]:
+    """The names of parts of the next state that one call writes: of each owner, or of several of ``many`` pairs."""
+    pairs = {pair.name for pair in world.pairs} if many else set()
+    found: list[list[str]] = []
+    room = 0
+    for owner, names in owners.items():
+        if owner in pairs and room:
+            found[-1] += names
+        else:
+            found.append(list(names))
+            room = PAIRS_TOGETHER if owner in pairs else 0
+        room = max(room - 1, 0)
+    return found
 
 
 def _packed(layout: Layout, tracer: InlineTracer, x: State) -> Expr:

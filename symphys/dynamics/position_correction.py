@@ -40,8 +40,10 @@ def displacements(
     if not context.settings.scheme.time_of_impact:
         return late
     for each, *impulses in zip(constraints, started, given, strict=True):
-        for term, (body, carrier) in enumerate(zip(each.bodies, each.carriers, strict=True)):
-            late[carrier] = _delayed(late[carrier], each.constraint, term, impulses, trees.motions[body].inverse_mid)
+        turning = tuple(trees.motions[body].inverse_mid for body in each.bodies)
+        own = tuple(late[carrier] for carrier in each.carriers)
+        for carrier, moved in zip(each.carriers, _delayed(own, each.constraint, impulses, turning), strict=True):
+            late[carrier] = moved
     return late
 
 
@@ -56,15 +58,28 @@ def _drift(motion: PredictedMotion, state: Velocities, duration: Expr) -> TreeDi
 
 @traced
 def _delayed(
-    late: TreeDisplacement, constraint: ContactConstraint, k: int, impulses: list[ContactImpulse], turning: Expr
-) -> TreeDisplacement:
-    """The displacement less that which the impulse on term k would have caused before it acts.
+    late: tuple[TreeDisplacement, ...],
+    constraint: ContactConstraint,
+    impulses: list[ContactImpulse],
+    turning: tuple[Expr, ...],
+) -> tuple[TreeDisplacement, ...]:
+    """The displacements less those which the impulse would have caused on each term before it acts.
 
     What goes on from the last step has acted all the time, whatever rounding makes of the gap.
     """
-    term, impulse = constraint.terms[k], impulses[1].minus(impulses[0].times(constraint.lasts))
+    impulse = impulses[1].minus(impulses[0].times(constraint.lasts))
     force, twist = impulse.linear(constraint.impulse_normal), impulse.angular(constraint.impulse_normal)
-    early = constraint.delay * term.sign
+    found = list[TreeDisplacement]()
+    for term, own, inverse in zip(constraint.terms, late, turning, strict=True):
+        before = found[0] if constraint.same and found else own
+        found.append(_earlier(before, term, constraint.delay * term.sign, (force, twist), inverse))
+    return tuple(found[-1] for _ in found) if constraint.same else tuple(found)
+
+
+def _earlier(
+    late: TreeDisplacement, term: BodyTerm, early: Expr, impulse: tuple[Expr, Expr], turning: Expr
+) -> TreeDisplacement:
+    force, twist = impulse
     if isinstance(late, GeneralizedVelocities) and term.jacobian is not None:
         return GeneralizedVelocities(
             late.numbers

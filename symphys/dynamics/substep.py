@@ -227,8 +227,9 @@ def _store_forces(
         values[f"{pair.name}.force"] = force if scheme.warm_start else ca.SX.zeros(3)
         if pair.law.spins:
             values[f"{pair.name}.torque"] = torque if scheme.warm_start else ca.SX.zeros(3)
-        for k, body in enumerate(each.bodies):
-            total[body] = _summed(total[body], each.constraint, k, force, torque)
+        sums = _summed(tuple(total[body] for body in each.bodies), each.constraint, force, torque)
+        for body, summed in zip(each.bodies, sums, strict=True):
+            total[body] = summed
     return total
 
 
@@ -242,11 +243,13 @@ def _persistent(
 
 @traced
 def _summed(
-    total: tuple[Expr, Expr], constraint: ContactConstraint, k: int, force: Expr, torque: Expr
-) -> tuple[Expr, Expr]:
-    term = constraint.terms[k]
-    turning = ca.cross(term.impulse_arm, force) + torque
-    return total[0] + term.sign * force, total[1] + term.sign * turning
+    totals: tuple[tuple[Expr, Expr], ...], constraint: ContactConstraint, force: Expr, torque: Expr
+) -> tuple[tuple[Expr, Expr], ...]:
+    found = []
+    for total, term in zip(totals, constraint.terms, strict=True):
+        turning = ca.cross(term.impulse_arm, force) + torque
+        found.append((total[0] + term.sign * force, total[1] + term.sign * turning))
+    return tuple(found)
 
 
 @traced

@@ -77,13 +77,13 @@ def test_the_adjoint_of_a_calm_walk_is_its_derivative() -> None:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, 1, 2])
-@pytest.mark.parametrize("name", ["quadruped_walk", "quadruped_walk_net"])
-def test_it_walks(name: str, seed: int) -> None:
-    """At 1.5 m/s and more, upright, straight on; nineteen of twenty in samples that it has not seen."""
+@pytest.mark.parametrize(("name", "speed", "share"), [("quadruped_walk", 2.5, 0.98), ("quadruped_walk_net", 1.5, 0.95)])
+def test_it_walks(name: str, speed: float, share: float, seed: int) -> None:
+    """As fast as it shall, upright, straight on, and upright in most samples that it has not seen."""
     made, scenario, z = taught(name, {}, seed)
     assert made.judge(z).solved
     x, up = ahead(made, z)
-    assert x > 15 and up > 0.866
+    assert x > 10 * speed and up > 0.866
     errors = scenario.value(z[None], scenario.draw(np.random.default_rng(UNSEEN), 500), 0.0).errors
     upright = [constraint.name for constraint in made.problem.constraints].index("stays upright")
-    assert (errors[:, upright] <= 1).mean() >= 0.95
+    assert (errors[:, upright] <= 1).mean() >= share

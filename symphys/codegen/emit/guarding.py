@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,10 @@ from symphys.codegen.program.program import FunctionCall, Place, Program
 Words = NDArray[np.int64]
 NONE = -1
 TABLES = ("body", "again", "back_body")
+AHEAD = 16
+"""As in ``guards.c``."""
 WIDTHS = {"guards": 1, "groups": 1, "calls": 7, "reads": 2, "writes": 2, "chains": 2, "sections": 5, "copies": 5}
+WIDTHS |= {"late": 2, "parents": 1}
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,9 @@ class Guarding:
             - writes: chain, offset;
             - chains: offset and stride where each begins;
             - sections: first call, the one after the last; chain of its word, offset in it, 0; or -1, offset, stride;
-            - copies: offset; chain of the source, offset in it, 0; or -1, offset, stride; size.
+            - copies: offset; chain of the source, offset in it, 0; or -1, offset, stride; size;
+            - late: of the first calls those that have a guard themselves, which are the last of them; its number;
+            - parents: of each guard that such a call computes the number of this call's guard; of others -1.
         arena: words of 8 bytes that the driver needs for itself.
     """
 
@@ -161,7 +167,7 @@ class _Rows:
         groups: list[list[int]] = [[] for _ in range(len(word) + 1)]
         for k, call in enumerate(self._body):
             groups[NONE if call.guard is None else word[call.guard.offset]].append(k)
-        rows = {
+        listed: dict[str, Any] = {
             "guards": self._guards,
             "groups": [*np.cumsum([len(group) for group in groups]), *(k for group in groups for k in group)],
             "calls": self._starts,
@@ -171,15 +177,52 @@ class _Rows:
             "sections": self._sections,
             "copies": self._copies,
         }
-        calls, sections, outputs = len(self._body), len(self._sections), self._program.phases[1].outputs
+        computes = self._program.phases[1].outputs
+        first = 1 + int(computes.call[np.isin(computes.offset, np.array(self._guards, np.int64))].max(initial=NONE))
+        listed |= self._late(first, word)
+        rows = {name: np.array(each, np.int64).ravel() for name, each in listed.items()}
+        self._gather_chains(rows, word)
+        calls, sections = len(self._body), len(self._sections)
         seen = (2 + self._program.steps) * len(self._guards) // 8 + 1
-        arena = 1 + 64 + seen + calls // 64 + 1 + self._words + 3 * (calls + sections) + 2 * len(self._chains.roots)
-        computes = outputs.call[np.isin(outputs.offset, np.array(self._guards, np.int64))]
+        notes = calls // 64 + 1 + calls + AHEAD + 3 * (calls + sections) + 2 * len(self._chains.roots)
+        arena = 1 + 64 + seen + notes + self._words
         return Guarding(
-            first=1 + int(computes.max(initial=NONE)),
-            rows={name: np.array(each, np.int64).ravel() for name, each in rows.items()},
+            first=first,
+            rows=rows,
             arena=arena + 3 * (6 * sections + 4 * len(self._copies)),
         )
+
+    def _gather_chains(self, rows: Mapping[str, Words], word: Mapping[int, int]) -> None:
+        """Number the chains that begin with calls of one guard one after the other, so that they lie side by side."""
+        if not self._writes:
+            return
+        chains = np.array(self._writes, np.int64)[:, 0]
+        begins = np.unique(chains, return_index=True)[1]
+        whose = np.repeat(np.arange(len(self._body)), np.diff(self._starts[:, 5]))[begins]
+        guards = [word[call.guard.offset] for call in (self._body[k] for k in whose) if call.guard is not None]
+        order = np.argsort(np.array(guards), kind="stable")
+        number = np.empty_like(order)
+        number[order] = np.arange(len(order))
+        rows["chains"].reshape(-1, 2)[:] = rows["chains"].reshape(-1, 2)[order]
+        for name, column in (("reads", 1), ("writes", 0), ("sections", 2), ("copies", 1)):
+            each = rows[name].reshape(-1, WIDTHS[name])[:, column]
+            each[each != NONE] = number[each[each != NONE]]
+
+    def _late(self, first: int, word: Mapping[int, int]) -> dict[str, list[tuple[int, ...]]]:
+        """The rows of those calls of the first that have a guard, and of the guards that they compute."""
+        late, parents = list[tuple[int, ...]](), list[tuple[int, ...]]([(NONE,)] * len(self._guards))
+        for k, call in enumerate(self._body[:first]):
+            if call.guard is None:
+                if late:
+                    raise ProgramError(f"{call.function.name()}: it comes after calls with guards that compute others")
+                continue
+            parent = word[call.guard.offset]
+            late.append((k, parent))
+            for place in call.outputs:
+                if place.offset not in word or place.size != 1:
+                    raise ProgramError(f"{call.function.name()}: with a guard it computes more than guards")
+                parents[word[place.offset]] = (parent,)
+        return {"late": late, "parents": parents}
 
 
 class _Chains:

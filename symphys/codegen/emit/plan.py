@@ -77,7 +77,8 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
         program: what to compute.
         seeded: names of the outputs that are differentiated.
         word: bytes of one word of a whole block: lanes times the size of a number.
-        noted: whether the driver notes which guards are 0 in a step; otherwise they are computed again backwards.
+        noted: whether the driver notes which guards are 0 in a step, otherwise they are computed again backwards, and
+            takes ``again`` for the body where it has all calls of the only step.
     """
     functions = DistinctFunctions()
     parts = [_Part(calls, steps) for calls, steps in zip(program.phases, (1, program.steps, 1), strict=True)]
@@ -87,7 +88,8 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
     for part in parts:
         part.find_adjoints(active, functions)
     body = parts[1]
-    again = _again(program, body, reach, functions, noted)
+    at_once = noted and _taped_at_once(program)
+    again = np.ones(len(body.calls), bool) if at_once else _again(program, body, reach, functions, noted)
     tape = _put_on_tape(program, body, again, functions, FAST_MEMORY // word)
     tables = {name: part.pushes(functions) for name, part in zip(("prologue", "body", "epilogue"), parts, strict=True)}
     tables["again"] = body.pushes(functions, np.flatnonzero(again))
@@ -214,6 +216,11 @@ def _any(before: Words, spans: Spans, steps: int) -> NDArray[np.bool_]:
         on |= before[first + each[1]] > before[first]
     found[moving] = on[whose.ravel()]
     return found
+
+
+def _taped_at_once(program: Program) -> bool:
+    """Whether a gradient computes no values twice: there is one step, and no call of it may be left out."""
+    return program.steps == 1 and not any(call.guard is not None or call.section is not None for call in program.body)
 
 
 def _again(program: Program, body: _Part, reach: Reach, functions: DistinctFunctions, noted: bool) -> NDArray[np.bool_]:

@@ -24,7 +24,18 @@ from symphys.dynamics.collision.pairs.sphere_sphere import sphere_sphere
 from symphys.dynamics.collision.pairs.terrain import box_terrain, capsule_terrain, sphere_terrain
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.tracing.decorator import traced
-from symphys.model.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, Plane, Sphere, Surface, Terrain
+from symphys.model.shapes import (
+    Box,
+    Capsule,
+    Convex,
+    Cylinder,
+    Ellipsoid,
+    Plane,
+    Sphere,
+    Surface,
+    Terrain,
+    points_of_kinds,
+)
 
 __all__ = ["Contact", "collide"]
 
@@ -58,9 +69,25 @@ RULES: dict[tuple[type, type], Rule] = {
 """Which rule covers which surfaces; ``shapes.POINTS`` says how many points each returns."""
 
 
-@traced
+APART = frozenset({(Capsule, Plane), (Box, Plane), (Capsule, Capsule)})
+"""Pairs whose points have little in common: each is computed by itself, so that it may be far by itself."""
+
+
 def collide(first: Surface, second: Surface, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """The contacts of two surfaces, carried along a and b, in this step: one for each point."""
+    kinds = type(first), type(second)
+    if kinds in APART:
+        return [_point(k, first, second, a, b) for k in range(points_of_kinds(*kinds))]
+    return _points(first, second, a, b)
+
+
+@traced
+def _point(k: int, first: Surface, second: Surface, a: PredictedPath, b: PredictedPath) -> Contact:
+    return RULES[type(first), type(second)](first, second, a, b)[k]
+
+
+@traced
+def _points(first: Surface, second: Surface, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     rule = RULES.get((type(first), type(second)))
     if rule is not None:
         return rule(first, second, a, b)

@@ -1,21 +1,26 @@
-"""The broad phase: pairs of surfaces that are too far apart to act within a step.
+"""The broad phase: pairs of surfaces, and points of these, that are too far apart to act within a step.
 
 A pair is far where the spheres around its surfaces are farther apart than its bodies go in the step at their speeds,
-one of them struck by the fastest body. A far pair gives no impulse. That is part of the scheme, so every way to compute
-a step agrees. A compiled kernel leaves out the calls of pairs that are far (``symphys.dynamics.tracing.guards``).
+one of them struck by the fastest body. Of what is left some shapes are measured themselves (``near_points``), each of
+their points by itself. What is far gives no impulse. That is part of the scheme, so every way to compute a step agrees.
+A compiled kernel leaves out the calls of what is far (``symphys.dynamics.tracing.guards``).
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
+from symphys.dynamics.collision.near_points import Sight, Travel, can_measure, measured, near_points
 from symphys.dynamics.context import State, StepContext, StepSettings
+from symphys.dynamics.motion import inertia_matrix
 from symphys.dynamics.tracing.decorator import guard, traced
+from symphys.maths import rotation
 from symphys.maths.smoothing import length
 from symphys.model.body import Body
 from symphys.model.scalar import is_number
@@ -36,56 +41,66 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
     Smoothed contacts act from afar, so with smoothing all are near.
     """
     world, settings = context.world, context.settings
-    sides = [(pair.first, pair.second) for pair in world.pairs]
-    if len(set(sides)) < FEWEST:
+    points = Counter((pair.first, pair.second) for pair in world.pairs)
+    if len(points) < FEWEST:
         return ()
     held = {index for joint in world.joints for index in joint.bodies}
-    bodies = [_sight(x, body, context.input(f"{body.name}.force"), settings) for body in world.bodies]
-    fastest = _fastest(tuple(body.speed for body in bodies))
-    found = dict[tuple[Side, Side], Expr]()
-    for first, second in dict.fromkeys(sides):
+    bodies = [_sight(x, body, context, can_measure(body)) for body in world.bodies]
+    fastest = _fastest(tuple(_most(sight, _arm(body)) for sight, body in zip(bodies, world.bodies, strict=True)))
+    reach, found = Travel(settings.scheme.dt, fastest), dict[tuple[Side, Side], list[Expr]]()
+    for (first, second), count in points.items():
         radii = _radius(world, first, held), _radius(world, second, held)
         if first.body is None or radii[0] is None or radii[1] is None:
-            found[first, second] = ca.SX(1)
-        elif second.body is None:
-            plane = world.surface(second)
+            found[first, second] = [ca.SX(1)] * count
+            continue
+        shapes, a = (world.surface(first), world.surface(second)), bodies[first.body]
+        if second.body is None:
+            plane, b, near = shapes[1], None, ca.SX(1)
             assert isinstance(plane, Plane)
-            place = plane.normal, plane.offset
-            found[first, second] = guard(_near_plane(bodies[first.body], place, radii[0], fastest, settings))
+            if not measured(shapes, (a, b)):
+                near = guard(_near_plane(a, (plane.normal, plane.offset), radii[0], reach, settings))
         else:
-            both = bodies[first.body], bodies[second.body]
-            found[first, second] = guard(_near(*both, radii[0] + radii[1], fastest, settings))
-    return tuple(found[each] for each in sides)
+            b = bodies[second.body]
+            near = guard(_near(a, b, radii[0] + radii[1], reach, settings))
+        if measured(shapes, (a, b)):
+            words = near_points(shapes, (a, b), near, reach, settings.smoothing)
+            found[first, second] = [guard(word) for (word,) in words]
+        else:
+            found[first, second] = [near] * count
+    lists = {sides: iter(words) for sides, words in found.items()}
+    return tuple(next(lists[pair.first, pair.second]) for pair in world.pairs)
 
 
-@dataclass(frozen=True)
-class _Sight:
-    """What the broad phase needs of a body.
-
-    Attributes:
-        position, velocity: (3,) [m], [m/s].
-        gained: of speed within the step, without gravity and blows [m/s].
-        speed: the largest within the step [m/s].
-    """
-
-    position: Expr
-    velocity: Expr
-    gained: Expr
-    speed: Expr
-
-
-def _sight(x: State, body: Body, push: Expr | None, settings: StepSettings) -> _Sight:
+def _sight(x: State, body: Body, context: StepContext, turned: bool) -> Sight:
     """Of a body; a frame without mass counts as one of 1 kg, as in ``PredictedMotion``."""
-    position, velocity, reaction = (x[f"{body.name}.{field}"] for field in ("position", "velocity", "reaction_force"))
-    force = reaction, ca.SX.zeros(3) if push is None else push
+    position, velocity = x[f"{body.name}.position"], x[f"{body.name}.velocity"]
+    forces, torques = (
+        (x[f"{body.name}.reaction_{kind}"], ca.SX.zeros(3) if push is None else push)
+        for kind in ("force", "torque")
+        for push in [context.input(f"{body.name}.{kind}")]
+    )
     mass = 1.0 if body.massless else body.mass
-    return _seen(position, velocity, force, mass, settings.gravity, settings.scheme.dt)
+    settings = context.settings
+    seen = _seen(position, velocity, forces, mass, settings.gravity, settings.scheme.dt)
+    if not turned:
+        return seen
+    least = float(np.linalg.eigvalsh(np.array(ca.DM(inertia_matrix(body.inertia))))[0])
+    turning = x[f"{body.name}.orientation"], x[f"{body.name}.angular_velocity"]
+    return _turned(seen, turning, torques, least, settings.scheme.dt)
 
 
 @traced
-def _seen(position: Expr, velocity: Expr, forces: tuple[Expr, Expr], mass: Expr, gravity: Expr, dt: Expr) -> _Sight:
+def _seen(position: Expr, velocity: Expr, forces: tuple[Expr, Expr], mass: Expr, gravity: Expr, dt: Expr) -> Sight:
     gained = dt * (length(forces[0]) + length(forces[1])) / mass
-    return _Sight(position, velocity, gained, length(velocity) + gained + dt * length(gravity))
+    return Sight(position, velocity, gained, length(velocity) + gained + dt * length(gravity))
+
+
+@traced
+def _turned(
+    seen: Sight, turning: tuple[Expr, Expr], torques: tuple[Expr, Expr], least_inertia: float, dt: Expr
+) -> Sight:
+    spin = length(turning[1]) + dt * (length(torques[0]) + length(torques[1])) / least_inertia
+    return Sight(seen.position, seen.velocity, seen.gained, seen.speed, rotation.matrix(turning[0]), spin)
 
 
 def _radius(world: World, side: Side, held: set[int]) -> float | None:
@@ -99,20 +114,31 @@ def _radius(world: World, side: Side, held: set[int]) -> float | None:
     return hypot(*surface.centre) + surface.extent
 
 
+def _arm(body: Body) -> float:
+    """How far from the centre of mass of a body the farthest point of its shapes is [m]."""
+    sizes = [(shape.centre, shape.sizes) for shape in body.shapes]
+    return max((hypot(*shape.centre) + shape.extent for shape in body.shapes), default=0.0) if is_number(sizes) else 0.0
+
+
+@traced
+def _most(sight: Sight, arm: float) -> Expr:
+    """The greatest speed of a point of a body [m/s]."""
+    return sight.speed + sight.swing(arm)
+
+
 @traced
 def _fastest(speeds: Sequence[Expr]) -> Expr:
     return ca.mmax(ca.vertcat(*speeds))
 
 
 @traced
-def _near(a: _Sight, b: _Sight, radii: float, fastest: Expr, settings: StepSettings) -> Expr:
-    reach = settings.scheme.dt * (length(a.velocity - b.velocity) + a.gained + b.gained + fastest)
-    return ca.logic_or(length(a.position - b.position) < radii + reach, settings.smoothing > 0)
+def _near(a: Sight, b: Sight, radii: float, reach: Travel, settings: StepSettings) -> Expr:
+    ahead = reach.of_centres(a, b)
+    return ca.logic_or(length(a.position - b.position) < radii + ahead, settings.smoothing > 0)
 
 
 @traced
-def _near_plane(a: _Sight, plane: tuple[Any, Any], radius: float, fastest: Expr, settings: StepSettings) -> Expr:
+def _near_plane(a: Sight, plane: tuple[Any, Any], radius: float, reach: Travel, settings: StepSettings) -> Expr:
     normal, offset = plane
-    reach = settings.scheme.dt * (a.speed + fastest)
     height = ca.dot(ca.vertcat(*normal), a.position) - offset
-    return ca.logic_or(height < radius + reach, settings.smoothing > 0)
+    return ca.logic_or(height < radius + reach.of_centres(a, None), settings.smoothing > 0)

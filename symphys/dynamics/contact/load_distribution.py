@@ -63,10 +63,7 @@ def _face(world: World, pair: Pair) -> Any:
 
 @traced
 def _linear(constraints: tuple[ContactConstraint, ...], loads: tuple[Expr, ...]) -> tuple[Expr, ...]:
-    parts = [
-        ca.fmax(load - constraint.load, 0) / ca.fmax(load, constraint.load)
-        for constraint, load in zip(constraints, loads, strict=True)
-    ]
+    parts = [_share(constraint, load) for constraint, load in zip(constraints, loads, strict=True)]
     total = sum(parts) + BLUNT
     arms = [ca.cross(constraint.terms[0].impulse_arm, constraint.impulse_normal) for constraint in constraints]
     middle = sum(part * arm for part, arm in zip(parts, arms, strict=True)) / total
@@ -81,3 +78,9 @@ def _linear(constraints: tuple[ContactConstraint, ...], loads: tuple[Expr, ...])
         constraint.near * ca.fmax(load + part * (mean + ca.dot(slope, arm) - load), 0)
         for constraint, part, arm, load in zip(constraints, parts, arms, loads, strict=True)
     )
+
+
+def _share(constraint: ContactConstraint, load: Expr) -> Expr:
+    """How much of a point counts, from 0 to 1: nothing of what is far, whatever its numbers are."""
+    near = constraint.near
+    return near * ca.fmax(load - constraint.load, 0) / (ca.fmax(load, constraint.load) + (1 - near))

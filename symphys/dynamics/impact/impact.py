@@ -36,6 +36,7 @@ Expr = Any
 
 TOGETHER = 1e-9
 """Of dt: impacts that are no further apart are one."""
+POSE = "position", "orientation"
 TOUCHING = 1e-3
 """Of the distance a_ref dt^2: surfaces that near to each other take part in an impact of their bodies."""
 
@@ -223,22 +224,32 @@ def _delay(
     """
     held = {index for joint in context.world.joints for index in joint.bodies}
     for each, impulse, time in zip(constraints, impulses, late, strict=True):
-        for k, index in enumerate(each.bodies):
-            names = tuple(f"{context.world.bodies[index].name}.{part}" for part in ("position", "orientation"))
-            if index not in held:
-                pose = x[names[0]], x[names[1]]
-                x |= zip(names, _delayed(pose, each.constraint, k, impulse, time), strict=True)
+        free = [(k, index) for k, index in enumerate(each.bodies) if index not in held]
+        if not free:
+            continue
+        names = [tuple(f"{context.world.bodies[index].name}.{part}" for part in POSE) for _, index in free]
+        poses, terms = tuple(tuple(x[name] for name in own) for own in names), tuple(k for k, _ in free)
+        for own, pose in zip(names, _delayed(poses, each.constraint, terms, impulse, time), strict=True):
+            x |= zip(own, pose, strict=True)
 
 
 @traced
 def _delayed(
-    pose: tuple[Expr, Expr], constraint: ContactConstraint, k: int, impulse: ContactImpulse, time: Expr
-) -> tuple[Expr, Expr]:
-    term, (position, q) = constraint.terms[k], pose
+    poses: tuple[tuple[Expr, ...], ...],
+    constraint: ContactConstraint,
+    terms: tuple[int, ...],
+    impulse: ContactImpulse,
+    time: Expr,
+) -> tuple[tuple[Expr, Expr], ...]:
     push, twist = impulse.linear(constraint.impulse_normal), impulse.angular(constraint.impulse_normal)
-    early = -time * term.sign
-    turn = early * apply(term.inverse_inertia, ca.cross(term.impulse_arm, push) + twist)
-    return position + early * term.inverse_mass * push, q + rotation.multiply(ca.vertcat(0, turn / 2), q)
+    found = []
+    for k, (position, q) in zip(terms, poses, strict=True):
+        term = constraint.terms[k]
+        early = -time * term.sign
+        turn = early * apply(term.inverse_inertia, ca.cross(term.impulse_arm, push) + twist)
+        moved = position + early * term.inverse_mass * push
+        found.append((moved, q + rotation.multiply(ca.vertcat(0, turn / 2), q)))
+    return tuple(found)
 
 
 @traced

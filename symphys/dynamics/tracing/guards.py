@@ -8,17 +8,21 @@ of that kind, or are used by such calls only, can be left out.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from typing import Any, NamedTuple
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 
 Expr = Any
 """casadi SX"""
+MANY = 80
+"""Arguments of a call that is not looked into: it puts together what many bodies or pairs have."""
 Known = int
 """Which entries of a vector are known to be 0, as bits."""
 Pattern = tuple[Known, ...]
@@ -71,13 +75,18 @@ def with_guards(
         sections: words, as entries of vectors, that each leave out many calls that follow one another.
     """
     search = _Search(calls)
-    first = search.needed(guards)
-    found, taken = dict[int, Guard](), set(first)
-    for word in guards:
-        left = search.left_out(Part(word), taken)
+    first, found = search.needed(guards), dict[int, Guard]()
+    own, implied, taken = search.implied(guards), dict[int, list[int]](), set(first)
+    for word in sorted(guards, key=lambda each: bool(own[each.number])):
+        weaker = {k for number in own[word.number] for k in implied[number]}
+        taken -= search.writers(own[word.number])
+        left = search.left_out(Part(word), taken, weaker, [found[k] for k in weaker])
+        implied[word.number] = list(left)
         found |= left
         taken |= left.keys()
-    order = [k for k in range(len(calls)) if k in first] + [k for k in range(len(calls)) if k not in first]
+    late = [k for k in range(len(calls)) if k in first and k in found]
+    early = [k for k in range(len(calls)) if k in first and k not in found]
+    order = [*early, *late, *(k for k in range(len(calls)) if k not in first)]
     apart: dict[int, Guard] = {}
     for vector, entry in sections:
         left = search.left_out(Part(vector, entry), apart.keys())
@@ -95,23 +104,56 @@ class _Search:
         self._readers: dict[int, list[int]] = {}
         self._writer: dict[int, int] = {}
         self._evaluated: dict[tuple[int, Pattern], list[Simplified]] = {}
+        self._disregarded: dict[tuple[int, Pattern], _Disregarded] = {}
+        self._zeros: dict[int, Pattern] = {}
         for k, call in enumerate(calls):
             for vector in call.outputs:
                 self._writer[vector.number] = k
             for vector in call.inputs:
                 self._readers.setdefault(vector.number, []).append(k)
 
-    def left_out(self, word: Part, without: Collection[int]) -> dict[int, Guard]:
-        """The calls that are without effect where ``word`` is 0, but for those ``without``."""
+    def implied(self, guards: Sequence[TracedVector]) -> dict[int, list[int]]:
+        """For each guard, by the numbers of their vectors, the others that are 0 where it is."""
+        numbers = {word.number for word in guards}
+        found: dict[int, list[int]] = {}
+        for word in guards:
+            results = self._simplified(word, 0, numbers)
+            zero = (
+                vector.number
+                for k, each in results.items()
+                for vector, (_, known) in zip(self._calls[k].outputs, each, strict=True)
+                if known & 1 and vector.number in numbers
+            )
+            found[word.number] = [number for number in zero if number != word.number]
+        return found
+
+    def writers(self, numbers: Sequence[int]) -> set[int]:
+        """The calls that write vectors."""
+        return {self._writer[number] for number in numbers}
+
+    def left_out(
+        self, word: Part, without: Collection[int], weaker: Collection[int] = (), standing_for: Iterable[Guard] = ()
+    ) -> dict[int, Guard]:
+        """The calls that are without effect where ``word`` is 0, but for those ``without``.
+
+        ``weaker`` are among these: calls that are left out then by guards of their own, ``standing_for`` what stands
+        for their results.
+        """
         assert word.vector is not None
         found = self._simplified(word.vector, word.start)
         left, standing = dict[int, Guard](), {word.vector.number}
+        standing |= {
+            part.vector.number
+            for guard in standing_for
+            for part in guard.otherwise
+            if part is not None and part.vector is not None
+        }
         looked_at = set(found)
         waiting = [-k for k in found]
         heapify(waiting)
         while waiting:
             k = -heappop(waiting)
-            otherwise = None if k in without else self._otherwise(k, found.get(k), left, standing)
+            otherwise = None if k in without else self._otherwise(k, found, left, weaker, standing)
             if otherwise is None:
                 continue
             left[k] = Guard(word, otherwise)
@@ -160,64 +202,125 @@ class _Search:
         return found
 
     def _otherwise(
-        self, k: int, found: Sequence[Simplified] | None, left: Collection[int], standing: Collection[int]
+        self,
+        k: int,
+        found: Mapping[int, Sequence[Simplified]],
+        left: Collection[int],
+        weaker: Collection[int],
+        standing: Collection[int],
     ) -> tuple[Part | None, ...] | None:
         """What stands for the results of a call; None if one of them is needed and has to be computed.
 
-        ``left`` are the calls that are left out, ``standing`` what stands for their results.
+        ``left`` and ``weaker`` are the calls that are left out, ``standing`` what stands for their results.
         """
         parts: list[Part | None] = []
-        call = self._calls[k]
+        call, results = self._calls[k], found.get(k)
         for i, vector in enumerate(call.outputs):
-            needed = bool(vector.name) or vector.number in standing
-            if not needed:
-                for reader in self._readers.get(vector.number, ()):
-                    if reader not in left:
+            needed, read = bool(vector.name) or vector.number in standing, False
+            for reader in () if needed else self._readers.get(vector.number, ()):
+                if reader not in left and reader not in weaker:
+                    read = True
+                    if not self._disregards(reader, vector.number, found):
                         needed = True
                         break
-            same = found[i][0] if needed and found is not None else None
+            same = results[i][0] if needed and results is not None else None
             if needed and (vector.name or same is None):
                 return None
+            if read and not needed:
+                same = _Same(None)  # any number would do
             parts.append(None if same is None else same.of(call.inputs))
         return tuple(parts)
 
-    def _simplified(self, word: TracedVector, start: int) -> dict[int, list[Simplified]]:
-        """For each call that reads something known what its results are, as far as they are known; in order."""
+    def _disregards(self, k: int, number: int, found: Mapping[int, Sequence[Simplified]]) -> bool:
+        """Whether the results of a call are the same whatever is in a vector that it reads, and with zeros there."""
+        if k not in found:
+            return False
+        call = self._calls[k]
+        if call.outputs[0].name or len(call.inputs) > MANY:
+            return False
+        key = id(call.function), self._zeros[k]
+        if key not in self._disregarded:
+            self._disregarded[key] = _Disregarded(call.function, self._zeros[k])
+        return all(self._disregarded[key][i] for i, vector in enumerate(call.inputs) if vector.number == number)
+
+    def _simplified(self, word: TracedVector, start: int, until: Collection[int] = ()) -> dict[int, list[Simplified]]:
+        """For each call that reads something known what its results are, as far as they are known; in order.
+
+        Nothing is followed beyond vectors with numbers in ``until``, where there are any, nor what has no such.
+        """
         known: dict[int, Known] = {word.number: 1 << start}
         found: dict[int, list[Simplified]] = {}
-        waiting = list(self._readers.get(word.number, ()))
+        self._zeros = {}
+        waiting = [k for k in self._readers.get(word.number, ()) if not until or self._gives(k, until)]
         heapify(waiting)
         while waiting:
             k = heappop(waiting)
             if k in found:
                 continue
             call = self._calls[k]
-            zeros = tuple([known.get(vector.number, 0) for vector in call.inputs])
-            found[k] = results = self._results(call.function, zeros)
+            self._zeros[k] = zeros = tuple([known.get(vector.number, 0) for vector in call.inputs])
+            found[k] = results = self._results(call, zeros)
             for vector, (_, zero) in zip(call.outputs, results, strict=True):
                 if zero:
                     known[vector.number] = zero
-                    for reader in self._readers.get(vector.number, ()):
+                    for reader in () if until else self._readers.get(vector.number, ()):
                         heappush(waiting, reader)
         return found
 
-    def _results(self, function: ca.Function, zeros: Pattern) -> list[Simplified]:
-        """What is known of each result."""
+    def _gives(self, k: int, numbers: Collection[int]) -> bool:
+        return any(vector.number in numbers for vector in self._calls[k].outputs)
+
+    def _results(self, call: TracedCall, zeros: Pattern) -> list[Simplified]:
+        """What is known of each result; nothing of what is needed anyway, nor where few of many arguments are known."""
+        function = call.function
+        if call.outputs[0].name or len(zeros) > max(MANY, 2 * sum(map(bool, zeros))):
+            return [(None, 0)] * len(call.outputs)
         key = id(function), zeros
         if key not in self._evaluated:
-            homes, arguments = dict[int, tuple[int, int]](), list[Expr]()
-            for i, known in enumerate(zeros):
-                entries: list[Expr] = ca.SX.sym("a", function.numel_in(i)).nonzeros()
-                homes |= {e.element_hash(): (i, j) for j, e in enumerate(entries)}
-                if known:
-                    entries = [ca.SX(0) if known >> j & 1 else e for j, e in enumerate(entries)]
-                arguments.append(ca.densify(ca.vertcat(ca.SX(0, 1), *entries)))
+            homes, results = _with_zeros(function, zeros)
             found = list[Simplified]()
-            for result in function.call(arguments):
+            for result in results:
                 same = [_entry(e, homes) for e in ca.densify(result).nonzeros()]
                 found.append((_part(same), sum(1 << j for j, entry in enumerate(same) if entry == 0)))
             self._evaluated[key] = found
         return self._evaluated[key]
+
+
+def _with_zeros(function: ca.Function, zeros: Pattern) -> tuple[dict[int, tuple[int, int]], list[Expr]]:
+    """Where symbols lie, by their hashes, (argument, entry), and the results of these symbols and zeros."""
+    homes, arguments = dict[int, tuple[int, int]](), list[Expr]()
+    for i, known in enumerate(zeros):
+        entries: list[Expr] = ca.SX.sym("a", function.numel_in(i)).nonzeros()
+        homes |= {e.element_hash(): (i, j) for j, e in enumerate(entries)}
+        if known:
+            entries = [ca.SX(0) if known >> j & 1 else e for j, e in enumerate(entries)]
+        arguments.append(ca.densify(ca.vertcat(ca.SX(0, 1), *entries)))
+    return homes, function.call(arguments)
+
+
+class _Disregarded:
+    """For each argument of a function whether results do not depend on it, and are the same with zeros in its place."""
+
+    def __init__(self, function: ca.Function, zeros: Pattern) -> None:
+        """``zeros``: what is known of the arguments."""
+        self._function, self._zeros = function, zeros
+        homes, results = _with_zeros(function, zeros)
+        read: list[Expr] = ca.symvar(ca.vertcat(ca.SX(0, 1), *map(ca.vec, results)))
+        self._found: dict[int, bool] = dict.fromkeys((homes[e.element_hash()][0] for e in read), False)
+
+    def __getitem__(self, argument: int) -> bool:
+        """Of an argument; symbols tell of most that it counts, the others are tried with numbers."""
+        if argument not in self._found:
+            random, given = np.random.default_rng(0), list[NDArray[np.float64]]()
+            for i, known in enumerate(self._zeros):
+                kept = [not known >> j & 1 for j in range(self._function.numel_in(i))]
+                given.append(random.uniform(0.5, 1.5, len(kept)) * kept)
+            others = [*given[:argument], 0 * given[argument], *given[argument + 1 :]]
+            one, other = (
+                np.array(ca.vertcat(*self._function.call(list(map(ca.DM, each))))) for each in (given, others)
+            )
+            self._found[argument] = np.array_equal(one, other)
+        return self._found[argument]
 
 
 def _entry(expression: Expr, homes: dict[int, tuple[int, int]]) -> Any:

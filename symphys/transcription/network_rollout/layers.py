@@ -65,7 +65,7 @@ class Layers:
     def _turned(self) -> list[Any]:
         return [matrix.T.copy() for matrix in self.matrices]
 
-    def _product(self, number: int, values: Any, turned: bool, out: Any = None) -> Any:
+    def _product(self, number: int, values: Any, turned: bool, out: Any) -> Any:
         """A matrix, or its transpose, times (width, columns)."""
         stored = turned == self.rows and self.copied
         matrix = (self._turned if stored else self.matrices)[number]
@@ -109,7 +109,7 @@ class Layers:
         back = adjoint
         for i, layer in reversed(list(enumerate(self.layers))):
             through(layer.activation, values[i + 1], back, deltas[i])
-            back = self._product(i, deltas[i], True)
+            back = self._product(i, deltas[i], True, self.room(layer.inputs, deltas[i].shape[1]))
         return self.get(back if self.straight is None else back + self.straight.T @ adjoint).T
 
     def gradient(self, values: Sequence[Any], deltas: Sequence[Any], adjoint: Any) -> Array:

@@ -9,6 +9,7 @@ import programs
 import pytest
 
 from symphys.codegen import Cache, Kernel, ProgramError, compile_program, interpret
+from symphys.codegen.emit.plan import plan
 
 
 def draw(kernel: Kernel, rows: int) -> Any:
@@ -50,6 +51,23 @@ def test_a_gradient_is_the_seed_times_the_jacobian(kernel: Kernel) -> None:
         np.vstack([kernel.jacobian(row, name, gravity(kernel)) for name in kernel.program.outputs]) for row in z
     ]
     np.testing.assert_allclose(gradient, np.einsum("bs,bsn->bn", seed, jacobians), rtol=1e-11, atol=1e-12)
+
+
+def test_of_one_step_nothing_is_computed_twice(cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The driver takes what fills the tape for the values; they and gradients are those of two passes, to the bit."""
+    program, found = programs.chain(1), []
+    for once in (True, False):
+        with monkeypatch.context() as patch:
+            if not once:
+                patch.setattr("symphys.codegen.emit.plan._taped_at_once", lambda program: False)
+            tables = plan(program, list(program.outputs)).tables
+            assert (tables["again"][0] == tables["body"][0]) == once
+            kernel = compile_program(program, cache=cache, threads=1)
+            found.append(kernel.gradient(draw(kernel, 9), np.ones(5)))
+    (values, gradients), (others, expected) = found
+    np.testing.assert_array_equal(joined(values), joined(others))
+    np.testing.assert_array_equal(gradients, expected)
+    assert np.abs(expected).max() > 0
 
 
 @pytest.mark.parametrize("threads", [1, 2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
@@ -14,6 +15,7 @@ from symphys import Body, Law, Layout, Plane, Scheme, initial_state, make_world,
 from symphys.dynamics.collision import broad_phase
 from symphys.dynamics.collision.broad_phase import near_pairs
 from symphys.dynamics.context import StepContext, make_context
+from symphys.model.shapes import Box, Capsule
 
 
 def world_of(places: list[tuple[float, float, float]]) -> symphys.World:
@@ -39,6 +41,34 @@ def test_what_is_apart_by_more_than_the_way_of_a_step_is_far() -> None:
 def test_speed_brings_pairs_near() -> None:
     found = near(world_of(LINE), velocity=(0, 0, 4))
     assert {name for name, each in found.items() if each} == {"b0-ground", "b0-b1"}
+
+
+def rods(places: list[tuple[float, float, float]]) -> symphys.World:
+    """Upright capsules, 0.4 m from end to end."""
+    rod = Body("rod", 1.0, (0.02, 0.02, 0.005), (Capsule(0.05, 0.15),))
+    bodies = [replace(rod, name=f"b{i}", start={"position": place}) for i, place in enumerate(places)]
+    return make_world(bodies, [Plane.ground()], Law(0.5, 0.5))
+
+
+def test_of_capsules_the_points_that_may_touch_are_near() -> None:
+    """The spheres around them overlap, but only neighbouring ends and what is between are within reach."""
+    apart = [(0, 0, 3), (0.3, 0, 3), (0.01, 0, 3.405), (5, 0, 1), (5, 5, 1), (9, 5, 1)]
+    found = near(rods(apart), velocity=(0, 0, 0.5))
+    assert {name for name, each in found.items() if each} == {"b0-b2:1", "b0-b2:2", "b0-b2:4"}
+
+
+def test_a_corner_over_the_ground_is_near_by_itself() -> None:
+    box = Body("b0", 1.0, (0.02, 0.02, 0.02), (Box((0.1, 0.1, 0.1)),))
+    balls = [Body.ball(f"b{i}", 0.1, 1.0, position=(2.0 * i, 0, 3)) for i in range(1, 5)]
+    world = make_world([box, *balls], [Plane.ground()], Law(0.5, 0.5))
+    x, layout = np.array(initial_state(world)).ravel(), Layout(world)
+    x[layout["b0.position"]], half = (0, 0, 0.13), np.radians(20) / 2
+    x[layout["b0.orientation"]] = (np.cos(half), np.sin(half), 0, 0)
+    context = make_context(world, Scheme(dt=0.01), (), ca.SX(0, 1), ca.SX(0))
+    found = near_pairs(context, {name: ca.SX(x[layout[name]]) for name in layout.names()})
+    words = [int(each) for pair, each in zip(world.pairs, found, strict=True) if pair.first.body == 0]
+    assert sum(words[:8]) == 2
+    assert sum(words[8:]) == 0
 
 
 def test_with_smoothing_all_are_near() -> None:

@@ -11,7 +11,7 @@ from symphys.dynamics.collision.box_geometry import MovingBox, facing, moving_bo
 from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.pairs.box_box import approach_of, edges_across
 from symphys.dynamics.collision.pairs.sphere_box import BoxField
-from symphys.dynamics.collision.pairs.sphere_capsule import CapsuleField
+from symphys.dynamics.collision.pairs.sphere_capsule import ball_at_capsule
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.model.shapes import Box, Capsule
@@ -30,6 +30,5 @@ def capsule_box(capsule: Capsule, box: Box, a: PredictedPath, b: PredictedPath) 
     approach = approach_of(near, (a, b), capsule.half_length + sum(box.half_sizes))
     ground = facing(other, near.direction.at(near.time), near.time)
     found += edges_across([a.path(end) for end in tips], ground, approach, capsule.radius)
-    side = CapsuleField(capsule.radius, capsule.half_length)
-    corners = [ball_in_field(c, c - b.centre(), 0.0, capsule, side, a) for c in ground.corners()]
+    corners = [ball_at_capsule(c, c - b.centre(), 0.0, capsule, a) for c in ground.corners()]
     return found + [flipped(contact) for contact in corners]

@@ -10,9 +10,8 @@ import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes, ends
 from symphys.dynamics.collision.contact_geometry import Contact, Expr, flipped
-from symphys.dynamics.collision.pairs.sphere_capsule import CapsuleField
+from symphys.dynamics.collision.pairs.sphere_capsule import ball_at_capsule
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, chosen
-from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.dynamics.collision.witness_points import Witness, contact_of, steady
 from symphys.maths.smoothing import length
@@ -33,8 +32,7 @@ def capsule_capsule(first: Capsule, second: Capsule, a: PredictedPath, b: Predic
 
 def on_capsule(first: Capsule, second: Capsule, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """The round ends of the first against the second."""
-    field = CapsuleField(second.radius, second.half_length)
-    return [ball_in_field(a.path(end), a.arm(end), first.radius, second, field, b) for end in ends(first)]
+    return [ball_at_capsule(a.path(end), a.arm(end), first.radius, second, b) for end in ends(first)]
 
 
 def crossing(first: Capsule, second: Capsule, a: PredictedPath, b: PredictedPath) -> Contact:
