@@ -237,7 +237,7 @@ static void look(const program *p, left_out *x, char *needed, V *m, word k) {
   for (word i = 0; i < p->late.count; i++, late += 2)
     if (needed[late[1]] || x->on[late[1]]) {
       const word *t = p->body.entries + p->calls.places[7 * late[0]];
-      FUNCTIONS[t[0]](m, 0, t + 2, k);
+      CALL(t, m, 0, k);
     }
   for (word i = 0; i < p->guards.count; i++)
     if (parent[i] >= 0 && needed[parent[i]]) needed[i] = (char)any(m + p->guards.places[i]);
