@@ -29,7 +29,7 @@ class SourceFile:
 
     text: str
     narrow: bool = False
-    straight: bool = True
+    straight: bool = False
 
 
 def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[SourceFile]:
@@ -37,21 +37,26 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
 
     ``narrow``: of fewer lanes than a vector register has.
     """
-    head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
     found, moving, dialect = [], plan.moving(), forms_of(lanes)
     for backward in (False, True):
         mine = [i for i, (_, form) in enumerate(plan.functions) if form.backward == backward]
         work = [len(plan.functions[i][0].nodes) for i in mine]
         texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i]) for i in mine]
-        start = head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
+        start = head_of(lanes, single, dialect)
         for group in spread(texts, work, FILES):
-            found.append(SourceFile("\n".join([start, *group]), narrow=narrow))
+            found.append(SourceFile("\n".join([start, *group]), narrow=narrow, straight=True))
     names = [f"f{number}" for number in range(len(plan.functions))]
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
     listed = f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
-    driver = head + resource("vector.h") + listed + "".join(map(resource, (*DRIVER, "phases.c")))
-    return [*found, SourceFile(driver, straight=False)]
+    driver = head_of(lanes, single) + listed + "".join(map(resource, (*DRIVER, "phases.c")))
+    return [*found, SourceFile(driver)]
+
+
+def head_of(lanes: int, single: bool, dialect: Dialect = VECTORS) -> str:
+    """How a C file begins."""
+    head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
+    return head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
 
 
 def forms_of(lanes: int) -> Dialect:
