@@ -26,6 +26,7 @@ def seconds(call: Callable[[], object]) -> float:
 def gradients(robots: int = ROBOTS, steps: int = STEPS, repeats: int = REPEATS) -> tuple[float, float]:
     """(seconds of the kernel alone, ratio of ``rollout.gradient`` to it): medians of calls in turns."""
     rollout = symphys.compile(table_problem([], steps))
+    rollout.finish()
     Z = rollout.z() + 0.01 * np.random.default_rng(0).standard_normal((robots, rollout.n))
     evaluator = rollout._made.shooting.evaluator
     kernel, parameters, seeds = evaluator.kernel, evaluator.parameters(0.0), evaluator.steepest

@@ -48,6 +48,10 @@ class CompiledRollout:
         """What evaluates, in words."""
         return str(self._made.backend)
 
+    def finish(self) -> None:
+        """Wait for the compiler: a first start of a large problem begins on an interpreter, with the same bits."""
+        self._made.backend.finish()
+
     def z(self, values: Mapping[str, ArrayLike] | None = None, /, **variables: ArrayLike) -> Array:
         """(n,): the guess, with some variables replaced by name."""
         return vector(self._made.shooting, {**(values or {}), **variables})

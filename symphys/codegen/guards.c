@@ -2,6 +2,9 @@
    the adjoints and stays from one evaluation to the next: ``prepare`` begins it. */
 #include <string.h>
 
+#ifndef CALL
+#define CALL(t, m, b, k) FUNCTIONS[(t)[0]](m, b, (t) + 2, k)
+#endif
 #ifndef LOWEST
 static int LOWEST(unsigned long long bits) {
   int lowest = 0;
@@ -30,7 +33,7 @@ typedef struct {
 
 static void run(const phase *calls, V *m, V *b, word k) {
   const word *t = calls->entries;
-  for (word c = 0; c < calls->count; c++, t += t[1]) FUNCTIONS[t[0]](m, b, t + 2, k);
+  for (word c = 0; c < calls->count; c++, t += t[1]) CALL(t, m, b, k);
 }
 
 static left_out *left_of(const program *p, V *m) {
@@ -201,7 +204,7 @@ static void run_left(const program *p, const left_out *x, word table, V *m, V *b
   const word **items = x->items[table] + x->starts[table], *copied = x->copied + 4 * table * p->copies.count;
   for (word i = 0; i < x->counts[table]; i++) {
     const word *t = items[i];
-    if (t[0] >= 0) FUNCTIONS[t[0]](m, b, t + 2, k);
+    if (t[0] >= 0) CALL(t, m, b, k);
     else if (!any(m + t[1] + k * t[2])) skip(x, copied, t, m, b, k), i += t[3];
   }
 }
@@ -234,7 +237,7 @@ static void look(const program *p, left_out *x, char *needed, V *m, word k) {
   for (word i = 0; i < p->late.count; i++, late += 2)
     if (needed[late[1]] || x->on[late[1]]) {
       const word *t = p->body.entries + p->calls.places[7 * late[0]];
-      FUNCTIONS[t[0]](m, 0, t + 2, k);
+      CALL(t, m, 0, k);
     }
   for (word i = 0; i < p->guards.count; i++)
     if (parent[i] >= 0 && needed[parent[i]]) needed[i] = (char)any(m + p->guards.places[i]);

@@ -32,9 +32,9 @@ class FastestKernel(ProcessorKernel):
 
     @property
     def chosen(self) -> str:
-        """What was decided so far, in a line, or empty; without a GPU nothing is."""
+        """What was decided so far, in a line, or empty."""
         parts = ", ".join(_told(*each) for each in sorted(self._gains.items()))
-        return joined(parts and f"{self._name} against the processor: {parts}", self._refused)
+        return joined(super().chosen, parts and f"{self._name} against the processor: {parts}", self._refused)
 
     def _run(self, batch: RolloutBatch) -> None:
         kind = "gradient" in batch.results, batch.rows.bit_length() - 1
@@ -63,6 +63,7 @@ class FastestKernel(ProcessorKernel):
 
     def _expected(self, batch: RolloutBatch) -> float:
         """[s] of the processor, from a block for each thread."""
+        self.widths.finish()  # an interpreter says nothing of the processor
         width = self.widths.ready(batch.rows)
         lanes, rows = width.lanes, min(batch.rows, self.threads * width.lanes)
         blocks = [batch.part(first, min(first + lanes, rows)) for first in range(0, rows, lanes)]

@@ -80,6 +80,7 @@ class Description:
         note: what the user should know, such as why it is not the backend that was wanted; or empty.
         later: what was decided while it evaluated, to be asked when that is over; or empty.
         flags: with which the compiler was called.
+        finish: waits for what is still being compiled.
     """
 
     name: str
@@ -92,6 +93,7 @@ class Description:
     note: str = ""
     later: Callable[[], str] = field(default=nothing, repr=False, compare=False)
     flags: tuple[str, ...] = ()
+    finish: Callable[[], object] = field(default=nothing, repr=False, compare=False)
 
     def __str__(self) -> str:
         """In a line."""

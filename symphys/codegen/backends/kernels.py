@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
-from symphys.codegen import Kernel, KernelUnavailable, Program, compile_program
+from symphys.codegen import Kernel, KernelUnavailable, ProcessorKernel, Program, compile_program
 from symphys.codegen.backends.fastest import FastestKernel
 from symphys.codegen.backends.interface import Description, joined, nothing
 from symphys.codegen.cuda import DeviceKernel, compile_on, find_gpu
@@ -25,12 +25,14 @@ PRECISIONS: dict[str, Literal["double", "single"]] = {
 ON_DEVICE = ("cuda", "cuda32")
 
 
-def build_kernel(name: str, program: Program | ProgramSource, seeded: Sequence[str], threads: int) -> Kernel:
+def build_kernel(
+    name: str, program: Program | ProgramSource, seeded: Sequence[str], threads: int, wait: bool = False
+) -> Kernel:
     """The kernel of a program, whose outputs ``seeded`` can be differentiated; KernelUnavailable if that cannot be.
 
     Where there is no GPU for it, it is one for the processor, and the note of its report says why. ``threads`` share
     the blocks of a batch there. Of a source those of ``seeded`` that it has. "auto" is the processor's, which takes
-    large batches to a GPU where that is faster.
+    large batches to a GPU where that is faster. ``wait``: for the compiler of a source too; else see ``compiled``.
     """
     note, precision = "", PRECISIONS[name]
     if name in ON_DEVICE:
@@ -39,7 +41,7 @@ def build_kernel(name: str, program: Program | ProgramSource, seeded: Sequence[s
         except KernelUnavailable as error:
             note = f"the processor evaluates: {error}"
     if isinstance(program, ProgramSource):
-        kernel = compile_source(program, seeded, threads, precision)
+        kernel = compile_source(program, seeded, threads, precision, wait=wait)
     else:
         kernel = compile_program(program, seeded=seeded, threads=threads, precision=precision)
     kernel.report = replace(kernel.report, note=joined(note, kernel.report.note))
@@ -91,5 +93,6 @@ def described(kernel: Kernel, seconds: float, precision: str | None = None, note
         cached=report.cached,
         seconds=seconds,
         note=joined(report.note, note),
-        later=(lambda: kernel.chosen) if isinstance(kernel, FastestKernel) else nothing,
+        later=(lambda: kernel.chosen) if isinstance(kernel, ProcessorKernel) else nothing,
+        finish=kernel.widths.finish if isinstance(kernel, ProcessorKernel) else nothing,
     )

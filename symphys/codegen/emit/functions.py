@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen.emit.writer import Form
+from symphys.codegen.emit.pieces import Form
 from symphys.codegen.graph.adjoint import Mask, adjoint_graph
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.instructions import graph_of

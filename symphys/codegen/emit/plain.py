@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 from symphys.codegen.emit.dialect import NUMBERS
 from symphys.codegen.emit.guarding import Guarding
+from symphys.codegen.emit.pieces import Form
 from symphys.codegen.emit.plan import plan
 from symphys.codegen.emit.source import DRIVER, resource
-from symphys.codegen.emit.writer import Form, write
+from symphys.codegen.emit.writer import write
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.program.program import Function, Place, Program
 from symphys.codegen.runtime.library import data_places

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.guarding import TABLES, Guarding, guarding_of
+from symphys.codegen.emit.pieces import Form
 from symphys.codegen.emit.shapes import Shape
 from symphys.codegen.emit.tables import Recipe, Table, table_of
-from symphys.codegen.emit.writer import Form
 from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.reach import KnownCalls, Reach

@@ -30,7 +30,7 @@ class SourceFile:
 
     text: str
     narrow: bool = False
-    straight: bool = True
+    straight: bool = False
 
 
 def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[SourceFile]:
@@ -38,7 +38,6 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
 
     ``narrow``: of fewer lanes than a vector register has.
     """
-    head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
     found, moving = [], plan.moving()
     shapes = plan.shapes or [None] * len(plan.functions)
     kinds: dict[tuple[bool, int], list[int]] = {}
@@ -48,25 +47,28 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
         work = [len(plan.functions[i][0].nodes) for i in mine]
         dialect = TEAM if calls > 1 else forms_of(lanes)
         texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i], shapes[i]) for i in mine]
-        start = _team(calls, single) if calls > 1 else head + (NUMBERS if dialect is ONE_LANE else "")
-        start += resource("vector.h") + (UNALIGNED if calls > 1 else "")
+        start = _team(calls, single) if calls > 1 else head_of(lanes, single, dialect)
         for group in spread(texts, work, FILES):
-            found.append(SourceFile("\n".join([start, *group]), narrow=narrow))
+            found.append(SourceFile("\n".join([start, *group]), narrow=narrow, straight=True))
     names = [f"f{number}" for number in range(len(plan.functions))]
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
     listed = f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
-    driver = head + resource("vector.h") + listed + "".join(map(resource, (*DRIVER, "phases.c")))
-    return [*found, SourceFile(driver, straight=False)]
+    driver = head_of(lanes, single) + listed + "".join(map(resource, (*DRIVER, "phases.c")))
+    return [*found, SourceFile(driver)]
+
+
+def head_of(lanes: int, single: bool, dialect: Dialect = VECTORS) -> str:
+    """How a C file begins."""
+    head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
+    return head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
 
 
 def _team(calls: int, single: bool) -> str:
-    """Defines what a function needs for several calls at once."""
+    """How a C file of functions for several calls at once begins."""
     each = ", ".join(["x_"] * calls)
-    return (
-        f"#define LANES {calls}\n#define SINGLE {int(single)}\n"
-        f"#define ALL(x) ({{ const R x_ = (x); (V){{{each}}}; }})\n"
-    )
+    whole = f"#define ALL(x) ({{ const R x_ = (x); (V){{{each}}}; }})\n"
+    return head_of(calls, single) + whole + UNALIGNED
 
 
 def forms_of(lanes: int) -> Dialect:

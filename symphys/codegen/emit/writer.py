@@ -1,41 +1,15 @@
-"""From graphs to C functions, cut where a compiler's register allocation would take too long."""
+"""From graphs to C functions."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
-from itertools import groupby
+from dataclasses import dataclass
 
 from symphys.codegen.emit.dialect import VECTORS, Dialect
+from symphys.codegen.emit.pieces import Form, GraphPiece, pieces_of
 from symphys.codegen.emit.shapes import PlaceWords, Shape, TeamWords
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import MASKS
-from symphys.codegen.graph.rewrite import fused_results, with_fused_products
-
-LONGEST = 500
-"""Statements in one C function, and copies of what is given: a compiler's time grows faster than its length."""
-
-MANY = 8
-"""Words in a row that are one constant are written by a loop: inputs that nothing sets fill thousands of them."""
-
-
-@dataclass(frozen=True)
-class Form:
-    """How a graph meets the memory.
-
-    Attributes:
-        primal: how many of its arguments are places of the memory; the others are places of the adjoint memory.
-        adds: results are added to what is there.
-        backward: results go to the adjoint memory.
-        clears: the adjoint arguments are zeroed when they have been read.
-        shared: what it reads of the memory is one number for all lanes.
-    """
-
-    primal: int
-    adds: bool
-    backward: bool = False
-    clears: bool = False
-    shared: bool = False
 
 
 def write(
@@ -50,12 +24,9 @@ def write(
 
     ``moving``: the pairs that may have a stride; None: all. ``shape``: of a function for one rollout alone.
     """
-    fused: set[int] = set()
-    if form.backward and dialect.fuses:
-        graph = with_fused_products(graph, form.adds)
-        fused = fused_results(graph) if form.adds else fused
     words = PlaceWords(dialect.word) if shape is None else TeamWords(shape, len(graph.sizes), form.backward)
-    pieces = _cut(graph, dialect, words, fused)
+    cut = pieces_of(graph, form, dialect.fuses)
+    graph, pieces = cut.graph, [_Written(piece, dialect, words) for piece in cut.pieces]
     pointers = _pointers(graph, form, dialect, words)
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
     text = []
@@ -71,43 +42,32 @@ def write(
     return "".join([*text, _entry(name, pointers, pieces, dialect, moving)])
 
 
-@dataclass
-class _Piece:
-    """A run of nodes that becomes one C function.
+@dataclass(frozen=True)
+class _Written:
+    """A piece in C."""
 
-    Attributes:
-        nodes: what it computes, in order.
-        slots: the values that a later piece than their own reads, and their words in the buffer between pieces.
-        dialect: how it is written.
-        words: how the words of places are.
-        fused: products that are added to results in one rounding.
-        targets: for a node, the words of results that it is: the head of a loop or nothing, the result, the word.
-    """
-
-    nodes: list[int]
-    slots: dict[int, int]
+    piece: GraphPiece
     dialect: Dialect
     words: PlaceWords
-    fused: set[int]
-    targets: dict[int, list[tuple[str, str, int | str]]] = field(default_factory=dict)
 
     def statements(self, graph: Graph, form: Form) -> list[str]:
         """Its C statements."""
         names: dict[int, str] = {}
         lines: list[str] = []
-        for x in self.nodes:
+        piece = self.piece
+        for x in piece.nodes:
             node = graph.nodes[x]
             operands = [self._use(graph, y, names, lines, form) for y in node.operands]
-            if x in self.fused:
+            if x in piece.fused:
                 product = f"FMA({operands[0]}, {operands[1]}, {{}})"
-                lines += (loop + self.words.add(name, word, product) for loop, name, word in self.targets[x])
+                lines += (self.words.add(f"o{r}", word, product) for r, word, _ in piece.targets[x])
                 continue
             lines.append(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
             names[x] = f"v{x}"
-            if x in self.slots:
-                lines.append(f"w[{self.slots[x]}] = (V)v{x};")
+            if x in piece.slots:
+                lines.append(f"w[{piece.slots[x]}] = (V)v{x};")
             lines += self._stores(graph, x, names[x], form.adds)
-        for x in set(self.targets) - set(self.nodes):
+        for x in piece.copied():
             value = self._use(graph, x, names, lines, form)
             lines += self._stores(graph, x, value, form.adds)
         return lines
@@ -119,7 +79,7 @@ class _Piece:
             return literal(node.value)
         if x not in names:
             given = node.op == "input"
-            source = self.words.load(f"i{node.at[0]}", node.at[1]) if given else f"w[{self.slots[x]}]"
+            source = self.words.load(f"i{node.at[0]}", node.at[1]) if given else f"w[{self.piece.slots[x]}]"
             names[x] = f"v{x}"
             value = f"ALL({source})" if given and form.shared and node.at[0] < form.primal else source
             lines.append(f"const {_type(node.op)} v{x} = ({_type(node.op)}){value};")
@@ -129,38 +89,9 @@ class _Piece:
         node = graph.nodes[x]
         if adds and node.op == "const" and float.fromhex(node.value) == 0:
             return
-        for loop, name, word in self.targets.get(x, ()):
-            yield loop + (self.words.add if adds else self.words.store)(name, word, value)
-
-
-def _cut(graph: Graph, dialect: Dialect, words: PlaceWords, fused: set[int]) -> list[_Piece]:
-    order = [x for x in graph.needed() if graph.nodes[x].op not in ("const", "input")]
-    runs = [order[i : i + LONGEST] for i in range(0, len(order), LONGEST)] or [[]]
-    home = {x: i for i, run in enumerate(runs) for x in run}
-    crossing = sorted({y for x in order for y in graph.nodes[x].operands if home.get(y, home[x]) != home[x]})
-    slots = {x: slot for slot, x in enumerate(crossing)}
-    pieces = [_Piece(run, slots, dialect, words, fused) for run in runs]
-    copied = 0
-    for r, result in enumerate(graph.results):
-        for x, first, count in _runs(graph, result):
-            if x not in home and (copied := copied + 1) % LONGEST == 0:
-                pieces.append(_Piece([], slots, dialect, words, fused))
-            target: int | str = first if count == 1 else "j"
+        for r, first, count in self.piece.targets.get(x, ()):
             loop = f"for (int j = {first}; j < {first + count}; j++) " if count > 1 else ""
-            pieces[home.get(x, -1)].targets.setdefault(x, []).append((loop, f"o{r}", target))
-    return pieces
-
-
-def _runs(graph: Graph, result: Sequence[int]) -> Iterator[tuple[int, int, int]]:
-    """(value, first word, number of words) of a result; words are together where one constant fills many of them."""
-    first = 0
-    for x, words in groupby(result):
-        count = len(list(words))
-        if graph.nodes[x].op == "const" and count >= MANY:
-            yield x, first, count
-        else:
-            yield from ((x, word, 1) for word in range(first, first + count))
-        first += count
+            yield loop + (self.words.add if adds else self.words.store)(f"o{r}", first if count == 1 else "j", value)
 
 
 def _type(op: str) -> str:
@@ -180,14 +111,14 @@ def _pointers(graph: Graph, form: Form, dialect: Dialect, words: PlaceWords) -> 
 def _entry(
     name: str,
     pointers: Sequence[tuple[str, str, str]],
-    pieces: Sequence[_Piece],
+    pieces: Sequence[_Written],
     dialect: Dialect,
     moving: Collection[int] | None,
 ) -> str:
     """The function itself; pieces of one that is cut are called apart, and each finds the places that it needs."""
     steps = [f" + k * t[{2 * i + 1}]" if moving is None or i in moving else "" for i in range(len(pointers))]
     places = [f"{memory} + t[{2 * i}]{steps[i]}" for i, (_, _, memory) in enumerate(pointers)]
-    slots = len(pieces[0].slots)
+    slots = len(pieces[0].piece.slots)
     arguments = ", ".join([*places, "w" if slots else "0"])
     given = f"{dialect.memory}m, {dialect.memory}b, const word *t, word k"
     lines, apart = [f"V w[{slots}];"] if slots else [], []

@@ -121,6 +121,11 @@ class ProcessorKernel(Kernel):
         self.widths = widths
         self.threads = processors() if threads is None else threads
 
+    @property
+    def chosen(self) -> str:
+        """What was decided since it was made, in a line, or empty."""
+        return self.widths.note
+
     def fixed(self, seed: ArrayLike = ()) -> Fixed:
         """An evaluation of one z at fixed addresses, with a row for each seed (rows, s), or one row without any."""
         seeds = np.array(seed, float)
@@ -128,6 +133,7 @@ class ProcessorKernel(Kernel):
         batch = self._batch(z, parameters, seeds if seeds.size else None)
         outputs = batch.outputs(self._width())
         gradient = batch.gradient(len(z)) if seeds.size else np.zeros((0, len(z)))
+        self.widths.finish()
         width = self.widths.ready(batch.rows)
         part, memory = batch.part(0, batch.rows), width.pool.new()
         return Fixed(width.loaded, part, memory, z, parameters, outputs, gradient, seeds)

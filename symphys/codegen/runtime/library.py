@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from symphys.codegen.emit.codes import Codes
 from symphys.codegen.emit.guarding import WIDTHS, Guarding
 from symphys.codegen.emit.plan import Plan
 from symphys.codegen.errors import KernelUnavailable
@@ -70,11 +71,34 @@ class BatchData(ctypes.Structure):
     )
 
 
+class LinkedCodes:
+    """Codes in this process's memory, for blocks of so many lanes; see ``emit/codes.py``."""
+
+    def __init__(self, codes: Codes, lanes: int, real: Any) -> None:
+        """``real``: type of numbers."""
+        numbers = np.repeat(np.array([*codes.constants, 0.0], real)[:, None], lanes, axis=1)
+        raw = np.empty(numbers.nbytes + numbers[0].nbytes, np.uint8)
+        start = -raw.ctypes.data % numbers[0].nbytes
+        raw[start : start + numbers.nbytes] = numbers.view(np.uint8).ravel()
+        words, starts = np.array(codes.words, np.uint32), np.array(codes.starts or [0], np.int64)
+        address = raw.ctypes.data + start
+        words[starts + 2], words[starts + 3] = address & 0xFFFFFFFF, address >> 32
+        self._addresses = words.ctypes.data + 4 * starts
+        self._kept = raw, words
+
+    @property
+    def pointer(self) -> Any:
+        """Of the address of each function."""
+        return self._addresses.ctypes.data_as(ctypes.c_void_p)
+
+
 class Loaded:
     """A kernel's library with the program that it runs."""
 
-    def __init__(self, path: Path, program: Program, plan: Plan, seeded: Sequence[str]) -> None:
-        """Load the library; KernelUnavailable if the system refuses."""
+    def __init__(
+        self, path: Path, program: Program, plan: Plan, seeded: Sequence[str], codes: LinkedCodes | None = None
+    ) -> None:
+        """Load the library; KernelUnavailable if the system refuses. ``codes``: if it is an interpreter."""
         try:
             library = ctypes.CDLL(str(path))
         except OSError as error:
@@ -91,7 +115,12 @@ class Loaded:
         for name, listed in data_places(program, seeded).items():
             setattr(self.data, name, self._list(len(listed), _ranges(listed)))
         for name in TABLES:
-            setattr(self.data, name, self._list(*plan.tables[name]))
+            count, words = plan.tables[name]
+            if codes is not None:
+                words = words.copy()
+                library.link_calls(words.ctypes.data_as(ctypes.c_void_p), WORD(count), codes.pointer)
+            setattr(self.data, name, self._list(count, words))
+        self._kept.append(codes)
         self.data.written = self._list(len(plan.written), np.append(plan.written, 0))
         if plan.guarding is not None:
             self._guard(plan.guarding)

@@ -11,13 +11,17 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from math import inf
+from pathlib import Path
 from time import perf_counter
 from typing import Protocol
 
+from symphys.codegen.emit.source import SourceFile
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.runtime.library import BatchData, Loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
+from symphys.codegen.toolchain.background import Background
+from symphys.codegen.toolchain.cache import Cache
 
 NARROW = (1, 2)
 """Lanes of the libraries for calls of so many rows."""
@@ -83,12 +87,40 @@ class Widths:
         self._choices: dict[int, Choice] = {}
         self._sought, self._spent = {first[0]}, dict[int, float]()
         self._lock = threading.Lock()
+        self._compiling: Background | None = None
+        self._note = ""
         self._add(*first)
 
     @property
     def loaded(self) -> dict[int, LoadedWidth]:
         """By lanes, what is loaded."""
         return dict(self._widths)
+
+    @property
+    def note(self) -> str:
+        """What the user should know of the library that was compiled meanwhile, or empty."""
+        return self._note
+
+    def compile(self, parts: Sequence[SourceFile], texts: str, cache: Cache, load: Callable[[Path], Loaded]) -> None:
+        """Compile the library of all lanes beside what runs, and change over to it when it is there.
+
+        See ``Background``; ``load`` loads it.
+        """
+
+        def done(path: Path) -> None:
+            loaded = load(path)
+            with self._lock:
+                self._add(self.full, loaded)
+
+        def failed(why: str) -> None:
+            self._note = f"an interpreter evaluates, which is slower: {why}"
+
+        self._compiling = Background(parts, texts, cache, done, failed)
+
+    def finish(self) -> None:
+        """Wait for the library that is being compiled, if there is one."""
+        if self._compiling is not None:
+            self._compiling.finish()
 
     def ready(self, rows: int) -> LoadedWidth:
         """What computes a call of so many rows now; nothing is compiled."""
@@ -105,15 +137,17 @@ class Widths:
 
     def _chosen(self, rows: int) -> Choice:
         """What computes calls of so many rows, and the lanes that would suit them better; 0: none."""
-        if (choice := self._choices.get(rows)) is not None:
+        choices = self._choices  # a library that comes meanwhile begins new ones
+        if (choice := choices.get(rows)) is not None:
             return choice
         lanes = suited(rows, self.full)
         if self._libraries is not None and lanes not in self._sought:
             self._seek(lanes, self._libraries)
-        there = sorted(self._widths)
-        width = self._widths[next((each for each in there if each >= min(rows, self.full)), there[-1])]
+        widths = self._widths
+        there = sorted(widths)
+        width = widths[next((each for each in there if each >= min(rows, self.full)), there[-1])]
         missing = 0 if self._libraries is None or width.lanes == lanes else lanes
-        self._choices[rows] = width, missing
+        choices[rows] = width, missing
         return width, missing
 
     def _timed(self, width: LoadedWidth, missing: int, parts: Sequence[BatchData], threads: int) -> None:
@@ -121,7 +155,7 @@ class Widths:
         width.pool.run([partial(width.loaded.evaluate, part) for part in parts], threads)
         if missing and self._libraries is not None:
             self._spent[missing] = self._spent.get(missing, 0.0) + perf_counter() - began
-            if self._spent[missing] >= self.patience:
+            if self._spent[missing] >= self.patience and not (self._compiling and self._compiling.running):
                 self._build(missing, self._libraries)
 
     def _seek(self, lanes: int, libraries: Libraries) -> None:
@@ -141,12 +175,12 @@ class Widths:
         try:
             if lanes not in self._widths:
                 self._add(lanes, libraries.build(lanes))
-            self._choices.clear()
+            self._choices = {}
         except KernelUnavailable:
             self._spent[lanes] = -inf
         finally:
             self._lock.release()
 
     def _add(self, lanes: int, loaded: Loaded) -> None:
-        self._widths[lanes] = LoadedWidth(lanes, loaded, self._pool(lanes, loaded))
-        self._choices.clear()
+        self._widths = {**self._widths, lanes: LoadedWidth(lanes, loaded, self._pool(lanes, loaded))}
+        self._choices = {}

@@ -207,8 +207,8 @@ def _sources(planned: SlopePlan, lanes: int) -> list[SourceFile]:
         mine = [i for i, (_, form) in enumerate(planned.functions) if form.backward == backward]
         work = [len(planned.functions[i][0].nodes) for i in mine]
         for group in spread([texts[i] for i in mine], work, FILES):
-            found.append(SourceFile("\n".join([head, *group])))
+            found.append(SourceFile("\n".join([head, *group]), straight=True))
     names = [f"f{number}" for number in range(len(texts))]
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
     listed = f"static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{', '.join(names) or '0'}}};\n"
-    return [*found, SourceFile(head + declared + listed + resource("slopes.c"), straight=False)]
+    return [*found, SourceFile(head + declared + listed + resource("slopes.c"))]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from symphys.codegen.emit.alternatives import ALWAYS, NONE, entries_of, of_call, word_of
 from symphys.codegen.emit.functions import DistinctFunctions
-from symphys.codegen.emit.writer import Form
+from symphys.codegen.emit.pieces import Form
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.graph.activity import Activity, CallActivity
 from symphys.codegen.graph.graph import Graph

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import os
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import IO, Literal
+
+import numpy as np
 
 from symphys.codegen.emit.alone import alone
+from symphys.codegen.emit.codes import codes_of, interpreter
 from symphys.codegen.emit.plan import Plan, plan
 from symphys.codegen.emit.source import SourceFile, forms_of, sources
 from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.program.collection import uncollected
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import ProcessorKernel
-from symphys.codegen.runtime.library import Loaded
+from symphys.codegen.runtime.library import LinkedCodes, Loaded
 from symphys.codegen.runtime.widths import PATIENCE, Widths, suited
 from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.compiler import Compiler, find_compiler
@@ -26,6 +32,9 @@ from symphys.codegen.toolchain.processes import ELSEWHERE
 from symphys.codegen.toolchain.processor import processor
 from symphys.codegen.toolchain.report import BuildReport
 from symphys.codegen.toolchain.temporary import TemporaryFolder
+
+WORTH = 20_000
+"""Operations of a kernel that takes long to compile, some seconds."""
 
 
 def compile_program(
@@ -85,8 +94,13 @@ def compiled(
     cache: Cache,
     threads: int | None,
     rows: int | None = None,
+    wait: bool = True,
 ) -> tuple[ProcessorKernel, KeptPlan]:
-    """The kernel of a program, and what is to be kept of it; see ``compile_program``."""
+    """The kernel of a program, and what is to be kept of it; see ``compile_program``.
+
+    ``wait``: for the compiler; else a kernel of ``WORTH`` begins with an interpreter, and changes over once it is
+    compiled. With $SYMPHYS_WAIT all wait.
+    """
     started = time.perf_counter()
     with uncollected():
         planned = plan(program, names, width.lanes * width.real)
@@ -98,9 +112,16 @@ def compiled(
     lanes = suited(rows, width.lanes) if rows is not None and width.several else width.lanes
     if lanes != width.lanes:
         parts = sources(own if lanes == 1 and own else planned, lanes, width.single, narrow=True)
+    waits = wait or operations < WORTH or lanes != width.lanes or bool(os.environ.get("SYMPHYS_WAIT"))
+    if not waits and libraries.find(lanes) is None:
+        with suppress(KernelUnavailable):
+            first = lanes, libraries.interpreter(planned)
+            kernel = kernel_of(first, libraries, threads, started, cached=False)
+            kernel.widths.compile(parts, kept.texts, cache, partial(libraries.load, lanes=lanes))
+            return kernel, kept
     with libraries.built(lanes, parts) as built:
         first = lanes, libraries.load(built.path, lanes)
-        return kernel_of(first, libraries, threads, started, built), kept
+        return kernel_of(first, libraries, threads, started, built.cached, built.note), kept
 
 
 def kernel_of(
@@ -108,9 +129,10 @@ def kernel_of(
     libraries: KeptLibraries,
     threads: int | None,
     started: float,
-    built: Built | None = None,
+    cached: bool = True,
+    note: str = "",
 ) -> ProcessorKernel:
-    """A kernel that begins with a library of so many lanes; ``built``: how that came there, None: it was kept."""
+    """A kernel that begins with a library of so many lanes; ``cached``: whether that was kept."""
     kept, width, compiler = libraries.kept, libraries.width, find_compiler()
     report = BuildReport(
         compiler=compiler.version,
@@ -120,9 +142,9 @@ def kernel_of(
         functions=kept.functions,
         operations=kept.operations,
         bytes_per_lane=(2 * kept.program.size + kept.plan.tape) * width.real,
-        cached=built is None or built.cached,
+        cached=cached,
         seconds=time.perf_counter() - started,
-        note="" if built is None else built.note,
+        note=note,
         arena=kept.plan.guarding.arena if kept.plan.guarding else 0,
     )
     patience = PATIENCE[0] + PATIENCE[1] * kept.operations
@@ -163,6 +185,15 @@ class KeptLibraries:
     def built(self, lanes: int, parts: Sequence[SourceFile]) -> AbstractContextManager[Built]:
         """The library of these C files; see ``shared_library``."""
         return shared_library(parts, self.cache, self._texts(lanes))
+
+    def interpreter(self, planned: Plan) -> Loaded:
+        """What runs the functions of a plan without compiling them; KernelUnavailable without a cache to keep it in."""
+        lanes, single = self.width.lanes, self.width.single
+        codes = LinkedCodes(codes_of(planned), lanes, np.float32 if single else np.float64)
+        with shared_library([interpreter(lanes, single)], self.cache) as built:
+            if built.note:
+                raise KernelUnavailable(built.note)
+            return Loaded(built.path, self.kept.program, self.kept.plan, self.kept.names, codes)
 
     def load(self, path: Path, lanes: int) -> Loaded:
         """The library of a file."""
@@ -223,6 +254,20 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None 
             found = cache.find(key)  # another process may have built it meanwhile
             path, note = (found, "") if found else _kept(cache, key, compiler.build(parts, flags, Path(folder)))
         yield Built(path, compiler, flags, found is not None, note)
+
+
+def compile_for(given: IO[bytes]) -> None:
+    """Keep the library of a ``Background``, and print where it is, or why there is none."""
+    asked = json.load(given)
+    parts, texts = [SourceFile(**part) for part in asked["parts"]], asked["texts"]
+    cache = Cache(Path(asked["cache"]["folder"]), asked["cache"]["limit"])
+    try:
+        with shared_library(parts, cache, texts) as built:
+            said = {"error": built.note} if built.note else {"path": str(built.path)}
+    except KernelUnavailable as error:
+        said = {"error": str(error)}
+    with suppress(OSError):  # who asked may have ended
+        print(json.dumps(said), flush=True)
 
 
 def texts_of(parts: Sequence[SourceFile]) -> str:

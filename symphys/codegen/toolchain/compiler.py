@@ -24,7 +24,7 @@ FLAGS = (
 """No -ffast-math: a NaN stays one, and sums keep their order. Products are fused where the C says so."""
 STRAIGHT = (
     *("-fno-tree-fre", "-fno-tree-pre", "-fno-gcse", "-fno-code-hoisting", "-fno-tree-vrp", "-fno-tree-pta"),
-    *("-fno-tree-dse", "-fno-dse", "-fno-rerun-cse-after-loop"),
+    *("-fno-tree-dse", "-fno-dse", "-fno-rerun-cse-after-loop", "-fno-crossjumping"),
     *("-fno-ipa-icf", "-fno-ipa-sra", "-fno-ipa-cp", "-fno-ipa-ra"),
 )
 """More flags of gcc where functions are straight lines of values, each computed once: a third less to compile."""

@@ -43,10 +43,11 @@ def compile_source(
     threads: int | None = None,
     precision: Precision = "double",
     cache: Cache | None = None,
+    wait: bool = True,
 ) -> ProcessorKernel:
     """The kernel of a source; those of ``seeded`` that the program has can be differentiated.
 
-    See ``compile_program`` for the other arguments.
+    See ``compile_program`` and ``build.compiled`` for the other arguments.
     """
     started, single = time.perf_counter(), precision == "single"
     cache, width = cache or default_cache(), BlockWidth(width_of("auto", single), single)
@@ -59,7 +60,7 @@ def compile_source(
             return kernel_of((width.lanes, loaded), libraries, threads, started)
     program = source.make()
     names = tuple(name for name in seeded if name in program.outputs)
-    kernel, plan = compiled(program, names, width, cache, threads)
+    kernel, plan = compiled(program, names, width, cache, threads, wait=wait)
     if key is not None:
         _keep(key[:32], plan, cache)
     return kernel

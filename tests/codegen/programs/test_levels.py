@@ -12,7 +12,8 @@ from toys import require
 
 import symphys
 from symphys.codegen import Cache, Program, compile_program
-from symphys.codegen.emit.writer import Form, write
+from symphys.codegen.emit.pieces import Form
+from symphys.codegen.emit.writer import write
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.graph.rewrite import with_fused_products
 from symphys.codegen.toolchain import compiler

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from operations import ARGUMENTS, PAIRS, SMOOTH, alone, build, every_operation, long_function
 
 from symphys.codegen import Cache, compile_program
-from symphys.codegen.emit.writer import Form, write
+from symphys.codegen.emit.pieces import Form
+from symphys.codegen.emit.writer import write
 from symphys.codegen.graph.adjoint import adjoint_graph
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.graph.rewrite import taped
