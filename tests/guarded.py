@@ -31,9 +31,9 @@ def program_of(name: str, folder: Path, exact: bool = True, duration: float | No
 
 
 def whole(program: Program) -> Program:
-    """The same without guards and sections."""
+    """The same without guards and sections, in the same order: adjoints add up in that of the calls."""
     bare: dict[str, Any] = {"guard": None, "otherwise": (), "section": None, "beside": ()}
-    return replace(program, body=tuple(replace(call, **bare) for call in program.body))
+    return replace(program, body=tuple(replace(call, **bare) for call in program.body), in_order=True)
 
 
 def halving(guard: bool, older: bool = False) -> Program:

@@ -6,8 +6,10 @@ Cost of a sweep: one projection of each constraint; only velocities, momenta and
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise, takewhile
 
+from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint, project_in_turn, pushed_by
 from symphys.dynamics.line_search import EVERY, Cluster, clusters, lengthened
 from symphys.dynamics.motion import PredictedMotion
 from symphys.dynamics.tracing.decorator import repeat, traced
@@ -40,6 +42,7 @@ def iterate(
     motions: Sequence[PredictedMotion],
 ) -> Iterate:
     """The solution after all sweeps; in clusters of unequal bodies with a line search after some of them."""
+    constraints = _coupled(constraints, start.momenta)
     found = tuple(clusters(world, constraints))
     if not found:
         return repeat(sweeps, sweep, constraints, start)
@@ -118,18 +121,46 @@ def apply_start(
     return Iterate(tuple(started), tuple(impulses), tuple(impulses))
 
 
+def _coupled(constraints: tuple[PlacedConstraint, ...], momenta: Sequence[Velocities]) -> tuple[PlacedConstraint, ...]:
+    """With ``pushed``, where coordinates of a tree follow one another."""
+    found = list(constraints)
+    for run in runs(constraints, momenta):
+        for k, then in pairwise(run):
+            first, second = constraints[k].constraint, constraints[then].constraint
+            if _of_tree(first) and _of_tree(second):
+                found[then] = replace(found[then], constraint=replace(second, pushed=pushed_by(first, second)))
+    return tuple(found)
+
+
+def _of_tree(constraint: VelocityConstraint) -> bool:
+    return isinstance(constraint, CoordinateConstraint) and constraint.of_tree is not None
+
+
 @traced
 def _project_run(
     projections: tuple[tuple[VelocityConstraint, tuple[int, ...]], ...], states: AllVelocities, old: list[AnyImpulse]
 ) -> tuple[AllVelocities, list[AnyImpulse]]:
     """One constraint after the other: each with the places of its bodies among the states."""
-    momenta, given = list(states), []
-    for (constraint, places), impulse in zip(projections, old, strict=True):
-        after, new = constraint.project(tuple(momenta[i] for i in places), impulse)
+    momenta, given = list(states), list[AnyImpulse]()
+    while len(given) < len(projections):
+        first, after = len(given), projections[len(given) + 1 :]
+        turn = [each for each, _ in (projections[first], *takewhile(lambda each: _pushed(each[0]), after))]
+        velocities = momenta[0]
+        if len(turn) > 1 and isinstance(velocities, GeneralizedVelocities):  # all on one tree
+            coordinates = [each for each in turn if isinstance(each, CoordinateConstraint)]
+            momenta[0], news = project_in_turn(coordinates, velocities, old[first : first + len(turn)])
+            given += news
+            continue
+        constraint, places = projections[first]
+        moved, new = constraint.project(tuple(momenta[i] for i in places), old[first])
         given.append(new)
-        for i, moved in zip(places, after, strict=True):
-            momenta[i] = moved
+        for i, momentum in zip(places, moved, strict=True):
+            momenta[i] = momentum
     return tuple(momenta), given
+
+
+def _pushed(constraint: VelocityConstraint) -> bool:
+    return isinstance(constraint, CoordinateConstraint) and constraint.pushed is not None
 
 
 @traced

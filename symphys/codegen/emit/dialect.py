@@ -20,6 +20,7 @@ class Dialect:
         word: a word of a place, by the place's name and the number of the word.
         inline: how a function begins that its only caller takes in; ``apart``: one that it does not.
         entry: how a function begins that the driver calls.
+        memory: type of the memories.
         fuses: whether adjoints have fused products, written out: all compilers give the same bits, at any level.
     """
 
@@ -31,12 +32,15 @@ class Dialect:
     inline: str = "static inline void"
     apart: str = "static NOINLINE void"
     entry: str = "void"
+    memory: str = "V *"
     fuses: bool = True
 
 
 VECTORS = Dialect(FORMS)
 NUMBERS = Dialect(PLAIN, fuses=False)
 ONE_LANE = Dialect(SCALAR)
+TEAM = Dialect(FORMS, reads="const R *", writes="R *restrict ", shares="R *", memory="R *")
+"""Several calls of one rollout at once: lanes are calls, and memories are those of one lane."""
 DEVICE = Dialect(
     PLAIN,
     reads="const V *restrict ",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.guarding import TABLES, Guarding, guarding_of
 from symphys.codegen.emit.pieces import Form
+from symphys.codegen.emit.shapes import Shape
 from symphys.codegen.emit.tables import Recipe, Table, table_of
 from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
@@ -20,6 +21,7 @@ from symphys.codegen.graph.rewrite import Taped
 from symphys.codegen.program.phase_calls import PhaseCalls, grouped, rows_of
 from symphys.codegen.program.program import Function, Place, Program
 from symphys.codegen.program.spans import Spans
+from symphys.codegen.program.teams import teamed
 
 Words = NDArray[np.int64]
 NONE = -1
@@ -39,6 +41,12 @@ class Plan:
         tape: words after the program's own, for what adjoints need not compute again.
         written: (places, 3) offset, size and stride of what each step of the body writes for itself.
         guarding: of calls that may be left out; None: none may.
+        program: what was planned, in the order of its tables; None: as it was given.
+        teams: (first call of the body, calls) that one rollout alone may compute side by side.
+        callers: for each table of ``TABLES`` the calls of the body whose entries it has.
+        shapes: of the functions for one rollout alone; empty for blocks of rollouts.
+        size: words before the tape; 0: the program's.
+        signature: of a plan for one rollout alone, how its C differs from that for blocks.
     """
 
     functions: tuple[tuple[Graph, Form], ...]
@@ -46,6 +54,12 @@ class Plan:
     tape: int
     written: Words
     guarding: Guarding | None = None
+    program: Program | None = None
+    teams: tuple[tuple[int, int], ...] = ()
+    callers: Mapping[str, Words] = field(default_factory=dict)
+    shapes: tuple[Shape, ...] = ()
+    size: int = 0
+    signature: str = ""
 
     def moving(self) -> list[set[int]]:
         """For each function, which of its places move with the step in any of its calls."""
@@ -80,7 +94,8 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
         noted: whether the driver notes which guards are 0 in a step, otherwise they are computed again backwards, and
             takes ``again`` for the body where it has all calls of the only step.
     """
-    functions = DistinctFunctions()
+    side_by_side = teamed(program)
+    program, functions = side_by_side.program, DistinctFunctions()
     parts = [_Part(calls, steps) for calls, steps in zip(program.phases, (1, program.steps, 1), strict=True)]
     reach = Reach(program.size, [KnownCalls(part.calls, part.steps, part.dependence(functions)) for part in parts])
     outputs = [_words_of(program.outputs[name]) for name in seeded]
@@ -97,7 +112,10 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
         tables[f"back_{name}"] = part.pulls(functions)
     guarding = guarding_of(program, {name: tables[name] for name in TABLES})
     filled = {name: (len(table.calls), table.filled()) for name, table in tables.items()}
-    return Plan(tuple(functions.listed), filled, tape, _written(program), guarding)
+    callers = {name: tables[name].calls for name in TABLES}
+    return Plan(
+        tuple(functions.listed), filled, tape, _written(program), guarding, program, side_by_side.teams, callers
+    )
 
 
 def _written(program: Program) -> Words:

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
-from symphys.codegen.emit.dialect import ONE_LANE, VECTORS, Dialect
+from symphys.codegen.emit.dialect import ONE_LANE, TEAM, VECTORS, Dialect
 from symphys.codegen.emit.plan import Plan
 from symphys.codegen.emit.writer import write
 
 ROOM = "symphys.codegen"
 DRIVER = ("program.h", "guards.c", "driver.c")
 NUMBERS = "#define NUMBERS\n"
+UNALIGNED = "typedef V U __attribute__((aligned(sizeof(R)), may_alias));\n"
 FILES, SHARE = 4, 400
 """Most files of values and most of adjoints; nodes for which another file is begun."""
 
@@ -37,12 +38,16 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
 
     ``narrow``: of fewer lanes than a vector register has.
     """
-    found, moving, dialect = [], plan.moving(), forms_of(lanes)
-    for backward in (False, True):
-        mine = [i for i, (_, form) in enumerate(plan.functions) if form.backward == backward]
+    found, moving = [], plan.moving()
+    shapes = plan.shapes or [None] * len(plan.functions)
+    kinds: dict[tuple[bool, int], list[int]] = {}
+    for i, ((_, form), shape) in enumerate(zip(plan.functions, shapes, strict=True)):
+        kinds.setdefault((form.backward, shape.lanes if shape else 1), []).append(i)
+    for (_, calls), mine in sorted(kinds.items()):
         work = [len(plan.functions[i][0].nodes) for i in mine]
-        texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i]) for i in mine]
-        start = head_of(lanes, single, dialect)
+        dialect = TEAM if calls > 1 else forms_of(lanes)
+        texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i], shapes[i]) for i in mine]
+        start = _team(calls, single) if calls > 1 else head_of(lanes, single, dialect)
         for group in spread(texts, work, FILES):
             found.append(SourceFile("\n".join([start, *group]), narrow=narrow, straight=True))
     names = [f"f{number}" for number in range(len(plan.functions))]
@@ -57,6 +62,13 @@ def head_of(lanes: int, single: bool, dialect: Dialect = VECTORS) -> str:
     """How a C file begins."""
     head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
     return head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
+
+
+def _team(calls: int, single: bool) -> str:
+    """How a C file of functions for several calls at once begins."""
+    each = ", ".join(["x_"] * calls)
+    whole = f"#define ALL(x) ({{ const R x_ = (x); (V){{{each}}}; }})\n"
+    return head_of(calls, single) + whole + UNALIGNED
 
 
 def forms_of(lanes: int) -> Dialect:

@@ -7,30 +7,37 @@ from dataclasses import dataclass
 
 from symphys.codegen.emit.dialect import VECTORS, Dialect
 from symphys.codegen.emit.pieces import Form, GraphPiece, pieces_of
+from symphys.codegen.emit.shapes import PlaceWords, Shape, TeamWords
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import MASKS
 
 
 def write(
-    name: str, graph: Graph, form: Form, dialect: Dialect = VECTORS, moving: Collection[int] | None = None
+    name: str,
+    graph: Graph,
+    form: Form,
+    dialect: Dialect = VECTORS,
+    moving: Collection[int] | None = None,
+    shape: Shape | None = None,
 ) -> str:
     """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step.
 
-    ``moving``: the places that may have a stride; None: all.
+    ``moving``: the pairs that may have a stride; None: all. ``shape``: of a function for one rollout alone.
     """
+    words = PlaceWords(dialect.word) if shape is None else TeamWords(shape, len(graph.sizes), form.backward)
     cut = pieces_of(graph, form, dialect.fuses)
-    graph, pieces = cut.graph, [_Written(piece, dialect) for piece in cut.pieces]
-    pointers = _pointers(graph, form, dialect)
+    graph, pieces = cut.graph, [_Written(piece, dialect, words) for piece in cut.pieces]
+    pointers = _pointers(graph, form, dialect, words)
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
     text = []
     for i, piece in enumerate(pieces):
         lines = piece.statements(graph, form)
         if piece is pieces[-1] and form.clears:
             lines += [
-                f"for (int j = 0; j < {graph.sizes[a]}; j++) {dialect.word.format(f'i{a}', 'j')} = S(0.0);"
+                f"for (int j = 0; j < {graph.sizes[a]}; j++) {words.clear(f'i{a}', 'j')}"
                 for a in range(form.primal, len(graph.sizes))
             ]
-        head = f"{dialect.inline if len(pieces) == 1 else dialect.apart} {name}_{i}({parameters})"
+        head = f"{dialect.inline} {name}_{i}({parameters})"
         text.append("\n  ".join([f"{head} {{", "(void)w;", *lines]) + "\n}\n")
     return "".join([*text, _entry(name, pointers, pieces, dialect, moving)])
 
@@ -41,6 +48,7 @@ class _Written:
 
     piece: GraphPiece
     dialect: Dialect
+    words: PlaceWords
 
     def statements(self, graph: Graph, form: Form) -> list[str]:
         """Its C statements."""
@@ -51,8 +59,8 @@ class _Written:
             node = graph.nodes[x]
             operands = [self._use(graph, y, names, lines, form) for y in node.operands]
             if x in piece.fused:
-                words = [self.dialect.word.format(f"o{r}", word) for r, word, _ in piece.targets[x]]
-                lines += (f"{to} = FMA({operands[0]}, {operands[1]}, {to});" for to in words)
+                product = f"FMA({operands[0]}, {operands[1]}, {{}})"
+                lines += (self.words.add(f"o{r}", word, product) for r, word, _ in piece.targets[x])
                 continue
             lines.append(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
             names[x] = f"v{x}"
@@ -71,7 +79,7 @@ class _Written:
             return literal(node.value)
         if x not in names:
             given = node.op == "input"
-            source = self.dialect.word.format(f"i{node.at[0]}", node.at[1]) if given else f"w[{self.piece.slots[x]}]"
+            source = self.words.load(f"i{node.at[0]}", node.at[1]) if given else f"w[{self.piece.slots[x]}]"
             names[x] = f"v{x}"
             value = f"ALL({source})" if given and form.shared and node.at[0] < form.primal else source
             lines.append(f"const {_type(node.op)} v{x} = ({_type(node.op)}){value};")
@@ -82,22 +90,22 @@ class _Written:
         if adds and node.op == "const" and float.fromhex(node.value) == 0:
             return
         for r, first, count in self.piece.targets.get(x, ()):
-            target = self.dialect.word.format(f"o{r}", first if count == 1 else "j")
             loop = f"for (int j = {first}; j < {first + count}; j++) " if count > 1 else ""
-            yield f"{loop}{target} {'+=' if adds else '='} {value};"
+            yield loop + (self.words.add if adds else self.words.store)(f"o{r}", first if count == 1 else "j", value)
 
 
 def _type(op: str) -> str:
     return "I" if op in MASKS else "V"
 
 
-def _pointers(graph: Graph, form: Form, dialect: Dialect) -> list[tuple[str, str, str]]:
+def _pointers(graph: Graph, form: Form, dialect: Dialect, words: PlaceWords) -> list[tuple[str, str, str]]:
     """(type, name, memory) of every argument and result; adjoints of arguments may coincide, all others may not."""
     kind, memory = ("const R *", "(const R *)m") if form.shared else (dialect.reads, "m")
     primal = [(kind, f"i{i}", memory) for i in range(form.primal)]
     seeds = [(dialect.writes, f"i{i}", "b") for i in range(form.primal, len(graph.sizes))]
     kind, memory = (dialect.shares, "b") if form.backward else (dialect.writes, "m")
-    return [*primal, *seeds, *((kind, f"o{i}", memory) for i in range(len(graph.results)))]
+    places = [*primal, *seeds, *((kind, f"o{i}", memory) for i in range(len(graph.results)))]
+    return [(kind, pointer, memory) for kind, name, memory in places for pointer in words.pointers(name)]
 
 
 def _entry(
@@ -107,14 +115,21 @@ def _entry(
     dialect: Dialect,
     moving: Collection[int] | None,
 ) -> str:
+    """The function itself; pieces of one that is cut are called apart, and each finds the places that it needs."""
     steps = [f" + k * t[{2 * i + 1}]" if moving is None or i in moving else "" for i in range(len(pointers))]
     places = [f"{memory} + t[{2 * i}]{steps[i]}" for i, (_, _, memory) in enumerate(pointers)]
     slots = len(pieces[0].piece.slots)
     arguments = ", ".join([*places, "w" if slots else "0"])
-    lines = [f"V w[{slots}];"] if slots else []
-    lines += [f"{name}_{i}({arguments});" for i in range(len(pieces))]
-    head = f"{dialect.entry} {name}(V *m, V *b, const word *t, word k) {{"
-    return "\n  ".join([head, "(void)b;", *lines]) + "\n}\n"
+    given = f"{dialect.memory}m, {dialect.memory}b, const word *t, word k"
+    lines, apart = [f"V w[{slots}];"] if slots else [], []
+    if len(pieces) == 1:
+        lines.append(f"{name}_0({arguments});")
+    for i in range(len(pieces)) if len(pieces) > 1 else ():
+        lines.append(f"{name}_{i}_({'m, b, t, k, ' + ('w' if slots else '0')});")
+        head = f"{dialect.apart} {name}_{i}_({given}, V *restrict w) {{"
+        apart.append("\n  ".join([head, "(void)b;", f"{name}_{i}({arguments});"]) + "\n}\n")
+    head = f"{dialect.entry} {name}({given}) {{"
+    return "".join(apart) + "\n  ".join([head, "(void)b;", *lines]) + "\n}\n"
 
 
 def literal(value: str) -> str:

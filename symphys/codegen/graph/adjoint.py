@@ -7,6 +7,7 @@ import casadi as ca
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.graph.rewrite import with_reciprocals
+from symphys.codegen.graph.sums import with_early_sums
 from symphys.codegen.program.program import Function
 
 Mask = tuple[bool, ...]
@@ -29,4 +30,5 @@ def adjoint_graph(function: Function, forward: Graph, inputs: Mask, outputs: Mas
     for x in wanted:
         ends.append(ends[-1] + x.numel())
     pieces = [ca.densify(piece) for piece in ca.vertsplit(ca.densify(adjoint), ends)]
-    return with_reciprocals(graph_of(ca.Function("adjoint", [*arguments, *seeds], pieces)), forward)
+    found = with_reciprocals(graph_of(ca.Function("adjoint", [*arguments, *seeds], pieces)), forward)
+    return found if tabled else with_early_sums(found, len(arguments))

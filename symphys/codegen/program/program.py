@@ -40,6 +40,7 @@ class Program:
         zeroed: places that are 0 at the beginning.
         constants: places and their values. Programs that differ in them only share one compiled kernel.
         discounted: what adjoints may lose on their way back; None: nothing.
+        in_order: whether the body stays in its order; otherwise equal calls are put side by side, see ``teams``.
     """
 
     size: int
@@ -53,6 +54,7 @@ class Program:
     zeroed: tuple[Place, ...] = ()
     constants: tuple[tuple[Place, tuple[float, ...]], ...] = ()
     discounted: AdjointDiscount | None = None
+    in_order: bool = False
 
     def __post_init__(self) -> None:
         """Check everything that can be checked; ProgramError names the call and the words."""

@@ -108,7 +108,7 @@ class Loaded:
         self._begin = _prepared(library.begin, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
         self._perform = _prepared(library.perform, ctypes.c_void_p, ctypes.c_void_p, WORD)
         self._kept: list[Any] = []
-        self.data = ProgramData(program.size, plan.tape, program.steps)
+        self.data = ProgramData(plan.size or program.size, plan.tape, program.steps)
         values = np.array([x for _, row in program.constants for x in row] or [0], dtype=np.float64)
         self._kept.append(values)
         self.data.values = values.ctypes.data
@@ -133,6 +133,11 @@ class Loaded:
         self.data.first = guarding.first
         for name, words in guarding.rows.items():
             setattr(self.data, name, self._list(guarding.count(name), words if words.size else np.zeros(1, np.int64)))
+
+    @property
+    def words(self) -> int:
+        """Of the memory of a lane: values, tape and adjoints."""
+        return int(2 * self.data.size + self.data.tape)
 
     def _list(self, count: int, words: Any) -> List:
         self._kept.append(words)

@@ -9,11 +9,13 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import IO, Literal
 
 import numpy as np
 
+from symphys.codegen.emit.alone import alone
 from symphys.codegen.emit.codes import codes_of, interpreter
 from symphys.codegen.emit.plan import Plan, plan
 from symphys.codegen.emit.source import SourceFile, forms_of, sources
@@ -103,21 +105,22 @@ def compiled(
     with uncollected():
         planned = plan(program, names, width.lanes * width.real)
         parts = sources(planned, width.lanes, width.single)
+        own = alone(planned) if width.several and width.lanes > 1 else None
     operations = sum(len(graph.nodes) for graph, _ in planned.functions)
-    kept = KeptPlan(program, planned, names, texts_of(parts), len(planned.functions), operations)
+    kept = KeptPlan(program, planned, names, texts_of(parts), len(planned.functions), operations, own)
     libraries = KeptLibraries(kept, width, cache)
     lanes = suited(rows, width.lanes) if rows is not None and width.several else width.lanes
     if lanes != width.lanes:
-        parts = sources(planned, lanes, width.single, narrow=True)
-    waits = wait or operations < WORTH or bool(os.environ.get("SYMPHYS_WAIT"))
+        parts = sources(own if lanes == 1 and own else planned, lanes, width.single, narrow=True)
+    waits = wait or operations < WORTH or lanes != width.lanes or bool(os.environ.get("SYMPHYS_WAIT"))
     if not waits and libraries.find(lanes) is None:
         with suppress(KernelUnavailable):
             first = lanes, libraries.interpreter(planned)
             kernel = kernel_of(first, libraries, threads, started, cached=False)
-            kernel.widths.compile(parts, kept.texts, cache, libraries.load)
+            kernel.widths.compile(parts, kept.texts, cache, partial(libraries.load, lanes=lanes))
             return kernel, kept
     with libraries.built(lanes, parts) as built:
-        first = lanes, libraries.load(built.path)
+        first = lanes, libraries.load(built.path, lanes)
         return kernel_of(first, libraries, threads, started, built.cached, built.note), kept
 
 
@@ -167,16 +170,17 @@ class KeptLibraries:
         """See ``widths.Libraries``."""
         compiler = find_compiler()
         path = self.cache.find(library_key(self._texts(lanes), compiler, compiler.flags(processor())))
-        return None if path is None else self.load(path)
+        return None if path is None else self.load(path, lanes)
 
     def build(self, lanes: int) -> Loaded:
         """See ``widths.Libraries``."""
         kept, width = self.kept, self.width
         with uncollected():
             planned = plan(kept.program, kept.names, width.lanes * width.real)
+            planned = (alone(planned) if lanes == 1 and kept.alone else None) or planned
             parts = sources(planned, lanes, width.single, lanes != width.lanes)
         with self.built(lanes, parts) as built:
-            return self.load(built.path)
+            return self.load(built.path, lanes)
 
     def built(self, lanes: int, parts: Sequence[SourceFile]) -> AbstractContextManager[Built]:
         """The library of these C files; see ``shared_library``."""
@@ -191,13 +195,18 @@ class KeptLibraries:
                 raise KernelUnavailable(built.note)
             return Loaded(built.path, self.kept.program, self.kept.plan, self.kept.names, codes)
 
-    def load(self, path: Path) -> Loaded:
+    def load(self, path: Path, lanes: int) -> Loaded:
         """The library of a file."""
-        return Loaded(path, self.kept.program, self.kept.plan, self.kept.names)
+        return Loaded(path, self.kept.program, self._plan(lanes), self.kept.names)
+
+    def _plan(self, lanes: int) -> Plan:
+        return self.kept.alone if lanes == 1 and self.kept.alone else self.kept.plan
 
     def _texts(self, lanes: int) -> str:
-        """Stands for the C files. Those of other lanes differ from those of all by the lanes and the dialect alone."""
-        return self.kept.texts if lanes == self.width.lanes else f"{self.kept.texts} {lanes} {forms_of(lanes)}"
+        """Stands for the C files. Others differ by the lanes, the dialect and what stands side by side."""
+        if lanes == self.width.lanes:
+            return self.kept.texts
+        return f"{self.kept.texts} {lanes} {forms_of(lanes)} {self._plan(lanes).signature}"
 
 
 def names_of(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:

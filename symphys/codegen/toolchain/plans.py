@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +57,7 @@ class KeptPlan:
         names: of the outputs that are differentiated.
         texts: checksum of the C files; see ``build.texts_of``.
         functions, operations: see ``BuildReport``.
+        alone: the plan of the library of one lane; None: the same.
     """
 
     program: Program
@@ -65,6 +66,7 @@ class KeptPlan:
     texts: str
     functions: int
     operations: int
+    alone: Plan | None = None
 
     def write(self, path: Path) -> None:
         """Into a file."""
@@ -88,6 +90,10 @@ class KeptPlan:
             "operations": self.operations,
         }
         arrays: dict[str, Any] = {f"table_{name}": table for name, (_, table) in plan.tables.items()}
+        if (alone := self.alone) is not None:
+            head["alone"] = [{name: count for name, (count, _) in alone.tables.items()}, alone.size, alone.tape]
+            head["signature"] = alone.signature
+            arrays |= {f"alone_{name}": table for name, (_, table) in alone.tables.items()}
         if plan.guarding is not None:
             arrays |= {f"guarding_{name}": rows for name, rows in plan.guarding.rows.items()}
         values = np.array([x for _, row in program.constants for x in row], np.float64)
@@ -122,9 +128,13 @@ class KeptPlan:
         if head["guarding"]:
             rows = {name.partition("_")[2]: each for name, each in arrays.items() if name.startswith("guarding_")}
             guarding = Guarding(head["guarding"][0], rows, head["guarding"][1])
-        plan = Plan((), tables, head["tape"], arrays["written"], guarding)
+        plan, alone = Plan((), tables, head["tape"], arrays["written"], guarding), None
+        if "alone" in head:
+            counts, size, tape = head["alone"]
+            tables = {name: (count, arrays[f"alone_{name}"]) for name, count in counts.items()}
+            alone = replace(plan, tables=tables, tape=tape, size=size, signature=head["signature"])
         program = KeptProgram(fields, make)
-        return cls(program, plan, tuple(head["names"]), head["texts"], head["functions"], head["operations"])
+        return cls(program, plan, tuple(head["names"]), head["texts"], head["functions"], head["operations"], alone)
 
 
 def _listed(place: Place) -> list[int]:

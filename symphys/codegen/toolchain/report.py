@@ -43,5 +43,5 @@ class BuildReport:
     def memories(self, lanes: int, loaded: Loaded) -> MemoryPool:
         """Memories for blocks of so many lanes of a library."""
         real = np.dtype(np.float32 if self.precision == "single" else np.float64)
-        words = self.bytes_per_lane // real.itemsize + -(-8 * self.arena // (lanes * real.itemsize))
+        words = loaded.words + -(-8 * self.arena // (lanes * real.itemsize))
         return MemoryPool(words, lanes, real, loaded.prepare)

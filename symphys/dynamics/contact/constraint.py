@@ -173,13 +173,14 @@ def _forces(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> tupl
 
 def _normal(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> Expr:
     """ln <- max(ln - m (n.u - b + gamma ln), 0), m = 1 / (k + gamma)."""
-    wanted = ca.dot(contact.normal, slip) - contact.target + contact.softness * old.normal
-    return positive(old.normal - contact.normal_mass * wanted, contact.normal_mass * contact.width)
+    kept = old.normal + contact.normal_mass * (contact.target - contact.softness * old.normal)
+    return positive(kept - contact.normal_mass * ca.dot(contact.normal, slip), contact.normal_mass * contact.width)
 
 
 def _tangent(contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal: Expr) -> Expr:
     """The friction impulse, onto the disc of radius mu ln."""
-    wanted = old.tangent - contact.tangent_mass * _across(slip - contact.slip_target, contact.normal)
+    kept = old.tangent + contact.tangent_mass * _across(contact.slip_target, contact.normal)
+    wanted = kept - contact.tangent_mass * _across(slip, contact.normal)  # what is known last comes in last
     return onto_disc(wanted, contact.law.friction * normal, contact.tangent_mass * contact.smoothing, contact.smoothing)
 
 

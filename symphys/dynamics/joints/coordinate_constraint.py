@@ -7,6 +7,7 @@ the rate after it: keep b K/(1 + b K), slope b/(1 + b K), offset a/(1 + b K), wi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,7 @@ import casadi as ca
 
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
+from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import GeneralizedVelocities
 from symphys.maths.smoothing import at_least, at_most
 
@@ -46,6 +48,7 @@ class CoordinateConstraint:
         landing: 1 for a limit that is struck: its impulse is an impact, not a force.
         drive: what a motor's command gives by itself [N m], [N]; None for what aims at a velocity.
         jump: by how much that differs from the step before; None for a motor that gives nothing else.
+        pushed: how much less impulse it gives for a unit impulse of the constraint before it; see ``project_in_turn``.
     """
 
     terms: tuple[BodyTerm, ...]
@@ -64,6 +67,7 @@ class CoordinateConstraint:
     landing: Expr
     drive: Expr | None = None
     jump: Expr | None = None
+    pushed: Expr | None = None
 
     def fitting(self, moved: Expr) -> Expr:
         """(1,): the impulse times a time that takes a limit back to where it is kept, a coupling to where it holds.
@@ -92,10 +96,18 @@ class CoordinateConstraint:
 
     def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
         """See ``VelocityConstraint``."""
-        rate = self.rate(momenta)
-        new = self.keep * old.numbers - self.slope * rate - self.offset
+        new, change = self.answer(self.rate(momenta), old.numbers)
+        return self.apply(momenta, JointImpulse(change)), JointImpulse(new)
+
+    def answer(self, rate: Expr, old: Expr, less: Expr | None = None) -> tuple[Expr, Expr]:
+        """The impulse after a projection, and its change; ``less`` is known last, so it is taken off last."""
+        free = self.low is None and self.high is None
+        new = self.keep * old - self.offset - (old if free else 0) - self.slope * rate
+        new = new if less is None else new - less
+        if free:
+            return old + new, new
         new = self.bounded(new)
-        return self.apply(momenta, JointImpulse(new - old.numbers)), JointImpulse(new)
+        return new, new - old
 
     def bounded(self, impulse: Expr) -> Expr:
         """Held within the bounds."""
@@ -111,6 +123,32 @@ class CoordinateConstraint:
             return apply_impulse(self.terms, self.given_along, momenta, impulse.numbers, self.same)
         after = GeneralizedVelocities(momenta[0].numbers + ca.mtimes(self.of_tree.response, impulse.numbers))
         return tuple(after for _ in self.terms)
+
+
+def project_in_turn(
+    constraints: Sequence[CoordinateConstraint], velocities: GeneralizedVelocities, old: Sequence[JointImpulse]
+) -> tuple[GeneralizedVelocities, list[JointImpulse]]:
+    """Projections of coordinates of one tree, one after the other.
+
+    Each takes the rate from the velocities before the last change, and what that did to it from ``pushed``. So two
+    projections are under way at a time: a processor that waits for results does not wait for one after the other.
+    """
+    before, given = velocities, list[JointImpulse]()
+    change: Expr = None
+    for constraint, impulse in zip(constraints, old, strict=True):
+        less: Expr = None if change is None else constraint.pushed * change
+        new, change = constraint.answer(constraint.rate((before,)), impulse.numbers, less)
+        before = velocities
+        (velocities, *_) = constraint.apply((velocities,), JointImpulse(change))
+        given.append(JointImpulse(new))
+    return velocities, given
+
+
+@traced
+def pushed_by(first: CoordinateConstraint, then: CoordinateConstraint) -> Expr:
+    """(1,): see ``CoordinateConstraint.pushed``."""
+    assert first.of_tree is not None and then.of_tree is not None
+    return then.slope * GeneralizedVelocities(first.of_tree.response).along(then.of_tree.jacobian)
 
 
 def towards(target: Expr, mobility: Expr) -> dict[str, Expr]:

@@ -1,0 +1,134 @@
+"""Where the words of a function's places lie, and how many calls it does at once, in a library of one lane."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+ALL, BESIDE, EACH, TURNS = "all", "beside", "each", "turns"
+"""One place for all lanes; places whose words are interleaved; a place for each lane; the same, where some coincide."""
+
+
+class Access(NamedTuple):
+    """How the words of an argument or result are reached.
+
+    Attributes:
+        kind: see above.
+        step: from one word of a place to the next.
+    """
+
+    kind: str
+    step: int
+
+
+class Shape(NamedTuple):
+    """How a function does one call, or several of them side by side.
+
+    Attributes:
+        lanes: calls at once.
+        accesses: of the arguments, then of the results.
+    """
+
+    lanes: int
+    accesses: tuple[Access, ...]
+
+
+class PlaceWords:
+    """C for the words of a function's places: ``i3`` is the fourth argument, ``o0`` the first result."""
+
+    def __init__(self, word: str) -> None:
+        """``word``: of a place, by the place's name and the number of the word."""
+        self._word = word
+
+    def pointers(self, name: str) -> list[str]:
+        """What a place is called, by the pairs of an entry."""
+        return [name]
+
+    def load(self, name: str, word: int | str) -> str:
+        """The value of a word."""
+        return self._word.format(name, word)
+
+    def store(self, name: str, word: int | str, value: str) -> str:
+        """Write a word."""
+        return f"{self.load(name, word)} = {value};"
+
+    def add(self, name: str, word: int | str, value: str) -> str:
+        """Add to a word; ``value`` may say where what is there comes in, as {}."""
+        to = self.load(name, word)
+        return f"{to} = {value.format(to)};" if "{}" in value else f"{to} += {value};"
+
+    def clear(self, name: str, word: str) -> str:
+        """Zero a word, in all lanes."""
+        return self.store(name, word, "S(0.0)")
+
+
+class TeamWords(PlaceWords):
+    """The same for one rollout alone, where words may lie apart and lanes are calls.
+
+    Results that several lanes add to are added to lane by lane, in the order of the calls: with whole vectors, of which
+    one lane is kept.
+    """
+
+    def __init__(self, shape: Shape, arguments: int, backward: bool) -> None:
+        """``arguments``: how many accesses belong to them; ``backward``: calls come in turn from the last lane on."""
+        self._lanes = shape.lanes
+        names = [f"i{i}" for i in range(arguments)] + [f"o{i}" for i in range(len(shape.accesses) - arguments)]
+        self._access = dict(zip(names, shape.accesses, strict=True))
+        self._turn = range(shape.lanes)[:: -1 if backward else 1]
+
+    @property
+    def single(self) -> bool:
+        """Whether it does one call."""
+        return self._lanes == 1
+
+    def pointers(self, name: str) -> list[str]:
+        """What a place is called, by the pairs of an entry."""
+        if self._access[name].kind in (EACH, TURNS):
+            return [f"{name}_{lane}" for lane in range(self._lanes)]
+        return [name]
+
+    def load(self, name: str, word: int | str) -> str:
+        """The value of a word."""
+        kind, at = self._access[name].kind, self._index(name, word)
+        if self.single:
+            return f"{name}[{at}]"
+        if kind == ALL:
+            return f"ALL({name}[{at}])"
+        if kind == BESIDE:
+            return f"*(const U *)({name} + {at})"
+        return f"((V){{{', '.join(f'{pointer}[{at}]' for pointer in self.pointers(name))}}})"
+
+    def store(self, name: str, word: int | str, value: str) -> str:
+        """Write a word."""
+        kind, at = self._access[name].kind, self._index(name, word)
+        if self.single:
+            return f"{name}[{at}] = {value};"
+        if kind == BESIDE:
+            return f"*(U *)({name} + {at}) = {value};"
+        parts = " ".join(f"{name}_{lane}[{at}] = x[{lane}];" for lane in range(self._lanes))
+        return f"{{ const V x = {value}; {parts} }}"
+
+    def add(self, name: str, word: int | str, value: str) -> str:
+        """Add to a word; ``value`` may say where what is there comes in, as {}."""
+        kind, at = self._access[name].kind, self._index(name, word)
+        if self.single:
+            return super().add(name, word, value)
+        sum_ = value if "{}" in value else f"{{}} + {value}"
+        if kind == BESIDE:
+            to = f"*(U *)({name} + {at})"
+            return f"{to} = {sum_.format(to)};"
+        if kind == EACH:
+            return self.store(name, word, sum_.format(self.load(name, word)))
+        words = [f"{name}[{at}]" if kind == ALL else f"{name}_{lane}[{at}]" for lane in range(self._lanes)]
+        parts = " ".join(f"x = {sum_.format(f'ALL({words[k]})')}; {words[k]} = x[{k}];" for k in self._turn)
+        return f"{{ V x; {parts} }}"
+
+    def clear(self, name: str, word: str) -> str:
+        """Zero a word, in all lanes."""
+        at = self._index(name, word)
+        if self.single or self._access[name].kind == BESIDE:
+            return self.store(name, word, "S(0.0)")
+        return f"{{ {' '.join(f'{pointer}[{at}] = 0;' for pointer in self.pointers(name))} }}"
+
+    def _index(self, name: str, word: int | str) -> int | str:
+        step = self._access[name].step
+        return word * step if isinstance(word, int) else f"{step} * {word}"
