@@ -172,11 +172,11 @@ static void note(const program *p, left_out *x, int backward) {
     if (s < p->sections.count && !inside && k >= section[0]) {
       for (word t = from; t < to; t++) begin_section(p, x, t, s);
       inside = 1;
-  }
+    }
     if (backward || k >= p->first) {
       redirect(p, x, backward ? call[4] : call[3], backward ? call[10] : call[4]);
       for (word t = from; t < to; t++) append(p, x, t, call);
-  }
+    }
     const word *w = p->writes.places + 2 * call[5];
     for (word i = call[5]; i < call[12]; i++, w += 2) x->current[2 * w[0]] = w[1], x->current[2 * w[0] + 1] = 0;
   }
@@ -232,8 +232,7 @@ static void look(const program *p, left_out *x, char *needed, V *m, word k) {
   const word *late = p->late.places, *parent = p->parents.places;
   phase first = {p->late.count ? late[0] : p->first, p->body.entries};
   run(&first, m, 0, k);
-  for (word i = 0; i < p->guards.count; i++)
-    needed[i] = parent[i] < 0 && any(m + p->guards.places[i]);
+  for (word i = 0; i < p->guards.count; i++) needed[i] = parent[i] < 0 && any(m + p->guards.places[i]);
   for (word i = 0; i < p->late.count; i++, late += 2)
     if (needed[late[1]] || x->on[late[1]]) {
       const word *t = p->body.entries + p->calls.places[7 * late[0]];
