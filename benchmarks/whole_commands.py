@@ -94,7 +94,8 @@ def main() -> None:
     parser.add_argument("--to", type=Path, metavar="FILE")
     options = parser.parse_args()
     own = [str(HERE / "benchmarks" / name) for name in OWN]
-    names = options.names or [*(path.stem for path in sorted((HERE / "problems").glob("*.toml"))), *own]
+    given = [str(Path(name).resolve()) if Path(name).is_file() else name for name in options.names]
+    names = given or [*(path.stem for path in sorted((HERE / "problems").glob("*.toml"))), *own]
     before = {} if options.before is None else {"before": options.before.resolve()}
     done = options.to.read_text().splitlines() if options.to and options.to.exists() else []
     rows = [json.loads(text) for text in done]

@@ -13,7 +13,7 @@ OFF = {"mpc.plant.masses": 1.1, "mpc.plant.latency": 0.004}
 """Masses and inertias 10 % off, and plans that are ready 4 ms after they were asked for."""
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_it_follows_its_way_without_a_fall() -> None:
     """In the first 0.4 s, in which the line goes 5 cm: within 5 cm of it, in its pose to 0.3 rad."""
     problem = load_problem(find("planar_hopper_mpc"), {**OFF, "mpc.duration": 0.4})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import shipped, solve
+from shipped import shipped, short_descent, solve
 
 from symphys.mpc import Controller, Plant, close_loop, record_of
 from symphys.problem import load_problem
@@ -23,7 +23,12 @@ def test_the_guess_touches_nothing_and_influences_nothing() -> None:
     assert np.abs(motion["axle.angle"]).max() == 0.0
 
 
-@pytest.mark.slow
+def test_a_short_descent_lowers_the_cost() -> None:
+    before, after = short_descent("spinner", 6)
+    assert after < before - 0.05
+
+
+@pytest.mark.thorough
 def test_smoothing_finds_the_contact() -> None:
     made = shipped("spinner")
     found = solve("ilqr", made)

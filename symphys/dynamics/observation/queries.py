@@ -13,7 +13,7 @@ from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.contact.body_term import Motions, at_touch
 from symphys.dynamics.context import StepContext
 from symphys.dynamics.motion import PredictedMotion
-from symphys.dynamics.prediction import along_paths, bodies_of, detect_contacts, predicted_motions
+from symphys.dynamics.prediction import along_paths, bodies_of, detect_contacts, free_motions, predicted_motions
 from symphys.dynamics.tracing.decorator import traced, tracing
 from symphys.model.shapes import Surface
 from symphys.model.state_layout import Layout
@@ -32,7 +32,8 @@ def gap_function(world: World, parameters: Sequence[Any] | None = None) -> ca.Fu
     tracer = inline(world, arguments, reduces=False)
     with tracing(tracer):
         context = context_of(world, None, (), arguments)
-        motions, duration = _motions(world, context, arguments[0])
+        duration = ca.SX(context.settings.scheme.dt)
+        motions = free_motions(context, parts_of(Layout(world), arguments[0]), duration)  # a gap is of positions alone
         gaps = map(tracer.value, along_paths(_gaps, context, motions, duration))
     taken = [arguments[0]] if parameters is None else [arguments[0], arguments[2]]
     return ca.Function("gaps", taken, [ca.densify(ca.vertcat(ca.SX(0, 1), *gaps))])

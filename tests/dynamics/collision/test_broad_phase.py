@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from heaps import heap
+from repeats import thorough
 
 import symphys
 from symphys import Body, Law, Layout, Plane, Scheme, initial_state, make_world, step_function
@@ -93,7 +94,7 @@ def test_where_there_are_few_pairs_nothing_is_looked_at() -> None:
     assert near_pairs(context, {}) == ()
 
 
-@pytest.mark.parametrize("kinds", [["sphere"] * 6, ["capsule", "box", "sphere", "sphere", "capsule"]])
+@pytest.mark.parametrize("kinds", [["sphere"] * 6, thorough(["capsule", "box", "sphere", "sphere", "capsule"])])
 def test_motions_are_those_without_a_broad_phase(
     kinds: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
