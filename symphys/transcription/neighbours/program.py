@@ -1,0 +1,90 @@
+"""The step of many bodies as a crowd for the compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import casadi as ca
+
+from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
+from symphys.codegen.neighbours.program import Crowd, Meeting, Room, Sight
+from symphys.dynamics.neighbours.sample import TWINS, Sample
+from symphys.dynamics.neighbours.step import RecordedStep, recorded_step
+from symphys.dynamics.tracing.recording import TracedVector
+from symphys.model.shapes import Plane
+from symphys.model.state_layout import Layout
+from symphys.model.world import Scheme
+from symphys.transcription.neighbours.loops import loops_of
+
+ROOM_FOR = 2
+"""Pairs of a kind for each body, for which there is room at first."""
+
+
+def crowd_of(sample: Sample, scheme: Scheme, exact: bool = False) -> Crowd:
+    """The crowd of a sample, whose ``cuts`` are those of the whole world."""
+    recorded = recorded_step(sample, scheme, exact=exact)
+    step = loops_of(sample, recorded)
+    species, counts = len(sample.species), [len(own) for own in sample.species]
+    members = [1, *counts, *(ROOM_FOR * counts[kind.first] for kind in sample.kinds)]
+    meetings = []
+    for kind in sample.kinds:
+        if kind.second is not None:
+            meetings.append(Meeting(kind.first, kind.second))
+            continue
+        plane = sample.world.statics[kind.plane]
+        assert isinstance(plane, Plane)
+        x, y, z = map(float, plane.normal)
+        meetings.append(Meeting(kind.first, normal=(x, y, z), offset=float(plane.offset)))
+    *seen, striking = recorded.recorder.sights
+    begin = [step.homes[number][1] for number in seen[::TWINS]]
+    sights = [Sight(position, position + 3) for position in begin]
+    rooms = [Room(*each) for each in zip(step.work, step.states, members, strict=True)]
+    program, places = _sample_program(sample, recorded)
+    roots = tuple(place for vector, place in places.items() if vector.number in recorded.recorder.roots)
+    return Crowd(
+        program,
+        step.loops,
+        tuple(rooms),
+        tuple(meetings),
+        tuple(sights),
+        step.homes[striking][1],
+        next(k for k, loop in enumerate(step.loops) if loop.room > species),
+        sum(recorded.sizes.values()),
+        roots,
+    )
+
+
+def _sample_program(sample: Sample, recorded: RecordedStep) -> tuple[Program, Mapping[TracedVector, Place]]:
+    """One step of the sample, without guards; where its vectors lie."""
+    layout, at = Layout(sample.world), MemoryLayout()
+    x = at.take(layout.size)
+    given = {name: at.take(size) for name, size in recorded.sizes.items()}
+    places: dict[TracedVector, Place] = {}
+    calls = []
+    for call in recorded.calls:
+        for vector in call.inputs:
+            if vector.name in given:
+                places[vector] = given[vector.name]
+            elif vector.name:
+                part = layout[vector.name]
+                places[vector] = Place(x.offset + part.start, part.stop - part.start)
+        for vector in call.outputs:
+            places[vector] = at.take(vector.size)
+        inputs, outputs = (tuple(places[v] for v in vectors) for vectors in (call.inputs, call.outputs))
+        calls.append(FunctionCall(call.function, inputs, outputs))
+    ends = [places[vector] for call in recorded.calls for vector in call.outputs if vector.name == "next"]
+    symbols = [ca.SX.sym("end", place.size) for place in ends]
+    after = at.take(sum(place.size for place in ends))
+    stack = ca.Function("after", symbols, [ca.vertcat(*symbols)])
+    first, size = given["u"].offset, sum(recorded.sizes.values())
+    program = Program(
+        size=at.size,
+        z=x,
+        parameters=Place(first, size),
+        steps=1,
+        outputs={"x": after},
+        body=(*calls, FunctionCall(stack, tuple(ends), (replace(after, stride=after.size),))),
+        in_order=True,
+    )
+    return program, places
