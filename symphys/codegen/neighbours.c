@@ -6,18 +6,19 @@
 #define CALL(t, m, b, k) FUNCTIONS[(t)[0]](m, b, (t) + 2, k)
 
 typedef struct { word work, state, members, base, from; } room; /* words of a member; where members begin */
-typedef struct { word room, first, end; } loop;                 /* of its actions */
-typedef struct { word store, room, of, offset, at, size, entry, back; } action; /* store -1: a call, else a copy */
+typedef struct { word room, first, end, other, section; } loop;  /* of its actions; those in place of them end there */
+typedef struct { word store, of, offset, pitch, at, size, entry, back; } action; /* store CALLED: a call, else a copy */
 typedef struct { word first, second, plane; double normal[3], offset; } kind; /* species; -1: a plane */
 typedef struct {
-  word rooms, species, loops, words, state, given, found;
+  word rooms, species, loops, words, state, given;
+  word found, looked, striking; /* loops: before the first pairs are found, from the other on near ones are left; and where
+                                   in the work of what is there once it says how far what strikes comes */
   const room *list;
   const loop *order;
   const action *actions;
   const word *values, *again, *back; /* entries of calls */
   const kind *kinds;
-  const word *sight; /* room by room where a position and a reach lie, and how far what strikes comes */
-  word striking;
+  const word *sight, *nears; /* by species: where a position and a reach lie; by kind: whether a pair is near */
 } crowd;
 typedef struct {
   word rows, steps;
@@ -27,78 +28,70 @@ typedef struct {
   word *most;                  /* (kinds): pairs at most */
 } scenes;
 
-enum { WORK, BEFORE, AFTER, GIVEN };
-enum { OWN, FIRST, SECOND, ONCE };
-typedef struct { int32_t first[LANES], second[LANES], before[LANES]; } near; /* before -1: not near then; -2: no pair */
+enum { WORK, BEFORE, AFTER, GIVEN, CALLED };
+enum { OWN, FIRST, SECOND, ONCE, THEN, OUT = 8 };
+/* before: the number of the same pair in the step before; -1: it was not near; -2: there is no pair in this lane */
+typedef struct { int32_t first[LANES], second[LANES], before[LANES]; } near;
 
 typedef struct {
   const crowd *c;
   V *m, *b, *x, *y, *given; /* work, its adjoints, states and their adjoints of all steps */
   near *pairs;              /* (steps, slots) */
   int32_t *used;            /* (steps, kinds) */
+  int32_t *active, *count;  /* (slots) those that are near in the step, by kind; (kinds) how many */
   word slots;
   char *scratch;
 } scene;
 
-static word members(const scene *s, word room, word k) {
-  const crowd *c = s->c;
-  return room <= c->species ? c->list[room].members : s->used[k * (c->rooms - 1 - c->species) + room - 1 - c->species];
+/* The number of the first pair of a room among all. */
+static word slots_before(const crowd *c, word room) {
+  word slots = 0;
+  for (word r = 1 + c->species; r < room; r++) slots += c->list[r].members;
+  return slots;
 }
 
-static word slot_of(const scene *s, word room, word i) {
-  word slot = i;
-  for (word r = 1 + s->c->species; r < room; r++) slot += s->c->list[r].members;
-  return slot;
-}
-
-static const near *pair_of(const scene *s, word room, word i, word k) {
-  return room <= s->c->species ? 0 : s->pairs + k * s->slots + slot_of(s, room, i);
-}
-
-/* One copy. ``there`` begins the other store's room, ``pitch`` apart are its members. */
-static void copied(const action *a, const near *p, word i, V *there, word pitch, V *here, int gains) {
-  word out = a->of & 8, of = a->of & 7;
-  there += a->offset, here += a->at;
-  if (!p || (of == OWN && (out || a->store != BEFORE)) || (of == ONCE && !out)) {
-    there += of == ONCE ? 0 : i * pitch;
+/* A copy in which each lane has members of its own; lanes without a pair have no effect. */
+static NOINLINE void copy_lanes(const action *a, const near *p, V *there, V *here, int gains) {
+  word out = a->of & OUT, of = a->of & ~OUT;
+  for (word l = 0; l < LANES; l++) {
+    word k = of == FIRST ? p->first[l] : of == SECOND ? p->second[l] : of == THEN ? p->before[l] : 0;
+    if (k < 0 || (out && p->before[l] == -2)) {
+      if (!out)
+        for (word w = 0; w < a->size; w++) LANE(here[a->at + w], l) = 0;
+      continue;
+    }
+    V *other = there + k * a->pitch, *own = here + a->at;
     for (word w = 0; w < a->size; w++)
-      if (gains) {
-        if (out) here[w] += there[w], there[w] = S(0.0);
-        else there[w] += here[w], here[w] = S(0.0);
-      } else if (out) there[w] = here[w];
-      else here[w] = there[w];
+      if (gains && out) LANE(own[w], l) += LANE(other[w], l), LANE(other[w], l) = 0;
+      else if (gains) LANE(other[w], l) += LANE(own[w], l), LANE(own[w], l) = 0;
+      else if (out) LANE(other[w], l) = LANE(own[w], l);
+      else LANE(own[w], l) = LANE(other[w], l);
+  }
+}
+
+static inline __attribute__((always_inline)) void copy(
+    const action *a, const near *p, word i, V *const *stores, V *here, int gains) {
+  V *there = stores[a->store] + a->offset, *own = here + a->at;
+  word out = a->of & OUT, of = a->of & ~OUT;
+#if LANES > 1
+  if (of == FIRST || of == SECOND || of == THEN || (out && of == ONCE && p)) {
+    copy_lanes(a, p, there, here, gains);
     return;
   }
-  for (word l = 0; l < LANES; l++) {
-    word k = i, none = 0;
-    if (of == ONCE) k = 0;
-    if (p) {
-      if (of == FIRST) k = p->first[l];
-      if (of == SECOND) k = p->second[l];
-      if (of == OWN && a->store == BEFORE) k = p->before[l], none = k < 0;
-      none |= out && p->before[l] == -2;
-    }
-    V *other = there + (none ? 0 : k * pitch);
-#define EACH for (word w = 0; w < a->size; w++)
-    if (!gains && !out) EACH LANE(here[w], l) = none ? (R)0 : LANE(other[w], l);
-    if (!gains && out && !none) EACH LANE(other[w], l) = LANE(here[w], l);
-    if (gains && !out) EACH {
-      if (!none) LANE(other[w], l) += LANE(here[w], l);
-      LANE(here[w], l) = 0;
-    }
-    if (gains && out && !none) EACH LANE(here[w], l) += LANE(other[w], l), LANE(other[w], l) = 0;
+  word k = of == OWN ? i : 0;
+#else
+  word k = of == OWN ? i : of == FIRST ? p->first[0] : of == SECOND ? p->second[0] : of == THEN ? p->before[0] : 0;
+  if (k < 0) {
+    memset(own, 0, a->size * sizeof(V));
+    return;
   }
-}
-
-static void move(const scene *s, const action *a, const near *p, word i, word k, V *here, int gains) {
-  const crowd *c = s->c;
-  const room *r = c->list + a->room;
-  V *base = gains ? s->b : s->m, *states = gains ? s->y : s->x;
-  if (a->store == WORK) copied(a, p, i, base + r->base, r->work, here, gains);
-  else if (a->store == GIVEN) {
-    if (!gains) copied(a, p, 0, s->given, 0, here, 0);
-    else memset(here + a->at, 0, a->size * sizeof(V));
-  } else copied(a, p, i, states + (k + (a->store == AFTER)) * c->state + r->from, r->state, here, gains);
+#endif
+  there += k * a->pitch;
+  for (word w = 0; w < a->size; w++)
+    if (gains && out) own[w] += there[w], there[w] = S(0.0);
+    else if (gains) there[w] += own[w], own[w] = S(0.0);
+    else if (out) there[w] = own[w];
+    else own[w] = there[w];
 }
 
 /* Which pairs may act: reaches and what strikes are at least what the calls go by. */
@@ -218,24 +211,64 @@ static int search(const scene *s, word k, word l, word *most) {
   return fits;
 }
 
-static int step(const scene *s, word k, const word *entries, word from, word end, word *most) {
+static int any(const V *word_of) {
+  for (word l = 0; l < LANES; l++)
+    if (LANE(*word_of, l) != 0) return 1;
+  return 0;
+}
+
+/* The pairs that are near, as their own calls have found out. */
+static void list_near(const scene *s, word k) {
   const crowd *c = s->c;
   word kinds = c->rooms - 1 - c->species;
-  for (word n = from; n < end; n++) {
+  for (word q = 0; q < kinds; q++) {
+    word room = 1 + c->species + q, first = slots_before(c, room), n = 0;
+    const V *word_of = s->m + c->list[room].base + c->nears[q];
+    for (word i = 0; i < s->used[k * kinds + q]; i++)
+      if (any(word_of + i * c->list[room].work)) s->active[first + n++] = i;
+    s->count[q] = n;
+  }
+}
+
+/* Which members a loop goes through, and its actions. */
+typedef struct { word count; const int32_t *listed; const near *pairs; const action *first, *end; } round;
+
+static round round_of(const scene *s, word n, word k) {
+  const crowd *c = s->c;
+  const loop *o = c->order + n;
+  word kinds = c->rooms - 1 - c->species, q = o->room - 1 - c->species, slots = slots_before(c, o->room);
+  int other = o->section >= 0 && !any(s->m + c->list[0].base + o->section);
+  round r = {.first = c->actions + (other ? o->end : o->first), .end = c->actions + (other ? o->other : o->end)};
+  if (q < 0) r.count = c->list[o->room].members;
+  else {
+    r.pairs = s->pairs + k * s->slots + slots;
+    r.count = n < c->looked ? s->used[k * kinds + q] : s->count[q];
+    if (n >= c->looked) r.listed = s->active + slots;
+  }
+  if (r.first == r.end) r.count = 0;
+  return r;
+}
+
+static int step(const scene *s, word k, const word *entries, word *most) {
+  const crowd *c = s->c;
+  word kinds = c->rooms - 1 - c->species;
+  V *stores[] = {s->m, s->x + k * c->state, s->x + (k + 1) * c->state, s->given};
+  for (word n = 0; n < c->loops; n++) {
     if (n == c->found && most) {
       memset(s->used + k * kinds, 0, kinds * sizeof(*s->used));
       for (word l = 0; l < LANES; l++)
         if (!search(s, k, l, most)) return 0;
     }
-    const loop *o = c->order + n;
-    const room *r = c->list + o->room;
-    word count = members(s, o->room, k);
-    for (word i = 0; i < count; i++) {
-      V *here = s->m + r->base + i * r->work;
-      const near *p = pair_of(s, o->room, i, k);
-      for (const action *a = c->actions + o->first; a < c->actions + o->end; a++)
-        if (a->store < 0) CALL(entries + a->entry, here, 0, 0);
-        else move(s, a, p, i, k, here, 0);
+    if (n == c->looked) list_near(s, k);
+    round r = round_of(s, n, k);
+    const room *own = c->list + c->order[n].room;
+    for (word j = 0; j < r.count; j++) {
+      word i = r.listed ? r.listed[j] : j;
+      V *here = s->m + own->base + i * own->work;
+      const near *p = r.pairs ? r.pairs + i : 0;
+      for (const action *a = r.first; a < r.end; a++)
+        if (a->store == CALLED) CALL(entries + a->entry, here, 0, 0);
+        else copy(a, p, i, stores, here, 0);
     }
   }
   return 1;
@@ -243,16 +276,18 @@ static int step(const scene *s, word k, const word *entries, word from, word end
 
 static void step_back(const scene *s, word k) {
   const crowd *c = s->c;
+  V *stores[] = {s->b, s->y + k * c->state, s->y + (k + 1) * c->state, 0};
   for (word n = c->loops - 1; n >= 0; n--) {
-    const loop *o = c->order + n;
-    const room *r = c->list + o->room;
-    for (word i = members(s, o->room, k) - 1; i >= 0; i--) {
-      V *here = s->m + r->base + i * r->work, *gains = s->b + r->base + i * r->work;
-      const near *p = pair_of(s, o->room, i, k);
-      for (const action *a = c->actions + o->end - 1; a >= c->actions + o->first; a--)
-        if (a->store >= 0) move(s, a, p, i, k, gains, 1);
-        else if (a->back >= 0) CALL(c->back + a->back, here, gains, 0);
-        else memset(gains + a->at, 0, a->size * sizeof(V));
+    round r = round_of(s, n, k);
+    const room *own = c->list + c->order[n].room;
+    for (word j = r.count - 1; j >= 0; j--) {
+      word i = r.listed ? r.listed[j] : j;
+      V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
+      const near *p = r.pairs ? r.pairs + i : 0;
+      for (const action *a = r.end - 1; a >= r.first; a--)
+        if (a->store == CALLED && a->back >= 0) CALL(c->back + a->back, here, gains, 0);
+        else if (a->store == CALLED || a->store == GIVEN) memset(gains + a->at, 0, a->size * sizeof(V));
+        else copy(a, p, i, stores, gains, 1);
     }
   }
 }
@@ -268,7 +303,8 @@ API word roll(const crowd *c, const scenes *q, V *memory) {
   s.given = s.y + (q->slopes ? (steps + 1) * c->state : 0);
   s.pairs = (near *)(s.given + c->given);
   s.used = (int32_t *)(s.pairs + steps * slots);
-  s.scratch = (char *)(((uintptr_t)(s.used + steps * kinds) + 7) / 8 * 8);
+  s.active = s.used + steps * kinds, s.count = s.active + slots;
+  s.scratch = (char *)(((uintptr_t)(s.count + kinds) + 7) / 8 * 8);
   for (word row = 0; row < q->rows; row += LANES) {
     word rows = q->rows - row < LANES ? q->rows - row : LANES;
     memset(s.x, 0, (steps + 1) * c->state * sizeof(V));
@@ -278,7 +314,7 @@ API word roll(const crowd *c, const scenes *q, V *memory) {
       for (word w = 0; w < c->given; w++) LANE(s.given[w], l) = (R)q->given[from * c->given + w];
     }
     for (word k = 0; k < steps; k++)
-      if (!step(&s, k, c->values, 0, c->loops, q->most)) return row;
+      if (!step(&s, k, c->values, q->most)) return row;
     for (word l = 0; l < rows; l++)
       for (word k = 0; k <= steps; k++)
         for (word w = 0; w < q->shown; w++)
@@ -291,7 +327,7 @@ API word roll(const crowd *c, const scenes *q, V *memory) {
         for (word w = 0; w < q->shown; w++)
           LANE(s.y[k * c->state + w], l) = (R)q->slopes[((row + l) * (steps + 1) + k) * q->shown + w];
     for (word k = steps - 1; k >= 0; k--) {
-      step(&s, k, c->again, 0, c->loops, 0);
+      step(&s, k, c->again, 0);
       step_back(&s, k);
     }
     for (word l = 0; l < rows; l++)

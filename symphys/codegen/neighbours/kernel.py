@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -17,7 +18,7 @@ from symphys.codegen.emit.source import FILES, SourceFile, head_of, resource, sp
 from symphys.codegen.emit.writer import write
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.neighbours.plan import CrowdPlan, crowd_plan
-from symphys.codegen.neighbours.program import Crowd
+from symphys.codegen.neighbours.program import Crowd, Store
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.toolchain.build import shared_library
 from symphys.codegen.toolchain.cache import Cache, default_cache
@@ -46,9 +47,9 @@ class _Kind(ctypes.Structure):
 
 class _Crowd(ctypes.Structure):
     _fields_ = (
-        *((name, WORD) for name in ("rooms", "species", "loops", "words", "state", "given", "found")),
-        *((name, POINTER) for name in ("list", "order", "actions", "values", "again", "back", "kinds", "sight")),
-        ("striking", WORD),
+        *((name, WORD) for name in ("rooms", "species", "loops", "words", "state", "given")),
+        *((name, WORD) for name in ("found", "looked", "striking")),
+        *((name, POINTER) for name in ("list", "order", "actions", "values", "again", "back", "kinds", "sight", "nears")),
     )
 
 
@@ -145,7 +146,7 @@ class CrowdKernel:
             bodies = sum(room.members for room in crowd.rooms[1 : 1 + len(crowd.sights)])
             slots = sum(room.members for room in crowd.rooms[1 + len(crowd.sights) :])
             words = 2 * data.words + (1 + gradient) * (steps + 1) * data.state + data.given
-            bytes_ = steps * (12 * lanes * slots + 4 * len(crowd.meetings)) + 16 * slots + 92 * bodies + 256
+            bytes_ = steps * (12 * lanes * slots + 4 * len(crowd.meetings)) + 24 * slots + 92 * bodies + 512
             self._pools = {(steps, gradient): MemoryPool(words + bytes_ // (8 * lanes) + 2, lanes, np.float64)}
         return self._pools[steps, gradient]
 
@@ -166,15 +167,29 @@ class CrowdKernel:
             kinds[k] = _Kind(each.first, each.second, plane, (ctypes.c_double * 3)(*each.normal), each.offset)
         self._kept += [rooms, kinds]
         sights = np.array([(s.position, s.reach) for s in crowd.sights], np.int64)
-        lists = planned.loops, planned.actions, planned.values, planned.again, planned.back
+        lists = planned.loops, self._actions(begins, planned), planned.values, planned.again, planned.back
         self._data = _Crowd(
-            *(len(crowd.rooms), species, len(planned.loops), base, begin, crowd.given, crowd.found),
+            *(len(crowd.rooms), species, len(planned.loops), base, begin, crowd.given),
+            *(crowd.found, crowd.looked, crowd.striking),
             ctypes.addressof(rooms),
             *(self._put(each) for each in lists),
             ctypes.addressof(kinds),
             self._put(sights),
-            crowd.striking,
+            self._put(np.array(crowd.nears, np.int64)),
         )
+
+    def _actions(self, begins: Sequence[int], planned: CrowdPlan) -> NDArray[np.int64]:
+        """With places in the memory in place of rooms."""
+        members = np.array([room.members for room in self.crowd.rooms])
+        work = np.array(planned.work)
+        base = np.cumsum(work * members) - work * members
+        states = np.array([room.state for room in self.crowd.rooms])
+        found = planned.actions.copy()
+        store, room = found[:, 0], found[:, 3].copy()
+        kept = (store == Store.BEFORE) | (store == Store.AFTER)
+        found[:, 3] = np.where(store == Store.WORK, work[room], np.where(kept, states[room], 0))
+        found[:, 2] += np.where(store == Store.WORK, base[room], np.where(kept, np.array(begins)[room], 0))
+        return found
 
     def _put(self, values: NDArray[Any]) -> int:
         values = np.ascontiguousarray(values) if values.size else np.zeros(1, np.int64)

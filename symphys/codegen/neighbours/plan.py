@@ -19,6 +19,8 @@ from symphys.codegen.graph.graph import Graph
 from symphys.codegen.neighbours.program import Crowd, MemberCall, Move
 
 Words = NDArray[np.int64]
+CALLED = 4
+"""The store of an action that is a call."""
 OUT = 8
 """Added to ``Of`` of a move that goes out."""
 
@@ -30,9 +32,9 @@ class CrowdPlan:
     Attributes:
         functions: the C functions, in the order of their numbers.
         work: words of a member of each room, with tapes.
-        loops: (loops, 3) room, first action, end.
-        actions: (actions, 8) store (-1: a call), room, of, offset, at, size, entry, entry of the adjoint; see
-            ``neighbours.c``.
+        loops: (loops, 5) room, first action, end, end of what is done where the section is left out, its word or -1.
+        actions: (actions, 8) store, of, offset, room, at, size, entry, entry of the adjoint; see ``neighbours.c``, where
+            the place of the room is part of the offset, and the words of a member stand for the room.
         values, again, back: entries of calls: of values alone, with tapes, adjoints.
     """
 
@@ -61,12 +63,14 @@ class _Planner:
 
     def plan(self) -> CrowdPlan:
         """Loops in order, and entries of their calls."""
-        loops, actions = list[tuple[int, int, int]](), list[tuple[int, ...]]()
+        loops, actions = list[tuple[int, ...]](), list[tuple[int, ...]]()
         for loop in self._crowd.loops:
             first = len(actions)
             for does in loop.does:
                 actions.append(_moved(does) if isinstance(does, Move) else self._called(does, loop.room))
-            loops.append((loop.room, first, len(actions)))
+            end = len(actions)
+            actions += [_moved(move) for move in loop.instead]
+            loops.append((loop.room, first, end, len(actions), NONE if loop.section is None else loop.section))
         lists = (np.array(each, np.int64) for each in (loops, actions, self._values, self._again, self._back))
         return CrowdPlan(tuple(self._functions.listed), tuple(self._work), *lists)
 
@@ -80,8 +84,8 @@ class _Planner:
         if kind == NONE:
             self._again += _entry(functions.number(forward, reads), places)
             self._level()
-            size = sum(map(len, forward.results)) if call.outputs else 0
-            return NONE, 0, 0, 0, call.outputs[0] if call.outputs else 0, size, entry, NONE
+            size = sum(map(len, forward.results))
+            return CALLED, 0, 0, 0, call.outputs[0], size, entry, NONE
         adjoint = part.kinds[kind]
         pair = functions.taped(forward, adjoint.graph)
         tape = []
@@ -95,7 +99,7 @@ class _Planner:
         marked = [*_marked(call.outputs, adjoint.outputs), *_marked(call.inputs, adjoint.inputs)]
         back = len(self._back)
         self._back += _entry(functions.number(pair.adjoint if pair else adjoint.graph, form), [*primal, *marked])
-        return NONE, 0, 0, 0, 0, 0, entry, back
+        return CALLED, 0, 0, 0, 0, 0, entry, back
 
     def _level(self) -> None:
         """Entries of both lists begin at the same places."""
@@ -105,7 +109,7 @@ class _Planner:
 
 
 def _moved(move: Move) -> tuple[int, ...]:
-    return int(move.store), move.room, int(move.of) + OUT * move.out, move.offset, move.at, move.size, 0, NONE
+    return int(move.store), int(move.of) + OUT * move.out, move.offset, move.room, move.at, move.size, 0, NONE
 
 
 def _marked(places: Sequence[int], mask: Sequence[bool]) -> list[int]:

@@ -9,12 +9,13 @@ from symphys.codegen.program.program import Place, Program
 
 
 class Of(IntEnum):
-    """Whose words are copied, as seen from a body or a pair: its own, those of its bodies, what is there once."""
+    """Whose words are copied: a member's own, those of a pair's bodies, what is there once, what a pair had then."""
 
     OWN = 0
     FIRST = 1
     SECOND = 2
     ONCE = 3
+    THEN = 4
 
 
 class Store(IntEnum):
@@ -65,10 +66,19 @@ class MemberCall:
 
 @dataclass(frozen=True)
 class Loop:
-    """What each member of a room does before the next one begins."""
+    """What each member of a room does before the next one begins.
+
+    Attributes:
+        room: whose members.
+        does: in order.
+        section: where in the work of what is there once a word is 0 if this is left out; None: it never is.
+        instead: what is copied then.
+    """
 
     room: int
     does: tuple[Move | MemberCall, ...]
+    section: int | None = None
+    instead: tuple[Move, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -121,6 +131,8 @@ class Crowd:
         sights: of the species.
         striking: where in the work of what is there once it says how far anything comes in a step [m].
         found: number of the loop before which pairs are looked for.
+        looked: number of the loop from which on only those are left that are near.
+        nears: by meeting, where in the work of a pair it says whether it is near.
         given: words that are given for all steps.
         chains: where in the sample lies what members hand on as it begins.
     """
@@ -132,6 +144,8 @@ class Crowd:
     sights: tuple[Sight, ...]
     striking: int
     found: int
+    looked: int
+    nears: tuple[int, ...]
     given: int
     chains: tuple[Place, ...]
 

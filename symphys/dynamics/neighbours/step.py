@@ -72,9 +72,20 @@ def recorded_step(
         for owner in dict.fromkeys(owners.values()):
             own = [name for name in layout.names() if owners[name] == owner]
             results[recorder.give("next", [after[name] for name in own]).number] = offsets[own[0]]
-    calls = with_guards(without_dead_code(recorder.calls), recorder.guards, [])
+    calls = with_guards(without_dead_code(recorder.calls), recorder.guards, recorder.sections)
+    calls = _seen_first(calls, recorder.sights)
     sizes = {"u": u.numel(), "p": p.numel(), "smoothing": 1}
     return RecordedStep(calls, recorder, Names(owners, offsets, results), sizes)
+
+
+def _seen_first(calls: Sequence[TracedCall], sights: Sequence[int]) -> tuple[TracedCall, ...]:
+    """The calls that vectors depend on, then the others: pairs are looked for between the two."""
+    wanted, first = set(sights), set[int]()
+    for k in range(len(calls) - 1, -1, -1):
+        if not wanted.isdisjoint(vector.number for vector in calls[k].outputs):
+            wanted.update(vector.number for vector in calls[k].inputs)
+            first.add(k)
+    return tuple([calls[k] for k in sorted(first)] + [call for k, call in enumerate(calls) if k not in first])
 
 
 def _names(sample: Sample, layout: Layout) -> tuple[dict[str, str], dict[str, int]]:

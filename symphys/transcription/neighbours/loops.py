@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from symphys.codegen.neighbours.program import Loop, MemberCall, Move, Of, Store
 from symphys.dynamics.neighbours.step import RecordedStep
 from symphys.dynamics.neighbours.sample import TWINS, Sample
+from symphys.dynamics.tracing.guards import Guard, Part
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.errors import SymphysError
 
@@ -52,7 +53,13 @@ class _Loop:
     """A loop that grows."""
 
     room: int
+    section: Part | None
     does: list[Move | MemberCall] = field(default_factory=list)
+    instead: list[Move] = field(default_factory=list)
+
+    def done(self, section: int | None) -> Loop:
+        """As it is; ``section``: where its word lies."""
+        return Loop(self.room, tuple(self.does), section, tuple(self.instead))
 
 
 class _Builder:
@@ -78,7 +85,7 @@ class _Builder:
         self._newest: dict[int, int] = {}
         self._twin: dict[int, int] = {}
         self._keys: dict[Hashable, list[tuple[int, ...]]] = {}
-        self._copies: dict[tuple[int, int], int] = {}
+        self._copies: dict[tuple[int, int, Part | None], int] = {}
         self._homes: dict[int, tuple[int, int]] = {}
 
     def built(self, calls: Sequence[TracedCall]) -> LoopStep:
@@ -97,7 +104,7 @@ class _Builder:
             for vector in call.outputs:
                 if vector.number in self._root:
                     self._newest[self._root[vector.number]] = vector.number
-        loops = tuple(Loop(loop.room, tuple(loop.does)) for loop in self._loops)
+        loops = tuple(loop.done(self._word(loop.section)) for loop in self._loops)
         return LoopStep(loops, tuple(self._work), tuple(self._states), self._homes)
 
     def _member(self, call: TracedCall) -> Owner:
@@ -169,6 +176,8 @@ class _Builder:
         inputs = tuple(self._copied(loop, vector, member) for vector in call.inputs)
         outputs = tuple(self._take(room, vector.size) for vector in call.outputs)
         loop.does.append(MemberCall(number, inputs, outputs))
+        if call.section is not None:
+            self._instead(loop, call, call.section, member, inputs, outputs)
         for vector, at in zip(call.outputs, outputs, strict=True):
             self._homes[vector.number] = room, at
             root = self._root.get(vector.number, vector.number)
@@ -181,6 +190,28 @@ class _Builder:
                 loop.does.append(Move(Store.AFTER, room, Of.OWN, offset, at, vector.size, out=True))
                 self._states[room] = max(self._states[room], offset + vector.size)
 
+    def _instead(
+        self, loop: _Loop, call: TracedCall, guard: Guard, member: Owner, inputs: Sequence[int], outputs: Sequence[int]
+    ) -> None:
+        """What is copied where the section of a call is left out; what is handed on stays as it is."""
+        for vector, at, part in zip(call.outputs, outputs, guard.otherwise, strict=True):
+            if part is None or vector.number in self._root:
+                continue
+            if part.vector is None or part.vector not in call.inputs:
+                raise SymphysError(f"neighbours: what stands for results of {call.function} is none of its arguments")
+            given = inputs[call.inputs.index(part.vector)]
+            number = part.vector.number
+            if part.vector.name or number in self._root or self._owner[number] != member:
+                loop.instead.append(self._read(part.vector, member, loop.room, given))
+            loop.instead.append(Move(Store.WORK, loop.room, Of.OWN, given + part.start, at, vector.size))
+
+    def _word(self, section: Part | None) -> int | None:
+        """Where the word of a section lies in the work of what is there once."""
+        if section is None or section.vector is None:
+            return None
+        number = section.vector.number
+        return self._homes[self._root.get(number, number)][1] + section.start
+
     def _loop(self, room: int, call: TracedCall) -> _Loop:
         """The loop that a call goes into: a new one where a member would come before another has handed on."""
         read, written = (
@@ -188,8 +219,10 @@ class _Builder:
             for vectors in (call.inputs, call.outputs)
         )
         late = any(self._touched.get(chain, False) for chain in read) or any(chain in self._touched for chain in written)
-        if not self._loops or self._loops[-1].room != room or late:
-            self._loops.append(_Loop(room))
+        section = None if call.section is None else call.section.word
+        last = self._loops[-1] if self._loops else None
+        if last is None or (last.room, last.section) != (room, section) or late:
+            self._loops.append(_Loop(room, section))
             self._touched = {}
         self._touched |= dict.fromkeys(read, False) | dict.fromkeys(written, True)
         return self._loops[-1]
@@ -198,28 +231,31 @@ class _Builder:
         """Where a call finds in its own work what it reads."""
         room, number = loop.room, vector.number
         if number in self._root:
-            root = self._root[number]
-            if self._newest[root] != number:
+            if self._newest[self._root[number]] != number:
                 raise SymphysError("neighbours: what has been handed on is read again")
-            owner, of = self._whose(vector, member, room)
-            move = Move(Store.WORK, owner, of, self._homes[self._first(root)][1], self._take(room, vector.size), vector.size)
-            loop.does.append(move)
-            return move.at
+            at = self._take(room, vector.size)
+            loop.does.append(self._read(vector, member, room, at))
+            return at
         if not vector.name and self._owner[number] == member:
             return self._homes[number][1]
-        if (room, number) not in self._copies:
-            self._copies[room, number] = self._take(room, vector.size)
-            loop.does.append(self._copy(vector, member, room, self._copies[room, number]))
-        return self._copies[room, number]
+        for key in ((room, number, None), (room, number, loop.section)):
+            if key in self._copies:
+                return self._copies[key]
+        at = self._copies[key] = self._take(room, vector.size)
+        loop.does.append(self._read(vector, member, room, at))
+        return at
 
-    def _copy(self, vector: TracedVector, member: Owner, room: int, at: int) -> Move:
-        """Of what does not change within a step."""
+    def _read(self, vector: TracedVector, member: Owner, room: int, at: int) -> Move:
+        """The copy of a vector to a member's work."""
         owner, of = self._whose(vector, member, room)
+        if vector.number in self._root:
+            return Move(Store.WORK, owner, of, self._homes[self._first(self._root[vector.number])][1], at, vector.size)
         if vector.name in self._given:
             return Move(Store.GIVEN, ONLY, Of.ONCE, self._given[vector.name], at, vector.size)
         if vector.name:
             offset = self._names.offsets[vector.name]
             self._states[owner] = max(self._states[owner], offset + vector.size)
+            of = Of.THEN if of is Of.OWN and member[0] == "pair" else of
             return Move(Store.BEFORE, owner, of, offset, at, vector.size)
         return Move(Store.WORK, owner, of, self._homes[self._first(vector.number)][1], at, vector.size)
 

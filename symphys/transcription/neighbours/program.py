@@ -8,14 +8,14 @@ from dataclasses import replace
 import casadi as ca
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
-from symphys.codegen.neighbours.program import Crowd, Meeting, Room, Sight
+from symphys.codegen.neighbours.program import Crowd, Meeting, MemberCall, Move, Room, Sight
 from symphys.dynamics.neighbours.sample import TWINS, Sample
 from symphys.dynamics.neighbours.step import RecordedStep, recorded_step
 from symphys.dynamics.tracing.recording import TracedVector
 from symphys.model.shapes import Plane
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme
-from symphys.transcription.neighbours.loops import loops_of
+from symphys.transcription.neighbours.loops import LoopStep, loops_of
 
 ROOM_FOR = 2
 """Pairs of a kind for each body, for which there is room at first."""
@@ -50,9 +50,25 @@ def crowd_of(sample: Sample, scheme: Scheme, exact: bool = False) -> Crowd:
         tuple(sights),
         step.homes[striking][1],
         next(k for k, loop in enumerate(step.loops) if loop.room > species),
+        1 + max(k for k, loop in enumerate(step.loops) for does in loop.does if _looks(does, recorded)),
+        tuple(_near_word(sample, recorded, step, kind) for kind in range(len(sample.kinds))),
         sum(recorded.sizes.values()),
         roots,
     )
+
+
+def _looks(does: Move | MemberCall, recorded: RecordedStep) -> bool:
+    """Whether an action is a call that finds out whether a pair is near."""
+    if isinstance(does, Move):
+        return False
+    return any(vector.number in recorded.recorder.words for vector in recorded.calls[does.number].outputs)
+
+
+def _near_word(sample: Sample, recorded: RecordedStep, step: LoopStep, kind: int) -> int:
+    """Where a pair's first word of that kind lies."""
+    pair = sample.world.pairs[sample.pairs[kind][0]]
+    sides = pair.first, pair.second
+    return next(step.homes[number][1] for number, of in recorded.recorder.words.items() if of == sides)
 
 
 def _sample_program(sample: Sample, recorded: RecordedStep) -> tuple[Program, Mapping[TracedVector, Place]]:
