@@ -18,7 +18,8 @@ typedef struct {
   const action *actions;
   const word *values, *again, *back; /* entries of calls */
   const kind *kinds;
-  const word *sight, *nears; /* by species: where a position and a reach lie; by kind: whether a pair is near */
+  const word *sight, *nears; /* by species: where a position and a reach lie; by kind where in nears
+                                words begin, of which one is not 0 if a pair is near */
 } crowd;
 typedef struct {
   word rows, steps;
@@ -223,9 +224,15 @@ static void list_near(const scene *s, word k) {
   word kinds = c->rooms - 1 - c->species;
   for (word q = 0; q < kinds; q++) {
     word room = 1 + c->species + q, first = slots_before(c, room), n = 0;
-    const V *word_of = s->m + c->list[room].base + c->nears[q];
-    for (word i = 0; i < s->used[k * kinds + q]; i++)
-      if (any(word_of + i * c->list[room].work)) s->active[first + n++] = i;
+    const word *near_words = c->nears + c->nears[q], *end = c->nears + c->nears[q + 1];
+    for (word i = 0; i < s->used[k * kinds + q]; i++) {
+      const V *here = s->m + c->list[room].base + i * c->list[room].work;
+      for (const word *w = near_words; w < end; w++)
+        if (any(here + *w)) {
+          s->active[first + n++] = i;
+          break;
+        }
+    }
     s->count[q] = n;
   }
 }

@@ -167,6 +167,7 @@ class CrowdKernel:
             kinds[k] = _Kind(each.first, each.second, plane, (ctypes.c_double * 3)(*each.normal), each.offset)
         self._kept += [rooms, kinds]
         sights = np.array([(s.position, s.reach) for s in crowd.sights], np.int64)
+        ends = 1 + len(crowd.nears) + np.cumsum([0, *map(len, crowd.nears)])
         lists = planned.loops, self._actions(begins, planned), planned.values, planned.again, planned.back
         self._data = _Crowd(
             *(len(crowd.rooms), species, len(planned.loops), base, begin, crowd.given),
@@ -175,7 +176,7 @@ class CrowdKernel:
             *(self._put(each) for each in lists),
             ctypes.addressof(kinds),
             self._put(sights),
-            self._put(np.array(crowd.nears, np.int64)),
+            self._put(np.array([*ends, *(at for words in crowd.nears for at in words)], np.int64)),
         )
 
     def _actions(self, begins: Sequence[int], planned: CrowdPlan) -> NDArray[np.int64]:

@@ -132,7 +132,7 @@ class Crowd:
         striking: where in the work of what is there once it says how far anything comes in a step [m].
         found: number of the loop before which pairs are looked for.
         looked: number of the loop from which on only those are left that are near.
-        nears: by meeting, where in the work of a pair it says whether it is near.
+        nears: by meeting, where in the work of a pair words lie of which one is not 0 if it is near.
         given: words that are given for all steps.
         chains: where in the sample lies what members hand on as it begins.
     """
@@ -145,7 +145,7 @@ class Crowd:
     striking: int
     found: int
     looked: int
-    nears: tuple[int, ...]
+    nears: tuple[tuple[int, ...], ...]
     given: int
     chains: tuple[Place, ...]
 

@@ -60,11 +60,12 @@ def rebound(
     between = replace(plastic, momenta=gathered(plastic.momenta)) if context.near else plastic
     newton = iterate(context.world, scheme.sweeps, constraints, between, motions)
     sums: tuple[Expr, Expr, Expr] = opened((ca.SX(0), ca.SX(0), ca.SX(0)))
-    bodies = (momenta_of(context, trees, solution.momenta) for solution in (start, plastic, newton))
+    solutions = replace(start, momenta=trees.states), plastic, newton
+    bodies = (momenta_of(context, trees, solution.momenta) for solution in solutions)
     for motion, *momenta in zip(motions, *bodies, strict=True):
         sums = sums if motion.massless else _energies(sums, motion, momenta)
     for tree, root in zip(trees.coordinates, trees.roots, strict=True):
-        rates = (rotor_rates(tree, solution.momenta[root]) for solution in (start, plastic, newton))
+        rates = (rotor_rates(tree, solution.momenta[root]) for solution in solutions)
         for armature, *turning in zip(tree.tree.armature, *rates, strict=True):
             sums = sums if armature is None else _rotor_energies(armature, turning, sums)
     share = _largest_share(sums)

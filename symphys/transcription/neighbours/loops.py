@@ -8,6 +8,7 @@ Of bodies and pairs that are alike only the first is kept.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -18,6 +19,7 @@ from symphys.dynamics.tracing.guards import Guard, Part
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.errors import SymphysError
 
+NONE = -1
 ONLY = 0
 """The number of the room of what is there once."""
 
@@ -48,6 +50,20 @@ def loops_of(sample: Sample, recorded: RecordedStep) -> LoopStep:
     return _Builder(sample, recorded).built(recorded.calls)
 
 
+def _points(sample: Sample, words: Mapping[int, Hashable]) -> dict[int, int]:
+    """For the words of guards that are about one point which that is: they come in order, behind that of the pair."""
+    points = Counter((pair.first, pair.second) for pair in sample.world.pairs)
+    by_sides: dict[Hashable, list[int]] = {}
+    for number, sides in words.items():
+        by_sides.setdefault(sides, []).append(number)
+    found: dict[int, int] = {}
+    for sides, own in by_sides.items():
+        count = points[sides]  # type: ignore[index]
+        if len(own) >= count:
+            found |= zip(own[len(own) - count :], range(count), strict=True)
+    return found
+
+
 @dataclass
 class _Loop:
     """A loop that grows."""
@@ -75,11 +91,14 @@ class _Builder:
         for k, pair in enumerate(sample.world.pairs):
             self._members[pair.name] = "pair", leads.setdefault((pair.first, pair.second), k)
         self._of_word = {number: ("pair", leads[sides]) for number, sides in self._recorder.words.items()}
+        self._points = _points(sample, self._recorder.words)
         self._kinds = {own[0]: kind for kind, own in enumerate(sample.pairs)}
         rooms = 1 + len(sample.species) + len(sample.kinds)
         self._work, self._states = [0] * rooms, [0] * rooms
         self._loops: list[_Loop] = []
         self._touched: dict[int, bool] = {}
+        self._reached = NONE
+        self._readers: dict[int, Owner | None] = {}
         self._owner: dict[int, Owner] = {}
         self._root: dict[int, int] = {}
         self._newest: dict[int, int] = {}
@@ -90,6 +109,7 @@ class _Builder:
 
     def built(self, calls: Sequence[TracedCall]) -> LoopStep:
         """All calls as loops."""
+        self._readers = self._read_by(calls)
         for number, call in enumerate(calls):
             for vector in call.inputs:
                 if vector.name:
@@ -109,20 +129,38 @@ class _Builder:
 
     def _member(self, call: TracedCall) -> Owner:
         """Who makes a call."""
-        words = [vector.number for vector in call.outputs]
-        if call.guard is not None and call.guard.word.vector is not None:
-            words.append(call.guard.word.vector.number)
-        for number in words:
-            if number in self._of_word:
-                return self._of_word[number]
+        if (pair := self._told(call)) is not None:
+            return pair
         roots = [self._recorder.roots[v.number] for v in call.outputs if v.number in self._recorder.roots]
         owners = {self._owner[vector.number] for vector in call.inputs} - {ONCE}
         owners |= {("body", body) for body in roots if body is not None}
         if pairs := {owner for owner in owners if owner[0] == "pair"}:
             owners = pairs
         if len(owners) > 1:
+            readers = {self._readers.get(vector.number) for vector in call.outputs}
+            owners = {owner for owner in readers if owner is not None}
+        if len(owners) > 1:
             raise SymphysError(f"neighbours: {call.function} belongs to no single body or pair")
         return owners.pop() if owners else ONCE
+
+    def _told(self, call: TracedCall) -> Owner | None:
+        """The pair that a call belongs to, as a guard says."""
+        words = [vector.number for vector in call.outputs]
+        if call.guard is not None and call.guard.word.vector is not None:
+            words.append(call.guard.word.vector.number)
+        return next((self._of_word[number] for number in words if number in self._of_word), None)
+
+    def _read_by(self, calls: Sequence[TracedCall]) -> dict[int, Owner | None]:
+        """For the numbers of vectors the pair that alone reads them; None: several do."""
+        found: dict[int, Owner | None] = {}
+        for call in reversed(calls):
+            pair = self._told(call)
+            if pair is None:
+                owners = {found[vector.number] for vector in call.outputs if vector.number in found}
+                pair = owners.pop() if len(owners) == 1 else None
+            for vector in call.inputs:
+                found[vector.number] = pair if found.get(vector.number, pair) == pair else None
+        return found
 
     def _room(self, member: Owner) -> int | None:
         """The room of a member that stands for the others; None for these."""
@@ -219,20 +257,29 @@ class _Builder:
             for vectors in (call.inputs, call.outputs)
         )
         late = any(self._touched.get(chain, False) for chain in read) or any(chain in self._touched for chain in written)
+        point = self._point(call)
+        late = late and not self._reached < point  # the points of a pair follow one another
         section = None if call.section is None else call.section.word
         last = self._loops[-1] if self._loops else None
         if last is None or (last.room, last.section) != (room, section) or late:
             self._loops.append(_Loop(room, section))
-            self._touched = {}
+            self._touched, self._reached = {}, NONE
+        self._reached = max(self._reached, point)
         self._touched |= dict.fromkeys(read, False) | dict.fromkeys(written, True)
         return self._loops[-1]
+
+    def _point(self, call: TracedCall) -> int:
+        """Which point of its pair a call is about; NONE: of none alone."""
+        words = [] if call.guard is None or call.guard.word.vector is None else [call.guard.word.vector.number]
+        words += [vector.number for vector in call.outputs]
+        return next((self._points[number] for number in words if number in self._points), NONE)
 
     def _copied(self, loop: _Loop, vector: TracedVector, member: Owner) -> int:
         """Where a call finds in its own work what it reads."""
         room, number = loop.room, vector.number
         if number in self._root:
             if self._newest[self._root[number]] != number:
-                raise SymphysError("neighbours: what has been handed on is read again")
+                raise SymphysError(f"neighbours: what has been handed on is read again: {vector}, newest {self._newest[self._root[number]]}, root {self._root[number]}, member {member}")
             at = self._take(room, vector.size)
             loop.does.append(self._read(vector, member, room, at))
             return at

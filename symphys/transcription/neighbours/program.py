@@ -51,7 +51,7 @@ def crowd_of(sample: Sample, scheme: Scheme, exact: bool = False) -> Crowd:
         step.homes[striking][1],
         next(k for k, loop in enumerate(step.loops) if loop.room > species),
         1 + max(k for k, loop in enumerate(step.loops) for does in loop.does if _looks(does, recorded)),
-        tuple(_near_word(sample, recorded, step, kind) for kind in range(len(sample.kinds))),
+        tuple(_near_words(sample, recorded, step, kind) for kind in range(len(sample.kinds))),
         sum(recorded.sizes.values()),
         roots,
     )
@@ -64,11 +64,10 @@ def _looks(does: Move | MemberCall, recorded: RecordedStep) -> bool:
     return any(vector.number in recorded.recorder.words for vector in recorded.calls[does.number].outputs)
 
 
-def _near_word(sample: Sample, recorded: RecordedStep, step: LoopStep, kind: int) -> int:
-    """Where a pair's first word of that kind lies."""
-    pair = sample.world.pairs[sample.pairs[kind][0]]
-    sides = pair.first, pair.second
-    return next(step.homes[number][1] for number, of in recorded.recorder.words.items() if of == sides)
+def _near_words(sample: Sample, recorded: RecordedStep, step: LoopStep, kind: int) -> tuple[int, ...]:
+    """Where the words of guards of a kind of pairs lie."""
+    first = {(pair.first, pair.second) for pair in (sample.world.pairs[k] for k in sample.pairs[kind])}
+    return tuple(step.homes[number][1] for number, sides in recorded.recorder.words.items() if sides in first)
 
 
 def _sample_program(sample: Sample, recorded: RecordedStep) -> tuple[Program, Mapping[TracedVector, Place]]:
