@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -11,10 +11,10 @@ from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.codegen.neighbours.program import Crowd, Meeting, MemberCall, Move, Room, Sight
 from symphys.dynamics.neighbours.sample import TWINS, Sample
 from symphys.dynamics.neighbours.step import RecordedStep, recorded_step
-from symphys.dynamics.tracing.recording import TracedVector
+from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.model.shapes import Plane
 from symphys.model.state_layout import Layout
-from symphys.model.world import Scheme
+from symphys.model.world import Scheme, World
 from symphys.transcription.neighbours.loops import LoopStep, loops_of
 
 ROOM_FOR = 2
@@ -40,7 +40,7 @@ def crowd_of(sample: Sample, scheme: Scheme, exact: bool = False) -> Crowd:
     begin = [step.homes[number][1] for number in seen[::TWINS]]
     sights = [Sight(position, position + 3) for position in begin]
     rooms = [Room(*each) for each in zip(step.work, step.states, members, strict=True)]
-    program, places = _sample_program(sample, recorded)
+    program, places = step_program(sample.world, recorded.calls, recorded.sizes)
     roots = tuple(place for vector, place in places.items() if vector.number in recorded.recorder.roots)
     return Crowd(
         program,
@@ -70,14 +70,19 @@ def _near_words(sample: Sample, recorded: RecordedStep, step: LoopStep, kind: in
     return tuple(step.homes[number][1] for number, sides in recorded.recorder.words.items() if sides in first)
 
 
-def _sample_program(sample: Sample, recorded: RecordedStep) -> tuple[Program, Mapping[TracedVector, Place]]:
-    """One step of the sample, without guards; where its vectors lie."""
-    layout, at = Layout(sample.world), MemoryLayout()
+def step_program(
+    world: World, traced: Sequence[TracedCall], sizes: Mapping[str, int]
+) -> tuple[Program, Mapping[TracedVector, Place]]:
+    """One step without guards, from z, the state, to "x", the parts of the next; where its vectors lie.
+
+    ``sizes`` are those of "u", "p" and "smoothing", the parameters.
+    """
+    layout, at = Layout(world), MemoryLayout()
     x = at.take(layout.size)
-    given = {name: at.take(size) for name, size in recorded.sizes.items()}
+    given = {name: at.take(size) for name, size in sizes.items()}
     places: dict[TracedVector, Place] = {}
     calls = []
-    for call in recorded.calls:
+    for call in traced:
         for vector in call.inputs:
             if vector.name in given:
                 places[vector] = given[vector.name]
@@ -88,11 +93,11 @@ def _sample_program(sample: Sample, recorded: RecordedStep) -> tuple[Program, Ma
             places[vector] = at.take(vector.size)
         inputs, outputs = (tuple(places[v] for v in vectors) for vectors in (call.inputs, call.outputs))
         calls.append(FunctionCall(call.function, inputs, outputs))
-    ends = [places[vector] for call in recorded.calls for vector in call.outputs if vector.name == "next"]
+    ends = [places[vector] for call in traced for vector in call.outputs if vector.name == "next"]
     symbols = [ca.SX.sym("end", place.size) for place in ends]
     after = at.take(sum(place.size for place in ends))
     stack = ca.Function("after", symbols, [ca.vertcat(*symbols)])
-    first, size = given["u"].offset, sum(recorded.sizes.values())
+    first, size = given["u"].offset, sum(sizes.values())
     program = Program(
         size=at.size,
         z=x,
