@@ -7,7 +7,7 @@
 
 typedef struct { word work, state, members, base, from; } room; /* words of a member; where members begin */
 typedef struct { word room, first, end, other, section; } loop;  /* of its actions; those in place of them end there */
-typedef struct { word store, of, offset, pitch, at, size, entry, back; } action; /* store CALLED: a call, else a copy */
+typedef struct { word store, of, offset, pitch, at, size, entry, back, guard; } action; /* CALLED: a call, else a copy */
 typedef struct { word first, second, plane; double normal[3], offset; } kind; /* species; -1: a plane */
 typedef struct {
   word rooms, species, loops, words, state, given;
@@ -274,7 +274,9 @@ static int step(const scene *s, word k, const word *entries, word *most) {
       V *here = s->m + own->base + i * own->work;
       const near *p = r.pairs ? r.pairs + i : 0;
       for (const action *a = r.first; a < r.end; a++)
-        if (a->store == CALLED) CALL(entries + a->entry, here, 0, 0);
+        if (a->guard >= 0 && !any(here + a->guard)) {
+          if (a->store == CALLED) memset(here + a->at, 0, a->size * sizeof(V));
+        } else if (a->store == CALLED) CALL(entries + a->entry, here, 0, 0);
         else copy(a, p, i, stores, here, 0);
     }
   }
@@ -292,7 +294,9 @@ static void step_back(const scene *s, word k) {
       V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
       const near *p = r.pairs ? r.pairs + i : 0;
       for (const action *a = r.end - 1; a >= r.first; a--)
-        if (a->store == CALLED && a->back >= 0) CALL(c->back + a->back, here, gains, 0);
+        if (a->guard >= 0 && !any(here + a->guard)) {
+          if (a->store == CALLED) memset(gains + a->at, 0, a->size * sizeof(V));
+        } else if (a->store == CALLED && a->back >= 0) CALL(c->back + a->back, here, gains, 0);
         else if (a->store == CALLED || a->store == GIVEN) memset(gains + a->at, 0, a->size * sizeof(V));
         else copy(a, p, i, stores, gains, 1);
     }

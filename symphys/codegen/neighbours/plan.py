@@ -33,7 +33,7 @@ class CrowdPlan:
         functions: the C functions, in the order of their numbers.
         work: words of a member of each room, with tapes.
         loops: (loops, 5) room, first action, end, end of what is done where the section is left out, its word or -1.
-        actions: (actions, 8) store, of, offset, room, at, size, entry, entry of the adjoint; see ``neighbours.c``, where
+        actions: (actions, 9) store, of, offset, room, at, size, entry, entry of the adjoint, guard; see ``neighbours.c``, where
             the place of the room is part of the offset, and the words of a member stand for the room.
         values, again, back: entries of calls: of values alone, with tapes, adjoints.
     """
@@ -78,14 +78,14 @@ class _Planner:
         part, functions = self._part, self._functions
         function, kind = part.calls.calls[call.number].function, int(part.kind[call.number])
         forward, reads = functions.forward(function), Form(primal=function.n_in(), adds=False)
-        places = [*call.inputs, *call.outputs]
+        places, size = [*call.inputs, *call.outputs], sum(map(len, forward.results))
+        guard = NONE if call.guard is None else call.guard
         entry = len(self._values)
         self._values += _entry(functions.number(forward, reads), places)
         if kind == NONE:
             self._again += _entry(functions.number(forward, reads), places)
             self._level()
-            size = sum(map(len, forward.results))
-            return CALLED, 0, 0, 0, call.outputs[0], size, entry, NONE
+            return CALLED, 0, 0, 0, call.outputs[0], size, entry, NONE, guard
         adjoint = part.kinds[kind]
         pair = functions.taped(forward, adjoint.graph)
         tape = []
@@ -99,7 +99,7 @@ class _Planner:
         marked = [*_marked(call.outputs, adjoint.outputs), *_marked(call.inputs, adjoint.inputs)]
         back = len(self._back)
         self._back += _entry(functions.number(pair.adjoint if pair else adjoint.graph, form), [*primal, *marked])
-        return CALLED, 0, 0, 0, 0, 0, entry, back
+        return CALLED, 0, 0, 0, call.outputs[0], size, entry, back, guard
 
     def _level(self) -> None:
         """Entries of both lists begin at the same places."""
@@ -109,7 +109,8 @@ class _Planner:
 
 
 def _moved(move: Move) -> tuple[int, ...]:
-    return int(move.store), int(move.of) + OUT * move.out, move.offset, move.room, move.at, move.size, 0, NONE
+    guard = NONE if move.guard is None else move.guard
+    return int(move.store), int(move.of) + OUT * move.out, move.offset, move.room, move.at, move.size, 0, NONE, guard
 
 
 def _marked(places: Sequence[int], mask: Sequence[bool]) -> list[int]:

@@ -39,6 +39,7 @@ class Move:
         at: in the member's work.
         size: words.
         out: whether they are copied from the member.
+        guard: where a word of the member's work is 0 if this may be left out; None: it may not.
     """
 
     store: Store
@@ -48,6 +49,7 @@ class Move:
     at: int
     size: int
     out: bool = False
+    guard: int | None = None
 
 
 @dataclass(frozen=True)
@@ -57,11 +59,13 @@ class MemberCall:
     Attributes:
         number: of the call in the sample's body.
         inputs, outputs: where they begin in the work of the member.
+        guard: where a word of that is 0 if results are 0 or not read; None: the call is always needed.
     """
 
     number: int
     inputs: tuple[int, ...]
     outputs: tuple[int, ...]
+    guard: int | None = None
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from symphys.codegen.neighbours.program import Loop, MemberCall, Move, Of, Store
 from symphys.dynamics.neighbours.step import RecordedStep
@@ -210,10 +210,10 @@ class _Builder:
 
     def _put(self, number: int, call: TracedCall, member: Owner, room: int) -> None:
         """A call, what is copied for it, and what it hands on."""
-        loop = self._loop(room, call)
-        inputs = tuple(self._copied(loop, vector, member) for vector in call.inputs)
+        loop, guard = self._loop(room, call), self._guard(call)
+        inputs = tuple(self._copied(loop, vector, member, guard) for vector in call.inputs)
         outputs = tuple(self._take(room, vector.size) for vector in call.outputs)
-        loop.does.append(MemberCall(number, inputs, outputs))
+        loop.does.append(MemberCall(number, inputs, outputs, guard))
         if call.section is not None:
             self._instead(loop, call, call.section, member, inputs, outputs)
         for vector, at in zip(call.outputs, outputs, strict=True):
@@ -222,7 +222,7 @@ class _Builder:
             if root != vector.number:
                 owner, of = self._whose(vector, member, room)
                 offset = self._homes[self._first(root)][1]
-                loop.does.append(Move(Store.WORK, owner, of, offset, at, vector.size, out=True))
+                loop.does.append(Move(Store.WORK, owner, of, offset, at, vector.size, out=True, guard=guard))
             if vector.number in self._names.results:
                 offset = self._names.results[vector.number]
                 loop.does.append(Move(Store.AFTER, room, Of.OWN, offset, at, vector.size, out=True))
@@ -274,14 +274,21 @@ class _Builder:
         words += [vector.number for vector in call.outputs]
         return next((self._points[number] for number in words if number in self._points), NONE)
 
-    def _copied(self, loop: _Loop, vector: TracedVector, member: Owner) -> int:
+    def _guard(self, call: TracedCall) -> int | None:
+        """Where the word of a call's point lies, if it is about one of several."""
+        if call.guard is None or call.guard.word.vector is None or call.guard.word.start:
+            return None
+        number = call.guard.word.vector.number
+        return self._homes[number][1] if number in self._points else None
+
+    def _copied(self, loop: _Loop, vector: TracedVector, member: Owner, guard: int | None) -> int:
         """Where a call finds in its own work what it reads."""
         room, number = loop.room, vector.number
         if number in self._root:
             if self._newest[self._root[number]] != number:
                 raise SymphysError(f"neighbours: what has been handed on is read again: {vector}, newest {self._newest[self._root[number]]}, root {self._root[number]}, member {member}")
             at = self._take(room, vector.size)
-            loop.does.append(self._read(vector, member, room, at))
+            loop.does.append(replace(self._read(vector, member, room, at), guard=guard))
             return at
         if not vector.name and self._owner[number] == member:
             return self._homes[number][1]
