@@ -2,12 +2,12 @@
 
     python benchmarks/start_up.py [NAME ...]
 
-Each start is a process of its own, with a cache of kernels that is empty at first. Modules are bytecode, as a package is
-installed: a start before the first writes it, whatever $PYTHONDONTWRITEBYTECODE says. Seconds are those of processors, of
-Python and of compilers, so that other work on the machine counts little; ``wall`` is the clock's, and ``kernel`` is the
-clock's until the kernel is there that is compiled beside a first start. ``--repeats`` starts each problem again from
-its kernel, and prints the least and the median. ``table_robot`` is the robot of table_robot.py with a net; other names
-are those of shipped problems.
+Each start is a process of its own, with a cache of kernels that is empty at first. Modules are bytecode, as a package
+is installed: a start before the first writes it, whatever $PYTHONDONTWRITEBYTECODE says. Seconds are those of
+processors, of Python and of compilers, so that other work on the machine counts little; ``wall`` is the clock's, and
+``kernel`` is the clock's until the kernel is there that is compiled beside a first start. ``--repeats`` starts each
+problem again from its kernel, and prints the least and the median. ``table_robot`` is the robot of table_robot.py with
+a net; other names are those of shipped problems.
 """
 
 from __future__ import annotations
