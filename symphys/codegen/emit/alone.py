@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.emit.guarding import TABLES
-from symphys.codegen.emit.plan import Plan
+from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.shapes import ALL, BESIDE, EACH, TURNS, Access, Shape
 from symphys.codegen.program.program import Program
 
@@ -187,7 +187,7 @@ class _Tables:
         for (offset, stride), size in zip(entry.pairs, self._sizes(entry.number), strict=True):
             first, step = self._placed(offset, size)
             pairs.append((first, stride))
-            accesses.append(Access(ALL, step))
+            accesses.append(Access(ALL, (step,)))
         return _Entry(self._number(entry.number, Shape(1, tuple(accesses))), pairs)
 
     def _team(self, own: Sequence[_Entry]) -> _Entry | None:
@@ -196,17 +196,17 @@ class _Tables:
         for i, size in enumerate(self._sizes(own[0].number)):
             strides = {entry.pairs[i][1] for entry in own}
             placed = [self._placed(entry.pairs[i][0], size) for entry in own]
-            steps = {step for _, step in placed}
-            if len(strides) > 1 or len(steps) > 1:
+            if len(strides) > 1:
                 return None
-            (stride,), (step,), first = strides, steps, [at for at, _ in placed]
+            (stride,) = strides
+            first, steps = map(list, zip(*placed, strict=True))
             if len(set(first)) == 1:
                 kind = ALL
-            elif first == list(range(first[0], first[0] + lanes)) and (size == 1 or step == lanes):
-                kind, step = BESIDE, lanes
+            elif first == list(range(first[0], first[0] + lanes)) and (size == 1 or set(steps) == {lanes}):
+                kind, steps = BESIDE, [lanes] * lanes
             else:
                 kind = EACH if len(set(first)) == lanes else TURNS
-            accesses.append(Access(kind, step))
+            accesses.append(Access(kind, tuple(steps)))
             pairs += [(at, stride) for at in (first if kind in (EACH, TURNS) else first[:1])]
         if not self._keeps_order(own):
             return None

@@ -13,11 +13,11 @@ class Access(NamedTuple):
 
     Attributes:
         kind: see above.
-        step: from one word of a place to the next.
+        steps: from one word of a place to the next, for each lane.
     """
 
     kind: str
-    step: int
+    steps: tuple[int, ...]
 
 
 class Shape(NamedTuple):
@@ -88,47 +88,49 @@ class TeamWords(PlaceWords):
 
     def load(self, name: str, word: int | str) -> str:
         """The value of a word."""
-        kind, at = self._access[name].kind, self._index(name, word)
+        kind, at = self._access[name].kind, self._words(name, word)
         if self.single:
-            return f"{name}[{at}]"
+            return at[0]
         if kind == ALL:
-            return f"ALL({name}[{at}])"
+            return f"ALL({at[0]})"
         if kind == BESIDE:
-            return f"*(const U *)({name} + {at})"
-        return f"((V){{{', '.join(f'{pointer}[{at}]' for pointer in self.pointers(name))}}})"
+            return f"*(const U *)&{at[0]}"
+        return f"((V){{{', '.join(at)}}})"
 
     def store(self, name: str, word: int | str, value: str) -> str:
         """Write a word."""
-        kind, at = self._access[name].kind, self._index(name, word)
+        kind, at = self._access[name].kind, self._words(name, word)
         if self.single:
-            return f"{name}[{at}] = {value};"
+            return f"{at[0]} = {value};"
         if kind == BESIDE:
-            return f"*(U *)({name} + {at}) = {value};"
-        parts = " ".join(f"{name}_{lane}[{at}] = x[{lane}];" for lane in range(self._lanes))
+            return f"*(U *)&{at[0]} = {value};"
+        parts = " ".join(f"{at[lane]} = x[{lane}];" for lane in range(self._lanes))
         return f"{{ const V x = {value}; {parts} }}"
 
     def add(self, name: str, word: int | str, value: str) -> str:
         """Add to a word; ``value`` may say where what is there comes in, as {}."""
-        kind, at = self._access[name].kind, self._index(name, word)
+        kind, at = self._access[name].kind, self._words(name, word)
         if self.single:
             return super().add(name, word, value)
         sum_ = value if "{}" in value else f"{{}} + {value}"
         if kind == BESIDE:
-            to = f"*(U *)({name} + {at})"
+            to = f"*(U *)&{at[0]}"
             return f"{to} = {sum_.format(to)};"
         if kind == EACH:
             return self.store(name, word, sum_.format(self.load(name, word)))
-        words = [f"{name}[{at}]" if kind == ALL else f"{name}_{lane}[{at}]" for lane in range(self._lanes)]
-        parts = " ".join(f"x = {sum_.format(f'ALL({words[k]})')}; {words[k]} = x[{k}];" for k in self._turn)
+        parts = " ".join(f"x = {sum_.format(f'ALL({at[k]})')}; {at[k]} = x[{k}];" for k in self._turn)
         return f"{{ V x; {parts} }}"
 
     def clear(self, name: str, word: str) -> str:
         """Zero a word, in all lanes."""
-        at = self._index(name, word)
         if self.single or self._access[name].kind == BESIDE:
             return self.store(name, word, "S(0.0)")
-        return f"{{ {' '.join(f'{pointer}[{at}] = 0;' for pointer in self.pointers(name))} }}"
+        return f"{{ {' '.join(f'{at} = 0;' for at in dict.fromkeys(self._words(name, word)))} }}"
 
-    def _index(self, name: str, word: int | str) -> int | str:
-        step = self._access[name].step
-        return word * step if isinstance(word, int) else f"{step} * {word}"
+    def _words(self, name: str, word: int | str) -> list[str]:
+        """The word of each lane; of lanes that are beside each other, or share a place, that of the first."""
+        kind, steps = self._access[name]
+        index = [word * step if isinstance(word, int) else f"{step} * {word}" for step in steps]
+        pointers = self.pointers(name)
+        apart = [f"{pointers[lane % len(pointers)]}[{index[lane]}]" for lane in range(len(steps))]
+        return apart[:1] * self._lanes if kind in (ALL, BESIDE) else apart

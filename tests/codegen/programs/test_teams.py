@@ -23,13 +23,14 @@ from symphys.codegen.runtime.widths import suited
 STEPS = 3
 
 
-def limbs(count: int = 4, crossed: bool = False) -> Program:
+def limbs(count: int = 4, crossed: bool = False, odd: bool = False) -> Program:
     """Limbs that hang on a trunk of two words; a limb is moved by the trunk, and the trunk by all limbs in turn.
 
-    ``crossed``: two limbs each have one arm at the same place.
+    ``crossed``: two limbs each have one arm at the same place. ``odd``: the first is bent by a function of its own.
     """
     trunk, own, arm = ca.SX.sym("trunk", 2), ca.SX.sym("own", 3), ca.SX.sym("arm", 3)
     bent = ca.Function("bent", [trunk, own], [ca.sin(own) * trunk[0], ca.if_else(own[0] > 0, own[1], trunk[1] * own)])
+    stiff = ca.Function("stiff", [trunk, own], [ca.cos(own) * trunk[1], 0.5 * own]) if odd else bent
     held = ca.Function(
         "held", [own, arm, trunk], [own * arm[0] + ca.sqrt(1 + arm**2) / (2 + own[1] ** 2), trunk * own[2]]
     )
@@ -42,11 +43,11 @@ def limbs(count: int = 4, crossed: bool = False) -> Program:
     body, now = list[FunctionCall](), replace(state, size=2)
     sines, bents, helds, pushes = ([at.take(size) for _ in range(count)] for size in (3, 3, 3, 2))
     for k in range(count):  # limb by limb, as a recorder would have it
-        body.append(FunctionCall(bent, (replace(state, size=2), part[k]), (sines[k], bents[k])))
+        body.append(FunctionCall(bent if k else stiff, (replace(state, size=2), part[k]), (sines[k], bents[k])))
         arm_of = sines[k // 2] if crossed else sines[k]
         body.append(FunctionCall(held, (bents[k], arm_of, replace(state, size=2)), (helds[k], pushes[k])))
         body.append(FunctionCall(moved, (helds[k], sines[count - 1 - k]), (part[k].later(),)))
-    body.sort(key=lambda call: [bent, held, moved].index(call.function) if crossed else 0)
+    body.sort(key=lambda call: [stiff, bent, held, moved].index(call.function) if crossed else 0)
     if not crossed:
         body = [body[3 * k + i] for i in (0, 1) for k in range(count)] + body[2::3]
     for k in range(count):
@@ -69,9 +70,10 @@ def limbs(count: int = 4, crossed: bool = False) -> Program:
 
 @pytest.mark.parametrize("count", [2, 4, 6])
 @pytest.mark.parametrize("crossed", [False, True])
-def test_one_rollout_alone_gives_the_same_bits(count: int, crossed: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize("odd", [False, True])
+def test_one_rollout_alone_gives_the_same_bits(count: int, crossed: bool, odd: bool, tmp_path: Path) -> None:
     require("simd")
-    program, cache = limbs(count, crossed), Cache(tmp_path / "kernels")
+    program, cache = limbs(count, crossed, odd), Cache(tmp_path / "kernels")
     rng = np.random.default_rng(count)
     Z, seeds = rng.normal(size=(5, program.z.size)), rng.normal(size=(5, program.z.size))
     wide = compile_program(program, cache=cache, threads=1, lanes=4)
@@ -104,6 +106,14 @@ def test_what_teams_hand_on_lies_side_by_side() -> None:
     crossed = alone(plan(limbs(crossed=True), ["end"]))
     assert crossed is not None
     assert TURNS in {access.kind for shape in crossed.shapes for access in shape.accesses}
+
+
+def test_what_comes_from_elsewhere_has_strides_of_its_own() -> None:
+    found = alone(plan(limbs(odd=True), ["end"]))
+    assert found is not None
+    steps = {access.steps for shape in found.shapes if shape.lanes == 4 for access in shape.accesses}
+    assert any(len(set(each)) > 1 for each in steps)
+    assert found.tables["body"][0] == 1 + 2 + 1 + 1 + 4  # stiff; bent of three; held, moved; pulled in turn
 
 
 def test_sums_do_not_wait_for_all_their_terms() -> None:
