@@ -1,7 +1,7 @@
 """Compiled kernels of all tests go into a cache of the checkout; what takes minutes runs only when asked for.
 
-Modules become bytecode, also where $PYTHONDONTWRITEBYTECODE is set, as in containers: hundreds of processes of the tests
-would each compile the package from its sources, a third of a second.
+Modules become bytecode, also where $PYTHONDONTWRITEBYTECODE is set, as in containers: else hundreds of processes of the
+tests would each compile the package from its sources, a third of a second.
 
 Ctrl-C reaches tests that send it themselves also where the shell ignores it, as with ``nohup make test &``.
 """
