@@ -18,7 +18,7 @@ from symphys.verification import examine
 from symphys.verification.examination import survey
 
 TABLES: dict[str, Any] = {
-    "simulation": {"duration": 0.6, "dt": 0.01},
+    "simulation": {"duration": 0.6, "dt": 0.02},
     "body": [
         {"name": "ball", "shape": {"sphere": {"radius": 0.1}}, "mass": 0.5, "position": [0, 0, 0.3]},
         {"name": "arm", "shape": {"capsule": {"radius": 0.02, "length": 0.3}}, "mass": 1, "position": [3, 0, 1]},
@@ -65,7 +65,7 @@ def made() -> Transcription:
 @pytest.fixture(scope="module")
 def other() -> Transcription:
     """The same where 0.7 s are the duration of the file."""
-    fixed = {**TABLES, "simulation": {"duration": 0.7, "dt": 0.7 / 60}}
+    fixed = {**TABLES, "simulation": {"duration": 0.7, "dt": 0.7 / 30}}
     fixed["variable"] = [each for each in TABLES["variable"] if each["name"] != "T"]
     return transcribe(problem_of_tables(fixed), backend="casadi")
 
