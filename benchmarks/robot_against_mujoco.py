@@ -53,7 +53,7 @@ class Candidate:
 
 
 def here(scene: JointedScene, sweeps: int, batch: int, calls: int = 1) -> Candidate:
-    """This engine; ``calls``: of how many batches, one after the other, of which ``DERIVED`` at most are differentiated."""
+    """This engine; ``calls``: batches, one after the other, of which at most ``DERIVED`` are differentiated."""
     world = scene.world()
     kernel = Rolling(world, Scheme(dt=DT, sweeps=sweeps, cuts=0), STEPS, rows=batch).kernel
     states = np.split(scene.states(world)[: batch * calls], calls)
