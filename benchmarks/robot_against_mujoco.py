@@ -160,7 +160,7 @@ def main() -> None:
         scene = standing(motor)
         ours = [here(scene, sweeps, 128) for sweeps in SWEEPS]
         theirs = [there(scene, integrator, cone) for cone in ("pyramidal", "elliptic")]
-        alone = [here(scene, SWEEPS[0], 1, calls) for calls in (128, 1)]
+        alone = [here(scene, SWEEPS[0], 1, calls) for calls in (1, 128)]
         candidates = [*ours, *alone, *theirs]
         times, errors = measure(candidates), errors_of(candidates)
         report(f"quadruped, {name}, dt = {DT}", candidates, times, errors)
