@@ -23,7 +23,8 @@ from spheres import BATCH, COUNT, STEPS, around, fastest, guess_of
 from worlds import spheres_on_ground
 
 from symphys.codegen import Program, compile_program
-from symphys.codegen.emit.plan import Plan, plan
+from symphys.codegen.emit.plan import plan
+from symphys.codegen.emit.planned import Plan
 from symphys.codegen.graph.operations import MASKS
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.codegen.toolchain.processor import processor

@@ -2,10 +2,12 @@
 
     python benchmarks/start_up.py [NAME ...]
 
-Each start is a process of its own, with a cache of kernels that is empty at first. Seconds are those of processors, of
-Python and of compilers, so that other work on the machine counts little; ``wall`` is the clock's, and ``kernel`` is the
-clock's until the kernel is there that is compiled beside a first start. ``table_robot`` is
-the robot of table_robot.py with a net; other names are those of shipped problems.
+Each start is a process of its own, with a cache of kernels that is empty at first. Modules are bytecode, as a package
+is installed: a start before the first writes it, whatever $PYTHONDONTWRITEBYTECODE says. Seconds are those of
+processors, of Python and of compilers, so that other work on the machine counts little; ``wall`` is the clock's, and
+``kernel`` is the clock's until the kernel is there that is compiled beside a first start. ``--repeats`` starts each
+problem again from its kernel, and prints the least and the median. ``table_robot`` is the robot of table_robot.py with
+a net; other names are those of shipped problems.
 """
 
 from __future__ import annotations
@@ -15,9 +17,10 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
+from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
@@ -63,14 +66,15 @@ def start(name: str) -> dict[str, Any]:
     return found
 
 
-def starts(name: str) -> list[dict[str, Any]]:
-    """A first and a second start, and the MiB of the cache after each."""
+def starts(name: str, bytecode: str, again: int = 0) -> list[dict[str, Any]]:
+    """A first start, a second and ``again`` more, and the MiB of the cache after each."""
     rows = []
+    own = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
     with TemporaryDirectory() as folder:
-        for _ in range(2):
+        for _ in range(2 + again):
             told = subprocess.run(
                 [sys.executable, __file__, CHILD, name],
-                env={**os.environ, "SYMPHYS_CACHE": folder},
+                env={**own, "SYMPHYS_CACHE": folder, "PYTHONPYCACHEPREFIX": bytecode},
                 capture_output=True,
                 text=True,
                 check=True,
@@ -80,22 +84,34 @@ def starts(name: str) -> list[dict[str, Any]]:
     return rows
 
 
+def numbers(row: Mapping[str, Any]) -> list[float]:
+    """The seconds of a row."""
+    return [*(row[phase] for phase in PHASES), sum(row[phase] for phase in PHASES), row["wall"], row["kernel"]]
+
+
+def shown(name: str, which: str, seconds: Iterable[float], row: Mapping[str, Any]) -> None:
+    """Print a row."""
+    told = " | ".join(f"{number:.2f}" for number in seconds)
+    print(f"| `{name}` | {which} | {told} | {row['memory']:.0f} | {row['cache']:.1f} |", flush=True)
+
+
 def main() -> None:
     """A row for each start."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", metavar="NAME", nargs="*", default=NAMES)
-    names = parser.parse_args().names
+    parser.add_argument("--repeats", type=int, default=0, help="more starts from a kernel that is there")
+    given = parser.parse_args()
     print("| problem | start | " + " | ".join(PHASES) + " | all | wall | kernel | memory [MiB] | cache [MiB] |")
-    for name in names:
-        for which, row in zip(("first", "second"), starts(name), strict=True):
-            numbers = [
-                *(row[phase] for phase in PHASES),
-                sum(row[phase] for phase in PHASES),
-                row["wall"],
-                row["kernel"],
-            ]
-            seconds = " | ".join(f"{number:.2f}" for number in numbers)
-            print(f"| `{name}` | {which} | {seconds} | {row['memory']:.0f} | {row['cache']:.1f} |", flush=True)
+    with TemporaryDirectory() as bytecode:
+        starts("ball_throw", bytecode)
+        for name in given.names:
+            first, second, *more = starts(name, bytecode, given.repeats)
+            shown(name, "first", numbers(first), first)
+            shown(name, "second", numbers(second), second)
+            if more:
+                columns = list(zip(*map(numbers, [second, *more]), strict=True))
+                shown(name, "least", map(min, columns), second)
+                shown(name, "median", map(median, columns), second)
 
 
 if __name__ == "__main__":

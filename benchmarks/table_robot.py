@@ -12,11 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen import compile_program
 from symphys.problem import Problem, load_problem
-from symphys.transcription import symbolic_rollout
-from symphys.transcription.network_rollout import LargeEvaluator, has_large_nets, transcribe_large
-from symphys.transcription.program import rollout_program
 
 Array = NDArray[np.float64]
 LEGS = {"fl": 1, "fr": -1, "hl": -1, "hr": 1}
@@ -111,11 +107,17 @@ Calls = tuple[Callable[[int], Array], Callable[[int], Array]]
 
 def calls(problem: Problem, backend: str = "simd") -> Calls:
     """Compiled; large nets beside the step, small ones within it. "simd32": large nets in single precision."""
+    from symphys.transcription.network_rollout import has_large_nets
+
     return beside(problem, backend) if has_large_nets(problem) else within(problem)
 
 
 def within(problem: Problem) -> Calls:
     """The net within the compiled step, every robot with weights of its own."""
+    from symphys.codegen import compile_program
+    from symphys.transcription import symbolic_rollout
+    from symphys.transcription.program import rollout_program
+
     kernel = compile_program(rollout_program(symbolic_rollout(problem), exact=True), seeded=["merit"])
     weights = problem.variables[0].guess
 
@@ -134,6 +136,8 @@ def within(problem: Problem) -> Calls:
 
 def beside(problem: Problem, backend: str) -> Calls:
     """The net beside the compiled step, its weights shared."""
+    from symphys.transcription.network_rollout import LargeEvaluator, transcribe_large
+
     made = transcribe_large(problem, exact=True, backend=backend)
     weights, evaluator = [problem.variables[0].guess], made.shooting.evaluator
     assert isinstance(evaluator, LargeEvaluator)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +17,9 @@ from symphys.problem.loading import Source, load
 from symphys.shooting import Evaluator, Linearized, Values
 from symphys.trajectory import Trajectory
 from symphys.transcription import Transcription
-from symphys.transcription.recorded_rollout import RecordedRollout
+
+if TYPE_CHECKING:
+    from symphys.transcription.recorded_rollout import RecordedRollout
 
 Array = NDArray[np.float64]
 

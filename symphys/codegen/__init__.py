@@ -1,17 +1,22 @@
 """Rollouts as programs of calls, compiled to C that computes a block of lanes at once, with their gradients."""
 
-from symphys.codegen.emit.source import SourceFile
-from symphys.codegen.errors import KernelUnavailable, ProgramError
-from symphys.codegen.program.interpret import interpret
-from symphys.codegen.program.layout import MemoryLayout
-from symphys.codegen.program.nan_location import Bad
-from symphys.codegen.program.program import AdjointDiscount, FunctionCall, Place, Program
-from symphys.codegen.runtime.fixed_addresses import Fixed, FixedBatch
-from symphys.codegen.runtime.kernel import Kernel, ProcessorKernel
-from symphys.codegen.toolchain.build import compile_program, shared_library
-from symphys.codegen.toolchain.cache import Cache, CacheInfo, default_cache
-from symphys.codegen.toolchain.compiler import processors
-from symphys.codegen.toolchain.report import BuildReport
+from typing import TYPE_CHECKING
+
+from symphys.later import later
+
+if TYPE_CHECKING:
+    from symphys.codegen.emit.source import SourceFile
+    from symphys.codegen.errors import KernelUnavailable, ProgramError
+    from symphys.codegen.program.interpret import interpret
+    from symphys.codegen.program.layout import MemoryLayout
+    from symphys.codegen.program.nan_location import Bad
+    from symphys.codegen.program.program import AdjointDiscount, FunctionCall, Place, Program
+    from symphys.codegen.runtime.fixed_addresses import Fixed, FixedBatch
+    from symphys.codegen.runtime.kernel import Kernel, ProcessorKernel
+    from symphys.codegen.toolchain.build import compile_program, shared_library
+    from symphys.codegen.toolchain.cache import Cache, CacheInfo, default_cache
+    from symphys.codegen.toolchain.compiler import processors
+    from symphys.codegen.toolchain.report import BuildReport
 
 __all__ = [
     "AdjointDiscount",
@@ -36,3 +41,21 @@ __all__ = [
     "processors",
     "shared_library",
 ]
+
+__getattr__ = later(
+    __name__,
+    {
+        "emit.source": ("SourceFile",),
+        "errors": ("KernelUnavailable", "ProgramError"),
+        "program.interpret": ("interpret",),
+        "program.layout": ("MemoryLayout",),
+        "program.nan_location": ("Bad",),
+        "program.program": ("AdjointDiscount", "FunctionCall", "Place", "Program"),
+        "runtime.fixed_addresses": ("Fixed", "FixedBatch"),
+        "runtime.kernel": ("Kernel", "ProcessorKernel"),
+        "toolchain.build": ("compile_program", "shared_library"),
+        "toolchain.cache": ("Cache", "CacheInfo", "default_cache"),
+        "toolchain.compiler": ("processors",),
+        "toolchain.report": ("BuildReport",),
+    },
+)

@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 
 import casadi as ca
 
-from symphys.dynamics.articulated.forward_dynamics import accelerations, world_inertia
 from symphys.dynamics.collision import Contact, collide
 from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.dynamics.context import State, StepContext
@@ -63,6 +62,8 @@ def free_motions(context: StepContext, x: State, duration: Expr) -> list[Predict
 
 def predicted_motions(context: StepContext, x: State, duration: Expr) -> list[PredictedMotion]:
     """Each body's motion from its true velocity under the persistent forces of the last step, as joints let it."""
+    from symphys.dynamics.articulated.forward_dynamics import accelerations, world_inertia
+
     found, joints = _motions(context, x, duration, 0, 1), context.world.joints
     gravity = context.settings.gravity
     for tree in kinematic_trees(joints):

@@ -1,5 +1,8 @@
 """Problem files: reading, validation, and the model that everything after works with."""
 
+from typing import TYPE_CHECKING
+
+from symphys.later import later
 from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
 from symphys.problem.guess.motion import GuessedMotion
 from symphys.problem.load import require_solvable
@@ -30,8 +33,10 @@ from symphys.problem.reading.solver_options import require_solvers, validate_opt
 from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
 from symphys.problem.recordings import IdentifySettings, Measured, RecordedFile, RecordedInput, Recording
 from symphys.problem.robot_alone import is_robot, robot_alone
-from symphys.problem.schema.json_schema import json_schema
-from symphys.problem.schema.reference import reference_page
+
+if TYPE_CHECKING:
+    from symphys.problem.schema.json_schema import json_schema
+    from symphys.problem.schema.reference import reference_page
 
 __all__ = [
     "ALIVE",
@@ -77,3 +82,11 @@ __all__ = [
     "set_quantities",
     "validate_options",
 ]
+
+__getattr__ = later(
+    __name__,
+    {
+        "schema.json_schema": ("json_schema",),
+        "schema.reference": ("reference_page",),
+    },
+)

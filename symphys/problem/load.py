@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 from pydantic import ValidationError
@@ -43,7 +43,6 @@ from symphys.problem.recordings.kept import recorded_appendix
 from symphys.problem.recordings.reading import read_identification, with_duration
 from symphys.problem.references import read_references, reference_values
 from symphys.problem.schema import Document
-from symphys.problem.sweeps.sweep import Sweep
 from symphys.problem.tables.attached import check_couplings, read_couplings, read_sites
 from symphys.problem.tables.bodies import read_body, read_state
 from symphys.problem.tables.contact import (
@@ -70,6 +69,9 @@ from symphys.problem.tables.statics import read_statics
 from symphys.problem.tables.termination import read_termination, with_termination_cost
 from symphys.problem.tables.variables import read_variables
 from symphys.problem.units import formula_units
+
+if TYPE_CHECKING:
+    from symphys.problem.sweeps.sweep import Sweep
 
 MEMBERS = ("body", "plane", "block", "terrain")
 SHARED_NAMES = (

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from itertools import chain
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from symphys.problem.receding_horizon import RecedingHorizon
 from symphys.problem.recordings.kept import without_places
 from symphys.problem.recordings.types import IdentifySettings, RecordedFile, Recording
 from symphys.problem.references import ReferenceTrajectory
-from symphys.problem.sweeps.sweep import Sweep
+
+if TYPE_CHECKING:
+    from symphys.problem.sweeps.sweep import Sweep
 
 Array = NDArray[np.float64]
 NOTHING: Mapping[str, Any] = MappingProxyType({})

@@ -1,14 +1,19 @@
 """From a problem to a shooting problem: the rollout, its costs and their derivatives as casadi functions."""
 
+from typing import TYPE_CHECKING
+
+from symphys.later import later
 from symphys.transcription.gradient_probe import Probe
 from symphys.transcription.judge import Assessment, Criterion
-from symphys.transcription.nan_tracing.steps import first_non_finite, first_non_finite_derivative
 from symphys.transcription.objective import Terms, terms
 from symphys.transcription.program import rollout_program
 from symphys.transcription.rollout import Rollout, symbolic_rollout
-from symphys.transcription.simulation import Record, plain
 from symphys.transcription.transcribe import guessed, transcribe
 from symphys.transcription.transcription import Transcription
+
+if TYPE_CHECKING:
+    from symphys.transcription.nan_tracing.steps import first_non_finite, first_non_finite_derivative
+    from symphys.transcription.simulation import Record, plain
 
 __all__ = [
     "Assessment",
@@ -27,3 +32,11 @@ __all__ = [
     "terms",
     "transcribe",
 ]
+
+__getattr__ = later(
+    __name__,
+    {
+        "nan_tracing.steps": ("first_non_finite", "first_non_finite_derivative"),
+        "simulation": ("Record", "plain"),
+    },
+)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
@@ -13,9 +13,6 @@ import numpy as np
 from symphys.codegen import AdjointDiscount, FunctionCall, MemoryLayout, Place, Program
 from symphys.codegen.program.collection import uncollected
 from symphys.codegen.toolchain.identity import identity_of
-from symphys.dynamics.functions import trace_step
-from symphys.dynamics.tracing.guards import Guard, Part
-from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout as Columns
 from symphys.model.state_layout import input_columns
@@ -28,6 +25,10 @@ from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.objective import Terms, plain_sums, terms
 from symphys.transcription.rollout import Rollout
+
+if TYPE_CHECKING:
+    from symphys.dynamics.tracing.guards import Guard, Part
+    from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 
 Expr = Any
 """casadi MX"""
@@ -191,6 +192,8 @@ def program_identity(problem: Problem, exact: bool) -> str | None:
 
 def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     """The calls of one time step, from ``x`` and ``u`` to the ``x`` after."""
+    from symphys.dynamics.functions import trace_step
+
     rollout = samples.rollout
     columns = Columns(rollout.world)
     recording = rollout.built(trace_step, exact)

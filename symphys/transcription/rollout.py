@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics.functions import InlineSteps, report_function, step_function
-from symphys.dynamics.horizon import roll_out
 from symphys.dynamics.kept import kept, structure
 from symphys.expression import Formula
 from symphys.model.world import Scheme, World
@@ -29,6 +27,9 @@ from symphys.transcription.formula_names import (
 from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.objective import plain_sums
 from symphys.transcription.termination import termination_function
+
+if TYPE_CHECKING:  # the physics of a step is imported where it is called: a start from a kept kernel needs none
+    from symphys.dynamics.functions import InlineSteps
 
 T = TypeVar("T")
 Expr = Any
@@ -77,6 +78,8 @@ class Rollout:
     @cached_property
     def step(self) -> ca.Function:
         """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
+        from symphys.dynamics.functions import step_function
+
         if self._shares:
             return self.remembering(self.built(step_function))
         steps, scheme = self._inline
@@ -85,6 +88,8 @@ class Rollout:
     @cached_property
     def report(self) -> ca.Function:
         """The step with all that happens in it; see ``report_function``."""
+        from symphys.dynamics.functions import report_function
+
         if self._shares:
             return self.remembering(self.built(report_function))
         steps, scheme = self._inline
@@ -98,6 +103,8 @@ class Rollout:
 
     @cached_property
     def _steps(self) -> InlineSteps:
+        from symphys.dynamics.functions import InlineSteps
+
         return InlineSteps(self.world, self.inputs, self.parameters.symbols)
 
     @property
@@ -161,6 +168,8 @@ class Rollout:
 
     def rolled(self, step: ca.Function) -> tuple[Expr, Expr, list[Expr]]:
         """States (nx, N + 1), inputs (nu, N) and what else a step gives, N columns each; ``step`` is not closed."""
+        from symphys.dynamics.horizon import roll_out
+
         given = self.given
         if self.feedback is not None:
             given = ca.vertcat(given, ca.DM(np.arange(self.steps)).T * self.interval)

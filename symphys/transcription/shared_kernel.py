@@ -21,7 +21,6 @@ from symphys.transcription.formula_names import swept_parameters
 from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.objective import Terms, terms
 from symphys.transcription.program import rollout_program
-from symphys.transcription.randomization.numbers import hidden
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 
 Array = NDArray[np.float64]
@@ -33,6 +32,10 @@ def inputs_of(problem: Problem) -> tuple[Variable, ...]:
     """A variable for each parameter in which the problems of its sweep differ, and that no variable of its own sets."""
     own = {slot.name for variable in problem.variables for slot in variable.slots}
     values = {name: problem.parameters[name] for name in swept_parameters(problem) if name not in own}
+    if not values:
+        return ()
+    from symphys.transcription.randomization.numbers import hidden
+
     return tuple(
         hidden(f"{name} of the sweep", "parameter", VariableSlot(name, tuple(range(value.size))), value)
         for name, value in values.items()

@@ -12,19 +12,11 @@ from symphys.problem import GuessedMotion, Problem
 from symphys.shooting import GuessedStates, ShootingProblem, StagedProblem
 from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
-from symphys.transcription.network_rollout import (
-    has_large_nets,
-    require_fixed_duration,
-    require_small_nets,
-    transcribe_large,
-)
+from symphys.transcription.network_rollout import has_large_nets, require_fixed_duration, require_small_nets
 from symphys.transcription.objective import bounds, has_squares, limits
 from symphys.transcription.program import program_identity, rollout_program
-from symphys.transcription.randomization import with_scenarios
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.shared_kernel import inputs_of, shared_backend
-from symphys.transcription.staged.guessed_states import guessed_states
-from symphys.transcription.staged.staged_problem import RolloutStages
 from symphys.transcription.transcription import Transcription
 
 
@@ -53,10 +45,14 @@ def transcribe(
     if problem.varied and (problem.scenarios is not None or has_large_nets(problem)):
         problem = replace(problem, varied=frozenset())  # their kernels are made in other ways
     if problem.scenarios is not None:
+        from symphys.transcription.randomization import with_scenarios
+
         require_small_nets(problem, "a problem with scenarios")
         plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads, like)
         return with_scenarios(plain, problem, exact, backend, threads)
     if has_large_nets(problem):
+        from symphys.transcription.network_rollout import transcribe_large
+
         require_fixed_duration(problem)
         return transcribe_large(problem, exact, backend, threads)
     began = perf_counter()
@@ -65,7 +61,7 @@ def transcribe(
     names, lower, upper = bounds(problem, lambda formula: int(rollout.compiled(formula).size1_out(0)))
     built = perf_counter() - began
     chosen = _evaluating(rollout, functions, exact, backend, threads)
-    staged = cache(lambda: RolloutStages(rollout, backend, threads, exact or not any(problem.simulation.smoothing)))
+    staged = cache(lambda: _stages(rollout, backend, threads, exact or not any(problem.simulation.smoothing)))
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),
@@ -85,6 +81,13 @@ def transcribe(
     return Transcription(problem, rollout, functions, shooting, chosen.description, built)
 
 
+def _stages(rollout: Rollout, backend: str, threads: int | None, exact: bool) -> StagedProblem:
+    """The problem step by step, for solvers that ask for it."""
+    from symphys.transcription.staged.staged_problem import RolloutStages
+
+    return RolloutStages(rollout, backend, threads, exact)
+
+
 def _evaluating(
     rollout: Rollout, functions: ExpressionFunctions, exact: bool, backend: str, threads: int | None
 ) -> Backend:
@@ -101,6 +104,8 @@ def states_of(staged: Callable[[], StagedProblem] | None, guess: GuessedMotion |
     """The states of a guessed motion, where there is one and the problem can be taken step by step."""
     if staged is None or guess is None:
         return None
+    from symphys.transcription.staged.guessed_states import guessed_states
+
     return lambda z, ticks, smoothing: guessed_states(staged(), guess, z, ticks, smoothing)  # type: ignore[arg-type]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -20,7 +21,9 @@ from symphys.transcription.gradient_probe import ExpressionProbe, Probe
 from symphys.transcription.judge import Assessment, assessment
 from symphys.transcription.objective import Terms
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.simulation import Record, motion_of, recorder, simulate
+
+if TYPE_CHECKING:
+    from symphys.transcription.simulation import Record
 
 Array = NDArray[np.float64]
 Judge = Callable[..., Assessment]
@@ -60,10 +63,14 @@ class Transcription:
 
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
         """The motion and the states and arguments that it is made from; NotFinite if there is none."""
+        from symphys.transcription.simulation import simulate
+
         return simulate(self.rollout, self._recorder, z, smoothing)
 
     def motion(self, z: Array, x: Array, u: Array) -> Trajectory:
         """The motion of states (N + 1, nx) with inputs (N, m), as variables give them, and the parameters of z (n,)."""
+        from symphys.transcription.simulation import motion_of
+
         p = np.array(self._start(z)[2]).ravel()
         dt = self.rollout.parameters.step_length(self.problem.simulation, p)
         return motion_of(self.rollout, np.arange(len(x), dtype=np.float64) * float(dt), x, u, p)
@@ -169,6 +176,8 @@ class Transcription:
 
     @cached_property
     def _recorder(self) -> ca.Function:
+        from symphys.transcription.simulation import recorder
+
         return recorder(self.rollout)
 
 

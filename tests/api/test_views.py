@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -33,6 +34,23 @@ def test_a_start_loads_no_scipy() -> None:
     code = "import sys, symphys; symphys.compile(symphys.load('ball_throw')); print('scipy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_a_second_start_loads_nothing_that_makes_kernels(tmp_path: Path) -> None:
+    """It has neither the step of the dynamics nor what writes C; the first start has both."""
+    makers = ("codegen.emit.plan", "codegen.slopes", "codegen.cuda", "dynamics.step", "transcription.staged.tangent")
+    code = (
+        "import sys, symphys; made = symphys.compile('ball_throw'); made.gradient(made.z()); made.finish(); "
+        f"print(*(name for name in {makers} if 'symphys.' + name in sys.modules))"
+    )
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", code], env={**os.environ, "SYMPHYS_CACHE": str(tmp_path)},
+            capture_output=True, text=True, check=True,
+        ).stdout.split()
+        for _ in range(2)
+    ]  # fmt: skip
+    assert told == [["codegen.emit.plan", "dynamics.step"], []]
 
 
 EXAMPLES = (

@@ -140,7 +140,7 @@ def test_a_gpu_needs_no_compiler_where_it_is_asked_for(
         if not gpu:
             raise KernelUnavailable("no GPU that CUDA can use")
 
-    monkeypatch.setattr("symphys.codegen.backends.kernels.find_gpu", find)
+    monkeypatch.setattr("symphys.codegen.cuda.find_gpu", find)
     with without_compiler(tmp_path):
         result = run(job_of(varied, tmp_path, backend), unbuilt)
     assert lacks(result) == refused

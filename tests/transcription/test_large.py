@@ -323,7 +323,7 @@ def test_nets_on_a_device(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Steps by a device's kernel, products by its library, on arrays that stay there: the same numbers and trust."""
-    monkeypatch.setattr("symphys.codegen.backends.kernels.find_gpu", lambda: Remote(tmp_path))
+    monkeypatch.setattr("symphys.codegen.cuda.find_gpu", lambda: Remote(tmp_path))
     beside = both[1]
     there = transcribe(beside.problem, backend="cuda")
     assert (there.backend.name, there.backend.note) == ("cuda", "nets by matrix products")

@@ -100,7 +100,7 @@ def test_steps_are_built_once(monkeypatch: pytest.MonkeyPatch) -> None:
         built.append(world)
         return report_function(world, *more)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("symphys.transcription.rollout.report_function", counted)
+    monkeypatch.setattr("symphys.dynamics.functions.report_function", counted)
     found = points("ball.mass=0.5:0.7:3", "simulation.dt=0.02,0.05", tables={})
     motions = [transcribe(point, backend="casadi").simulate(np.zeros(6)) for point in found]
     assert len(built) == 2  # one for each time step

@@ -7,11 +7,18 @@ from dataclasses import replace
 from functools import partial
 
 from symphys.codegen import KernelUnavailable, ProgramError, processors
-from symphys.codegen.backends.c_ import c
 from symphys.codegen.backends.casadi_ import casadi
 from symphys.codegen.backends.interface import Backend, BackendSource
 from symphys.codegen.backends.kernels import PRECISIONS
 from symphys.codegen.backends.simd import by_kernel
+
+
+def c(source: BackendSource, threads: int) -> Backend:
+    """See ``c_``, which is imported when it is asked for."""
+    from symphys.codegen.backends import c_
+
+    return c_.c(source, threads)
+
 
 BACKENDS: dict[str, Callable[[BackendSource, int], Backend]] = {
     **{name: partial(by_kernel, name=name) for name in PRECISIONS},

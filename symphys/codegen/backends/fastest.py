@@ -6,11 +6,14 @@ from collections.abc import Callable
 from functools import partial
 from math import inf
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 from symphys.codegen import KernelUnavailable, ProcessorKernel
 from symphys.codegen.backends.interface import joined
-from symphys.codegen.cuda import DeviceKernel
 from symphys.codegen.runtime.batch import RolloutBatch
+
+if TYPE_CHECKING:
+    from symphys.codegen.cuda import DeviceKernel
 
 LARGE = 512
 """Rows below which no GPU is asked. A rollout there waits for its longest chain of calls, however few robots there are;

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from symphys.codegen import Kernel, KernelUnavailable, ProcessorKernel, Program, compile_program
 from symphys.codegen.backends.fastest import FastestKernel
 from symphys.codegen.backends.interface import Description, joined, nothing
-from symphys.codegen.cuda import DeviceKernel, compile_on, find_gpu
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
+
+if TYPE_CHECKING:
+    from symphys.codegen.cuda import DeviceKernel
 
 BEST = "auto"
 PRECISIONS: dict[str, Literal["double", "single"]] = {
@@ -53,6 +55,8 @@ def build_kernel(
 def _on_device(
     program: Program | ProgramSource, precision: Literal["double", "single"], seeded: Sequence[str]
 ) -> DeviceKernel:
+    from symphys.codegen.cuda import compile_on, find_gpu
+
     gpu = find_gpu()
     if isinstance(program, ProgramSource):
         program = program.make()
@@ -67,6 +71,8 @@ def require_kernels(name: str) -> None:
     """
     refused = ""
     if name in ON_DEVICE:
+        from symphys.codegen.cuda import find_gpu
+
         try:
             find_gpu()
         except KernelUnavailable as error:
@@ -82,7 +88,7 @@ def require_kernels(name: str) -> None:
 def described(kernel: Kernel, seconds: float, precision: str | None = None, note: str = "") -> Description:
     """A kernel for results; ``precision``: where it is not the kernel's alone."""
     report, wanted = kernel.report, precision or kernel.report.precision
-    kind = "cuda" if isinstance(kernel, DeviceKernel) else "simd"
+    kind = "simd" if isinstance(kernel, ProcessorKernel) else "cuda"
     return Description(
         name=kind if wanted == "double" else f"{kind}32",
         lanes=report.lanes,

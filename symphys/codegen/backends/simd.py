@@ -11,7 +11,6 @@ import numpy as np
 
 from symphys.codegen import Kernel, KernelUnavailable, ProcessorKernel
 from symphys.codegen.backends.casadi_ import squared
-from symphys.codegen.backends.external import external_nlp
 from symphys.codegen.backends.interface import Backend, BackendSource, Function, joined
 from symphys.codegen.backends.kernels import build_kernel, described
 from symphys.codegen.backends.seeds import Seeds
@@ -102,6 +101,8 @@ def by_kernel(source: BackendSource, threads: int, name: str) -> Backend:
 
 def _nlp(kernel: ProcessorKernel, expression: Function, rows: Callable[[], Seeds] | None, told: list[str]) -> Nlp:
     """Objective and constraints by the kernel, or by the expression, and why is added to ``told``."""
+    from symphys.codegen.backends.external import external_nlp
+
     try:
         return external_nlp(kernel, expression, rows and rows())
     except KernelUnavailable as error:

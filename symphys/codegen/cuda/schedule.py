@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from symphys.codegen.emit.alternatives import ALWAYS, Alternatives, Span, entries_of, of_adjoint, of_call, word_of
 from symphys.codegen.emit.guarding import TABLES as GUARDED
-from symphys.codegen.emit.plan import Plan
+from symphys.codegen.emit.planned import Plan
 from symphys.codegen.program.program import FunctionCall, Program
 from symphys.codegen.runtime.library import TABLES
 

@@ -9,7 +9,7 @@ from importlib.resources import files
 
 from symphys.codegen.emit import source
 from symphys.codegen.emit.dialect import DEVICE
-from symphys.codegen.emit.plan import Plan
+from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.writer import write
 
 ROOM = "symphys.codegen.cuda"

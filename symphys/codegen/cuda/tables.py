@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from symphys.codegen.cuda.device import Device
 from symphys.codegen.cuda.schedule import Schedule
 from symphys.codegen.emit.alternatives import LEFT_OUT
-from symphys.codegen.emit.plan import Plan
+from symphys.codegen.emit.planned import Plan
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.library import WORD, List, RowSource, data_places, program_fields, strided
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.emit.guarding import TABLES
-from symphys.codegen.emit.plan import Plan
+from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.shapes import ALL, BESIDE, EACH, TURNS, Access, Shape
 from symphys.codegen.program.program import Program
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from symphys.codegen.emit.pieces import Cut, Form, pieces_of
-from symphys.codegen.emit.plan import Plan
+from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.source import DRIVER, SourceFile, head_of, resource
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.graph.graph import Graph

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 from symphys.codegen.emit.dialect import ONE_LANE, TEAM, VECTORS, Dialect
-from symphys.codegen.emit.plan import Plan
+from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.writer import write
 
 ROOM = "symphys.codegen"

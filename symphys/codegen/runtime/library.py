@@ -5,15 +5,17 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symphys.codegen.emit.codes import Codes
 from symphys.codegen.emit.guarding import WIDTHS, Guarding
-from symphys.codegen.emit.plan import Plan
+from symphys.codegen.emit.planned import Plan
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Place, Program
+
+if TYPE_CHECKING:
+    from symphys.codegen.emit.codes import Codes
 
 TABLES = ("prologue", "body", "epilogue", "again", "back_body", "back_prologue", "back_epilogue")
 INPUTS, RESULTS = ("z", "parameters", "seed"), ("outputs", "gradient", "trajectory")

@@ -13,15 +13,17 @@ from functools import partial
 from math import inf
 from pathlib import Path
 from time import perf_counter
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from symphys.codegen.emit.source import SourceFile
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.runtime.library import BatchData, Loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.toolchain.background import Background
 from symphys.codegen.toolchain.cache import Cache
+
+if TYPE_CHECKING:
+    from symphys.codegen.emit.source import SourceFile
 
 NARROW = (1, 2)
 """Lanes of the libraries for calls of so many rows."""

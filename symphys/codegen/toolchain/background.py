@@ -14,10 +14,13 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from symphys.codegen.emit.source import SourceFile
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.cache import Cache
+
+if TYPE_CHECKING:
+    from symphys.codegen.emit.source import SourceFile
 
 PROCESS = "import sys; from symphys.codegen.toolchain.build import compile_for; compile_for(sys.stdin.buffer)"
 Built = Callable[[Path], None]

@@ -11,14 +11,10 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import IO, Literal
+from typing import IO, TYPE_CHECKING, Literal
 
 import numpy as np
 
-from symphys.codegen.emit.alone import alone
-from symphys.codegen.emit.codes import codes_of, interpreter
-from symphys.codegen.emit.plan import Plan, plan
-from symphys.codegen.emit.source import SourceFile, forms_of, sources
 from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.program.collection import uncollected
 from symphys.codegen.program.program import Program
@@ -32,6 +28,10 @@ from symphys.codegen.toolchain.processes import ELSEWHERE
 from symphys.codegen.toolchain.processor import processor
 from symphys.codegen.toolchain.report import BuildReport
 from symphys.codegen.toolchain.temporary import TemporaryFolder
+
+if TYPE_CHECKING:  # what writes C is imported where it is called: a second start writes none
+    from symphys.codegen.emit.planned import Plan
+    from symphys.codegen.emit.source import SourceFile
 
 WORTH = 20_000
 """Operations of a kernel that takes long to compile, some seconds."""
@@ -101,6 +101,10 @@ def compiled(
     ``wait``: for the compiler; else a kernel of ``WORTH`` begins with an interpreter, and changes over once it is
     compiled. With $SYMPHYS_WAIT all wait.
     """
+    from symphys.codegen.emit.alone import alone
+    from symphys.codegen.emit.plan import plan
+    from symphys.codegen.emit.source import sources
+
     started = time.perf_counter()
     with uncollected():
         planned = plan(program, names, width.lanes * width.real)
@@ -174,6 +178,10 @@ class KeptLibraries:
 
     def build(self, lanes: int) -> Loaded:
         """See ``widths.Libraries``."""
+        from symphys.codegen.emit.alone import alone
+        from symphys.codegen.emit.plan import plan
+        from symphys.codegen.emit.source import sources
+
         kept, width = self.kept, self.width
         with uncollected():
             planned = plan(kept.program, kept.names, width.lanes * width.real)
@@ -188,6 +196,8 @@ class KeptLibraries:
 
     def interpreter(self, planned: Plan) -> Loaded:
         """What runs the functions of a plan without compiling them; KernelUnavailable without a cache to keep it in."""
+        from symphys.codegen.emit.codes import codes_of, interpreter
+
         lanes, single = self.width.lanes, self.width.single
         codes = LinkedCodes(codes_of(planned), lanes, np.float32 if single else np.float64)
         with shared_library([interpreter(lanes, single)], self.cache) as built:
@@ -206,6 +216,8 @@ class KeptLibraries:
         """Stands for the C files. Others differ by the lanes, the dialect and what stands side by side."""
         if lanes == self.width.lanes:
             return self.kept.texts
+        from symphys.codegen.emit.source import forms_of
+
         return f"{self.kept.texts} {lanes} {forms_of(lanes)} {self._plan(lanes).signature}"
 
 
@@ -258,6 +270,8 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None 
 
 def compile_for(given: IO[bytes]) -> None:
     """Keep the library of a ``Background``, and print where it is, or why there is none."""
+    from symphys.codegen.emit.source import SourceFile
+
     asked = json.load(given)
     parts, texts = [SourceFile(**part) for part in asked["parts"]], asked["texts"]
     cache = Cache(Path(asked["cache"]["folder"]), asked["cache"]["limit"])

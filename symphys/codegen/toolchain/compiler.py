@@ -11,11 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from symphys.codegen.emit.source import SourceFile
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.processes import ADVICE, ELSEWHERE, run, run_all
 from symphys.codegen.toolchain.processor import Processor
+
+if TYPE_CHECKING:
+    from symphys.codegen.emit.source import SourceFile
 
 FLAGS = (
     *("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-w"),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from symphys.codegen.emit.guarding import Guarding
-from symphys.codegen.emit.plan import Plan
+from symphys.codegen.emit.planned import Plan
 from symphys.codegen.program.program import AdjointDiscount, FunctionCall, Place, Program
 
 

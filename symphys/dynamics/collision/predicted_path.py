@@ -111,6 +111,16 @@ class PredictedPath:
         return self.centre() + self.arm(offset)
 
 
+class StillPath(PredictedPath):
+    """The path of a body that is looked at in one instant: its velocities are zero."""
+
+    def arm(self, offset: Sequence[Any]) -> Parabola:
+        """See ``PredictedPath``; the same without products with zero."""
+        if all(is_zero(c) for c in offset):
+            return STAYS
+        return Parabola(ca.mtimes(self.rotation, ca.vertcat(*offset)), STAYS.velocity, STAYS.acceleration)
+
+
 def at_rest(dt: Expr) -> PredictedPath:
     """The path of what is static: its frame is the world's."""
     zero = ca.SX.zeros(3)

@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, at_rest
+from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, StillPath, at_rest
 from symphys.dynamics.contact.body_term import BodyTerm, Motions, point_jacobian
 from symphys.dynamics.joints.joint_impulse import Directions
 from symphys.dynamics.tracing.decorator import traced
@@ -87,7 +87,7 @@ def joint_frames_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> Joint
     """The frames of a joint whose bodies are at these positions and orientations."""
     zero = ca.SX.zeros(3)
     return joint_frames_on(
-        joint, [PredictedPath(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses]
+        joint, [StillPath(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses]
     )
 
 

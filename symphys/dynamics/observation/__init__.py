@@ -11,6 +11,7 @@ from symphys.dynamics.observation.half_step import half_step_function
 from symphys.dynamics.observation.joint_coordinates import (
     joint_quantities,
     joint_quantity_names,
+    named_readings,
     reading_function,
     readings,
 )
@@ -27,6 +28,7 @@ __all__ = [
     "joint_quantities",
     "joint_quantity_names",
     "joint_turn",
+    "named_readings",
     "reading_function",
     "readings",
     "site_quantities",

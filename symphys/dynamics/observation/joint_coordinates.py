@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from symphys.dynamics.joints.joint_frames import JointFrames, errors, free, joint_frames_at
-from symphys.model.joints import Coordinate, Joint
+from symphys.model.joints import Coordinate, Joint, PlacedFrames
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
 
@@ -54,8 +54,13 @@ def reading_function(world: World, parameters: Sequence[Any] = ()) -> ca.Functio
 
 def joint_quantities(world: World, x: Expr) -> dict[str, Expr]:
     """What formulas call them: ``knee.angle`` or ``rail.position``, ``.rate``, and ``.torque`` if there is a motor."""
+    return named_readings(world, readings(world, x))
+
+
+def named_readings(world: World, found: Mapping[str, Reading]) -> dict[str, Expr]:
+    """See ``joint_quantities``, of joints that have been read; ``found``: all of them."""
     named: dict[str, Expr] = {}
-    for joint, reading in zip(world.joints, readings(world, x).values(), strict=True):
+    for joint, reading in zip(world.joints, found.values(), strict=True):
         parts = (reading.value, reading.rate, reading.torque)
         named.update(zip(_names(joint), parts, strict=False))
     return named
@@ -80,21 +85,22 @@ def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
     motions = [(x[layout[f"{name}.velocity"]], x[layout[f"{name}.angular_velocity"]]) for name in names]
     frames = joint_frames_at(joint, poses)
     placed, held = frames.placed(ca.SX(0)), 3 if joint.kind.slides is None else len(joint.kind.slides)
-    rates = [_rate(frames, coordinate, motions) for coordinate in coordinates]
+    off = errors(joint, placed)
+    rates = [_rate(frames, placed, coordinate, motions) for coordinate in coordinates]
     torque = x[layout[f"{joint.name}.motor"]] if joint.driven else ca.SX.zeros(len(coordinates))
     return Reading(
         value=ca.vertcat(ca.SX(0, 1), *(joint.value(k, placed) for k in range(len(coordinates)))),
         rate=ca.vertcat(ca.SX(0, 1), *rates),
         torque=torque,
-        separation=ca.norm_2(errors(joint, placed)[:held]),
-        tilt=ca.norm_2(errors(joint, placed)[held:]),
+        separation=ca.norm_2(off[:held]),
+        tilt=ca.norm_2(off[held:]),
     )
 
 
-def _rate(frames: JointFrames, coordinate: Coordinate, motions: list[Motion]) -> Expr:
+def _rate(frames: JointFrames, placed: PlacedFrames, coordinate: Coordinate, motions: list[Motion]) -> Expr:
     """How fast the first body moves against the second along a coordinate."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for sign, arm, (velocity, spin) in zip((1, -1), frames.lever_arms(ca.SX(0)), motions, strict=False):
         linear += sign * (velocity + ca.cross(spin, arm))
         angular += sign * spin
-    return free(coordinate, frames.placed(ca.SX(0))).forwards(linear, angular)
+    return free(coordinate, placed).forwards(linear, angular)

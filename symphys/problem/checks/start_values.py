@@ -20,10 +20,11 @@ from symphys.dynamics.observation import (
     accelerometers,
     body_quantities,
     gap_function,
-    joint_quantities,
+    named_readings,
     readings,
     site_quantities,
 )
+from symphys.dynamics.observation.joint_coordinates import Reading
 from symphys.model.state_layout import GIVEN, Layout, initial_state
 from symphys.model.world import World
 from symphys.problem.parametric.parts import DISTRIBUTION
@@ -53,14 +54,18 @@ class StartFunctions:
         """Names of formulas, and their values: of joints, and what is felt on bodies that are not accelerated."""
         layout = Layout(self.world)
         still = {body.name: self.x[layout[f"{body.name}.velocity"]] for body in self.world.bodies}
-        found = joint_quantities(self.world, self.x) | body_quantities(self.world, self.x)
+        found = named_readings(self.world, self._readings) | body_quantities(self.world, self.x)
         found |= accelerometers(self.world, self.x, still, 1.0) | site_quantities(self.world, self.x)
         return list(found), self._function("quantities", list(found.values()))
 
     @cached_property
+    def _readings(self) -> dict[str, Reading]:
+        return readings(self.world, self.x)
+
+    @cached_property
     def joints(self) -> ca.Function:
         """Of each joint its separation, tilt and coordinates."""
-        found = readings(self.world, self.x).values()
+        found = self._readings.values()
         return self._function("joints", [part for each in found for part in (each.separation, each.tilt, each.value)])
 
     def _function(self, name: str, values: list[Any]) -> ca.Function:

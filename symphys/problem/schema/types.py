@@ -12,7 +12,7 @@ from symphys.problem.schema import checks
 class SchemaTable(BaseModel):
     """A table of the file: unknown keys are errors, values are taken as they are written."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
 
 
 def deprecated(name: str) -> Any:

@@ -16,7 +16,6 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.dynamics.step import splits_of
 from symphys.problem import Problem
 from symphys.problem.parametric.by_phase import lagged
 
@@ -85,6 +84,8 @@ def phase_numbers(problem: Problem) -> PhaseNumbers:
     setting = [phase for phase in problem.phases if phase.sets]
     if not setting:
         return PhaseNumbers()
+    from symphys.dynamics.step import splits_of  # late: the physics of a step, which few problems need here
+
     simulation, shares = problem.simulation, dict[tuple[str, bool], PhaseShare]()
     before = 0.5 / (1 + splits_of(problem.world(), simulation.scheme()))
     sets: dict[str, list[tuple[str, PhaseShare]]] = {}

@@ -1,8 +1,17 @@
 """Rollouts with large nets: matrix products over the batch between compiled steps, weights shared by all robots."""
 
-from symphys.transcription.network_rollout.evaluator import LargeEvaluator, Shared
-from symphys.transcription.network_rollout.partition import has_large_nets, require_fixed_duration, require_small_nets
-from symphys.transcription.network_rollout.transcription import LargeTranscription, transcribe_large
+from typing import TYPE_CHECKING
+
+from symphys.later import later
+
+if TYPE_CHECKING:
+    from symphys.transcription.network_rollout.evaluator import LargeEvaluator, Shared
+    from symphys.transcription.network_rollout.partition import (
+        has_large_nets,
+        require_fixed_duration,
+        require_small_nets,
+    )
+    from symphys.transcription.network_rollout.transcription import LargeTranscription, transcribe_large
 
 __all__ = [
     "LargeEvaluator",
@@ -13,3 +22,12 @@ __all__ = [
     "require_small_nets",
     "transcribe_large",
 ]
+
+__getattr__ = later(
+    __name__,
+    {
+        "evaluator": ("LargeEvaluator", "Shared"),
+        "partition": ("has_large_nets", "require_fixed_duration", "require_small_nets"),
+        "transcription": ("LargeTranscription", "transcribe_large"),
+    },
+)

@@ -39,7 +39,7 @@ def test_a_broken_driver_is_told_in_its_own_words(monkeypatch: pytest.MonkeyPatc
     def refuse() -> None:
         raise KernelUnavailable("no GPU that CUDA can use: cudaErrorInsufficientDriver")
 
-    monkeypatch.setattr("symphys.codegen.backends.kernels.find_gpu", refuse)
+    monkeypatch.setattr("symphys.codegen.cuda.find_gpu", refuse)
     assert throw("cuda").backend.note.endswith("cudaErrorInsufficientDriver")
 
 
@@ -47,7 +47,7 @@ def test_a_broken_driver_is_told_in_its_own_words(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("kind", ["value", "gradient", "residuals", "jacobian"])
 def test_every_evaluation_is_the_processors(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     require("simd")
-    monkeypatch.setattr("symphys.codegen.backends.kernels.find_gpu", lambda: Emulated(tmp_path))
+    monkeypatch.setattr("symphys.codegen.cuda.find_gpu", lambda: Emulated(tmp_path))
     there, here = throw("cuda"), throw("simd")
     assert (there.backend.name, there.backend.lanes, there.backend.note) == ("cuda", 4, "")
     Z = np.array([here.shooting.start(seed) for seed in range(5)])

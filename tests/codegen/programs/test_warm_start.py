@@ -195,7 +195,7 @@ def test_a_second_start_of_a_problem_is_the_first(name: str, tmp_path: Path, mon
     problem: Problem = load_problem(find(name))
     cold = transcribe(problem, exact=True, threads=1)
     cold.backend.finish()
-    monkeypatch.setattr("symphys.transcription.program.trace_step", None)
+    monkeypatch.setattr("symphys.dynamics.functions.trace_step", None)
     warm = transcribe(problem, exact=True, threads=1)
     z = cold.shooting.start(0)[None]
     first, second = (made.shooting.evaluator.gradient(z, 0.0) for made in (cold, warm))
