@@ -52,19 +52,30 @@ class Candidate:
     engine: Engine
 
 
-def here(scene: JointedScene, sweeps: int, batch: int) -> Candidate:
-    """This engine."""
+def here(scene: JointedScene, sweeps: int, batch: int, calls: int = 1) -> Candidate:
+    """This engine; ``calls``: batches, one after the other, of which at most ``DERIVED`` are differentiated."""
     world = scene.world()
     kernel = Rolling(world, Scheme(dt=DT, sweeps=sweeps, cuts=0), STEPS, rows=batch).kernel
-    states = scene.states(world)[:batch]
-    seed = np.zeros(states.shape[1])
+    states = np.split(scene.states(world)[: batch * calls], calls)
+    seed = np.zeros(states[0].shape[1])
     seed[0] = 1.0
-    name = f"symphys, {sweeps} sweeps" + (", one robot alone" if batch == 1 else "")
+    alone = (", one call" if calls == 1 else ", one robot alone") if batch == 1 else ""
+    name = f"symphys, {sweeps} sweeps{alone}"
+    derived = states[:DERIVED]
+
+    def rollout() -> None:
+        for each in states:
+            kernel.forward(each, [0.0])
+
+    def derivative() -> None:
+        for each in derived:
+            kernel.gradient(each, seed, [0.0])
+
     return Candidate(
         name,
-        partial(kernel.forward, states, [0.0]),
-        partial(kernel.gradient, states, seed, [0.0]),
-        (batch * STEPS, batch * STEPS),
+        rollout,
+        derivative,
+        (calls * batch * STEPS, len(derived) * batch * STEPS),
         Here(name, scene, sweeps=sweeps, cuts=0),
     )
 
@@ -149,7 +160,8 @@ def main() -> None:
         scene = standing(motor)
         ours = [here(scene, sweeps, 128) for sweeps in SWEEPS]
         theirs = [there(scene, integrator, cone) for cone in ("pyramidal", "elliptic")]
-        candidates = [*ours, here(scene, SWEEPS[0], 1), *theirs]
+        alone = [here(scene, SWEEPS[0], 1, calls) for calls in (1, 128)]
+        candidates = [*ours, *alone, *theirs]
         times, errors = measure(candidates), errors_of(candidates)
         report(f"quadruped, {name}, dt = {DT}", candidates, times, errors)
 

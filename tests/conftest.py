@@ -1,5 +1,8 @@
 """Compiled kernels of all tests go into a cache of the checkout; what takes minutes runs only when asked for.
 
+Modules become bytecode, also where $PYTHONDONTWRITEBYTECODE is set, as in containers: else hundreds of processes of the
+tests would each compile the package from its sources, a third of a second.
+
 Ctrl-C reaches tests that send it themselves also where the shell ignores it, as with ``nohup make test &``.
 """
 
@@ -7,11 +10,14 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
 
 os.environ.setdefault("SYMPHYS_CACHE", str(Path(__file__).parents[1] / "build" / "kernels"))
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
-from pathlib import Path
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -17,17 +18,16 @@ from symphys.transcription.rollout import symbolic_rollout
 HEAPS = {
     "spheres": heap(["sphere"] * 6),
     "capsules": heap(["capsule"] * 5, law="friction = 0.4\ntorsion = 0.01\nrolling = 0.005"),
-    "a box": heap(["box", *["sphere"] * 5], restitution=0.0),
+    "a box": heap(["box", *["sphere"] * 3], restitution=0.0),
     "soft": heap(["sphere"] * 6, law="friction = 0.4\nfrequency = 30", restitution=0.0),
 }
 
 
-def program_of(name: str, folder: Path, exact: bool = True, duration: float | None = None) -> Program:
-    path = folder / "heap.toml"
-    path.write_text(
-        HEAPS[name] if duration is None else HEAPS[name].replace("duration = 0.2", f"duration = {duration}")
-    )
-    return rollout_program(symbolic_rollout(symphys.load(path)), exact)
+@cache
+def program_of(name: str, duration: float | None = None) -> Program:
+    """Built once: a program never changes."""
+    text = HEAPS[name] if duration is None else HEAPS[name].replace("duration = 0.2", f"duration = {duration}")
+    return rollout_program(symbolic_rollout(symphys.load(tomllib.loads(text))), exact=True)
 
 
 def whole(program: Program) -> Program:

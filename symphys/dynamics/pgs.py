@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
 
+from symphys.dynamics.contact.constraint import ContactConstraint, known_before
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint, project_in_turn, pushed_by
 from symphys.dynamics.line_search import EVERY, Cluster, clusters, lengthened
 from symphys.dynamics.motion import PredictedMotion
@@ -100,7 +101,7 @@ def runs(constraints: Sequence[PlacedConstraint], momenta: Sequence[Velocities])
     for k in projection_order(constraints):
         carriers = set(constraints[k].carriers)
         latest = max((last[i] for i in carriers if i in last), default=-1)
-        within = len(carriers) == 1 and isinstance(momenta[min(carriers)], GeneralizedVelocities)
+        within = _of_one_tree(constraints[k], momenta)
         if not (within and latest >= 0 and carriers == set(constraints[found[latest][0]].carriers)):
             latest = len(found)
             found.append([])
@@ -122,14 +123,25 @@ def apply_start(
 
 
 def _coupled(constraints: tuple[PlacedConstraint, ...], momenta: Sequence[Velocities]) -> tuple[PlacedConstraint, ...]:
-    """With ``pushed``, where coordinates of a tree follow one another."""
-    found = list(constraints)
+    """With what is known before: of contacts of one tree, and ``pushed`` where coordinates follow one another."""
+    found = [_readied(each) if _of_one_tree(each, momenta) else each for each in constraints]
     for run in runs(constraints, momenta):
         for k, then in pairwise(run):
             first, second = constraints[k].constraint, constraints[then].constraint
             if _of_tree(first) and _of_tree(second):
                 found[then] = replace(found[then], constraint=replace(second, pushed=pushed_by(first, second)))
     return tuple(found)
+
+
+def _of_one_tree(placed: PlacedConstraint, momenta: Sequence[Velocities]) -> bool:
+    return len(set(placed.carriers)) == 1 and isinstance(momenta[placed.carriers[0]], GeneralizedVelocities)
+
+
+def _readied(placed: PlacedConstraint) -> PlacedConstraint:
+    contact = placed.constraint
+    if not isinstance(contact, ContactConstraint) or contact.coupling is not None:
+        return placed
+    return replace(placed, constraint=replace(contact, before=known_before(contact)))
 
 
 def _of_tree(constraint: VelocityConstraint) -> bool:

@@ -12,12 +12,13 @@ from symphys import problems
 from symphys.codegen import compile_program, interpret
 from symphys.errors import ProblemError, SymphysError
 from symphys.problem import Problem, load_problem, problem_of_tables
-from symphys.transcription import rollout_program, transcribe
+from symphys.transcription import Transcription, rollout_program, transcribe
 from symphys.transcription.open_step import compile_open_step
 from symphys.verification import examine
+from symphys.verification.examination import survey
 
 TABLES: dict[str, Any] = {
-    "simulation": {"duration": 0.6, "dt": 0.01},
+    "simulation": {"duration": 0.6, "dt": 0.02},
     "body": [
         {"name": "ball", "shape": {"sphere": {"radius": 0.1}}, "mass": 0.5, "position": [0, 0, 0.3]},
         {"name": "arm", "shape": {"capsule": {"radius": 0.02, "length": 0.3}}, "mass": 1, "position": [3, 0, 1]},
@@ -55,8 +56,21 @@ TABLES: dict[str, Any] = {
 }
 
 
-def test_slopes_are_those_of_differences_and_the_kernel_agrees() -> None:
-    made = transcribe(problem_of_tables(TABLES), backend="casadi")
+@pytest.fixture(scope="module")
+def made() -> Transcription:
+    """At the duration of its guess, 0.7 s."""
+    return transcribe(problem_of_tables(TABLES), backend="casadi")
+
+
+@pytest.fixture(scope="module")
+def other() -> Transcription:
+    """The same where 0.7 s are the duration of the file."""
+    fixed = {**TABLES, "simulation": {"duration": 0.7, "dt": 0.7 / 30}}
+    fixed["variable"] = [each for each in TABLES["variable"] if each["name"] != "T"]
+    return transcribe(problem_of_tables(fixed), backend="casadi")
+
+
+def test_slopes_are_those_of_differences_and_the_kernel_agrees(made: Transcription) -> None:
     z, h = made.shooting.start(0), 1e-6
     merit, *_, slope, outputs = (np.array(part).ravel() for part in made.functions.gradient(z, 0.0))
     value = made.functions.value
@@ -71,11 +85,7 @@ def test_slopes_are_those_of_differences_and_the_kernel_agrees() -> None:
     assert gradient[0] == pytest.approx(slope, rel=1e-8)
 
 
-def test_the_motion_is_that_of_the_fixed_duration() -> None:
-    made = transcribe(problem_of_tables(TABLES), backend="casadi")
-    fixed = {**TABLES, "simulation": {"duration": 0.7, "dt": 0.7 / 60}}
-    fixed["variable"] = [each for each in TABLES["variable"] if each["name"] != "T"]
-    other = transcribe(problem_of_tables(fixed), backend="casadi")
+def test_the_motion_is_that_of_the_fixed_duration(made: Transcription, other: Transcription) -> None:
     motion, expected = made.simulate(made.shooting.start(0)), other.simulate(other.shooting.start(0))
     assert motion.time == pytest.approx(expected.time, rel=1e-14)
     for field in ("position", "velocity", "force", "contact_force", "joint_value"):
@@ -102,13 +112,10 @@ def test_a_free_duration_at_the_value_of_the_file_changes_nothing(name: str, tmp
     assert motion.position == pytest.approx(expected.position, rel=1e-9, abs=1e-10)
 
 
-def test_an_examination_is_of_the_duration_of_z() -> None:
-    made = transcribe(problem_of_tables(TABLES), backend="casadi")
+def test_an_examination_is_of_the_duration_of_z(made: Transcription, other: Transcription) -> None:
     found = examine(made, made.shooting.start(0))
+    expected = survey(other, other.record(other.shooting.start(0)))
     assert found["growth"]["time"][-1] == pytest.approx(0.7, rel=0.05)
-    fixed = {**TABLES, "simulation": {"duration": 0.7, "dt": 0.7 / 60}}
-    other = transcribe(problem_of_tables(fixed), backend="casadi")
-    expected = examine(other, other.shooting.start(0))
     for part, values in expected["energy"].items():
         assert found["energy"][part] == pytest.approx(values, rel=1e-6, abs=1e-8), part
     assert max(row["error"] for row in found["gradient"]) < 1e-6

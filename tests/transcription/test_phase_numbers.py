@@ -227,7 +227,7 @@ def test_gravity_and_motors_change_at_their_time() -> None:
 def test_phases_scale_with_a_free_duration() -> None:
     """Twice as long: x = v0 T/2 - ..., with half of the time on ice."""
     free = {"name": "T", "sets": "simulation.duration", "guess": 0.8}
-    made = transcribe(problem_of_tables({**SLED, "variable": [*SLED["variable"], free]}), backend="casadi")
+    made = made_of({**SLED, "variable": [*SLED["variable"], free]}, dt=0.04)
     z = made.shooting.start(0)
     assert made.simulate(z)["sled.velocity"][-1, 0] == pytest.approx(sliding(0.8, 0.4)[1], rel=1e-9)
     program = rollout_program(made.rollout)

@@ -21,6 +21,7 @@ import casadi as ca
 from symphys.dynamics.contact import body_term
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.coupling import Coupling
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import length, onto_disc, positive
 from symphys.model.world import Law
 
@@ -83,6 +84,21 @@ ZERO = ContactImpulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3))
 
 
 @dataclass(frozen=True)
+class KnownBefore:
+    """What projections need each time and is known before the sweeps.
+
+    Attributes:
+        asked: normal impulse for the velocity that is aimed at [N s].
+        slip_asked: (3,) the same of friction [N s].
+        against: (3,) friction that a unit of normal impulse takes off, by the slip that it makes.
+    """
+
+    asked: Expr
+    slip_asked: Expr
+    against: Expr
+
+
+@dataclass(frozen=True)
 class ContactConstraint:
     """A contact, prepared for the sweeps.
 
@@ -111,6 +127,7 @@ class ContactConstraint:
         coupling: where friction may act strongly on the normal velocity.
         paradox: 1 if the friction of the free slip would pull the surfaces together.
         near: 0 if the surfaces are too far apart to act: no impulse is given.
+        before: where both impulses are found in turn: shortens what a projection waits for.
     """
 
     law: Law
@@ -138,6 +155,7 @@ class ContactConstraint:
     coupling: Coupling | None = None
     paradox: Expr = NEVER
     near: Expr = ALWAYS
+    before: KnownBefore | None = None
 
     def slip(self, momenta: tuple[Any, ...]) -> Expr:
         """(3,) [m/s]: relative velocity of the touching points."""
@@ -167,8 +185,29 @@ def _forces(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> tupl
         smoothed = _solve_smoothed(contact, contact.coupling, slip, old)
         smooth = contact.smoothing > 0
         return ca.if_else(smooth, smoothed[0], exact[0]), ca.if_else(smooth, smoothed[1], exact[1])
+    if contact.before is not None:
+        return _in_turn(contact, contact.before, slip, old)
     normal = _normal(contact, slip, old)
     return normal, _tangent(contact, slip + contact.delassus_column * (normal - old.normal), old, normal)
+
+
+@traced
+def known_before(contact: ContactConstraint) -> KnownBefore:
+    """What is known of a contact before the sweeps."""
+    n, mass = contact.normal, contact.tangent_mass
+    friction = (mass * _across(each, n) for each in (contact.slip_target, contact.delassus_column))
+    return KnownBefore(contact.normal_mass * contact.target, *friction)
+
+
+def _in_turn(contact: ContactConstraint, before: KnownBefore, slip: Expr, old: ContactImpulse) -> tuple[Expr, Expr]:
+    """The normal impulse and that of friction; what is known last, the change of the first, comes in last."""
+    n, given = contact.normal, contact.normal_mass * contact.softness * old.normal
+    kept = old.normal + before.asked - given - contact.normal_mass * ca.dot(n, slip)
+    normal = positive(kept, contact.normal_mass * contact.width)
+    wanted = old.tangent + before.slip_asked - contact.tangent_mass * _across(slip, n)
+    wanted = wanted - before.against * (normal - old.normal)
+    width = contact.tangent_mass * contact.smoothing
+    return normal, onto_disc(wanted, contact.law.friction * normal, width, contact.smoothing)
 
 
 def _normal(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> Expr:

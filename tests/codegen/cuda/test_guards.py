@@ -34,7 +34,7 @@ def entries_of(program: Program, phase: str) -> list[int]:
 @pytest.mark.parametrize("name", ["spheres", thorough("capsules"), thorough("a box"), thorough("soft")])
 @pytest.mark.parametrize("warps", [4, thorough(1)])
 def test_a_heap_is_the_processors_and_that_of_all_calls(name: str, warps: int, tmp_path: Path, cache: Cache) -> None:
-    program = program_of(name, tmp_path, duration=0.1)
+    program = program_of(name, duration=0.1)
     here = compile_program(program, cache=cache, threads=1, seeded=("merit",), lanes=4)
     z = np.random.default_rng(2).uniform(-2, 2, (7, program.z.size))
     wanted, slopes = here.gradient(z, [1.0], [0.0])

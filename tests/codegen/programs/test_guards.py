@@ -26,8 +26,8 @@ from symphys.codegen.emit.plan import plan
 
 
 @pytest.fixture(params=["spheres", thorough("capsules"), "a box", thorough("soft")])
-def heap_program(request: pytest.FixtureRequest, tmp_path: Path) -> Program:
-    return program_of(request.param, tmp_path)
+def heap_program(request: pytest.FixtureRequest) -> Program:
+    return program_of(request.param)
 
 
 def spoil(kernel: ProcessorKernel) -> None:
@@ -68,7 +68,7 @@ def test_most_calls_of_a_heap_are_guarded(heap_program: Program, request: pytest
 
 
 def test_plain_c_leaves_out_the_same(tmp_path: Path, cache: Cache) -> None:
-    program = program_of("spheres", tmp_path)
+    program = program_of("spheres")
     program = replace(program, outputs={"merit": program.outputs["merit"]})
     try:
         kernel = compile_program(program, cache=cache, threads=1, seeded=("merit",))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
 from contacts import contact_of, momenta_of, numbers, terms_of
 
-from symphys.dynamics.contact.constraint import ZERO
+from symphys.dynamics.contact.constraint import ZERO, ContactImpulse, known_before
 from symphys.dynamics.contact.coupling import coupling_of
 from symphys.dynamics.contact.effective_mass import mobilities
 from symphys.model.world import Law
@@ -32,6 +34,21 @@ def test_a_contact_obeys_its_law(seed: int, coupled: bool) -> None:
     assert press * (slip[2] - target) == pytest.approx(0, abs=1e-9)
     assert np.linalg.norm(tangent) <= mu * press + 1e-12
     assert np.dot(tangent, slip) == pytest.approx(-mu * press * np.linalg.norm(slip[:2]), abs=1e-8)
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.05])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_known_before_the_sweeps_changes_nothing(seed: int, smoothing: float) -> None:
+    rng = np.random.default_rng(seed)
+    terms, momenta = terms_of(rng), momenta_of(rng)
+    asked = {"target": ca.SX(5 + rng.uniform()), "slip_target": ca.SX(rng.normal(size=3))}
+    widths = {"softness": ca.SX(0.1), "width": ca.SX(smoothing), "smoothing": ca.SX(smoothing)}
+    contact = contact_of(terms, Law(friction=0.3), **asked, **widths)
+    old = ContactImpulse(ca.SX(0.2), ca.SX([0.05, -0.02, 0.0]), ca.SX(0), ca.SX.zeros(3))
+    plain, ready = (each.project(momenta, old)[1] for each in (contact, replace(contact, before=known_before(contact))))
+    assert numbers(ready.normal) == pytest.approx(numbers(plain.normal), rel=1e-12)
+    assert numbers(ready.tangent) == pytest.approx(numbers(plain.tangent), rel=1e-12, abs=1e-15)
+    assert numbers(plain.normal) > 0 and np.abs(numbers(plain.tangent)[:2]).min() > 0
 
 
 def test_torques_stay_within_their_limits() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import casadi as ca
 import numpy as np
@@ -51,19 +53,30 @@ def chained(made: Linearization, z: np.ndarray, weights: np.ndarray, smoothing: 
     return np.asarray(found)
 
 
+@cache
+def compiled(name: str, threads: int = 1) -> Linearization:
+    """By kernels, whose plans take seconds; tests share them."""
+    with TemporaryDirectory() as folder:
+        return Linearization(symbolic_rollout(problem_of(name, Path(folder))), "auto", threads)
+
+
 def off_by(problem: Problem, backend: str, smoothing: float = 0.0) -> float:
     """How far chained slopes are from the adjoint, as a share of it."""
-    rollout = symbolic_rollout(problem)
-    made, z = Linearization(rollout, backend, 1), guess_of(problem)
+    return apart(Linearization(symbolic_rollout(problem), backend, 1), smoothing)
+
+
+def apart(made: Linearization, smoothing: float = 0.0) -> float:
+    """See ``off_by``."""
+    rollout, z = made.rollout, guess_of(made.rollout.problem)
     weights = np.random.default_rng(0).normal(size=rollout.memory.size)
     aim = adjoint_of(rollout, z, weights, smoothing)
     return float(np.abs(chained(made, z, weights, smoothing) - aim).max() / np.abs(aim).max())
 
 
 @pytest.mark.parametrize("name", KERNELS)
-def test_chained_slopes_are_the_adjoint(name: str, tmp_path: Path) -> None:
+def test_chained_slopes_are_the_adjoint(name: str) -> None:
     """In ``leg`` a parameter moves a joint, and with it the first state."""
-    assert off_by(problem_of(name, tmp_path), "auto") < 1e-10
+    assert apart(compiled(name)) < 1e-10
 
 
 @pytest.mark.parametrize("name", ["ball_throw", thorough("soft"), thorough("leg")])
@@ -93,20 +106,18 @@ def test_without_a_compiler_casadi_evaluates(tmp_path: Path, monkeypatch: pytest
     assert "there is no compiler" in made.step.description
 
 
-def test_steps_are_those_of_the_rollout_to_the_bit(tmp_path: Path) -> None:
-    problem = problem_of("loop", tmp_path)
-    rollout = symbolic_rollout(problem)
-    z = guess_of(problem)
+def test_steps_are_those_of_the_rollout_to_the_bit() -> None:
+    made = compiled("loop")
+    rollout, z = made.rollout, guess_of(made.rollout.problem)
     states = ca.Function("states", [rollout.z, rollout.smoothing], [rollout.x])(z, 0.0)
-    motion = Linearization(rollout, "auto", 1).motion(z, 0.0)
+    motion = made.motion(z, 0.0)
     assert np.array_equal(motion.x, np.array(states).T)
 
 
-def test_small_batches_are_prepared_once_and_differences_compiled(tmp_path: Path) -> None:
+def test_small_batches_are_prepared_once_and_differences_compiled() -> None:
     """Rows of small batches, again and again with other numbers, are those of large ones, and differences are right."""
-    problem = problem_of("leg", tmp_path)
-    made = Linearization(symbolic_rollout(problem), "auto", 1)
-    motion = made.motion(guess_of(problem), 0.0)
+    made = compiled("leg")
+    motion = made.motion(guess_of(made.rollout.problem), 0.0)
     _, u, p = made.begun(motion.z)
     large = made.step.step(np.arange(len(u)), motion.x[:-1], u, p, 0.0)
     assert len(u) > linearized_step.FEW
@@ -114,15 +125,14 @@ def test_small_batches_are_prepared_once_and_differences_compiled(tmp_path: Path
         few = slice(first, first + 4)
         found = made.step.step(np.arange(first, first + 4), motion.x[few], u[few], p, 0.0)
         np.testing.assert_array_equal(found, large[few])
-        apart = made.step.difference(motion.x[few], motion.x[few][::-1])
+        found = made.step.difference(motion.x[few], motion.x[few][::-1])
         wanted = made.tangent.difference(motion.x[few], motion.x[few][::-1])
-        np.testing.assert_allclose(apart, wanted, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12)
 
 
-def test_states_and_threads_do_not_change_each_others_numbers(tmp_path: Path) -> None:
-    problem = problem_of("loop", tmp_path)
-    made = [Linearization(symbolic_rollout(problem), "auto", threads) for threads in (1, 2)]
-    motion = made[0].motion(guess_of(problem), 0.0)
+def test_states_and_threads_do_not_change_each_others_numbers() -> None:
+    made = [compiled("loop", threads) for threads in (1, 2)]
+    motion = made[0].motion(guess_of(made[0].rollout.problem), 0.0)
     one, two = (each.linearize(motion) for each in made)
     assert np.array_equal(one.a, two.a) and np.array_equal(one.b, two.b)
     _, u, p = made[0].begun(motion.z)
@@ -130,10 +140,9 @@ def test_states_and_threads_do_not_change_each_others_numbers(tmp_path: Path) ->
     assert np.array_equal(few, one.a[:3])
 
 
-def test_what_is_not_finite_stays_so(tmp_path: Path) -> None:
-    problem = problem_of("loop", tmp_path)
-    made = Linearization(symbolic_rollout(problem), "auto", 1)
-    motion = made.motion(guess_of(problem), 0.0)
+def test_what_is_not_finite_stays_so() -> None:
+    made = compiled("loop")
+    motion = made.motion(guess_of(made.rollout.problem), 0.0)
     motion.x[1, 0] = np.nan
     found = made.linearize(motion).a
     assert np.isnan(found[1]).any() and np.isfinite(found[0]).all() and np.isfinite(found[2:]).all()
