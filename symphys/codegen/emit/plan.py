@@ -61,12 +61,12 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
 
 def with_adjoints(
     program: Program, seeded: Sequence[str], functions: DistinctFunctions, varying: Sequence[Place] = ()
-) -> tuple[list[Part], Reach]:
+) -> tuple[list[PlannedPhase], Reach]:
     """The phases of a program, with the adjoints of what matters to the seeded outputs and depends on z.
 
     What is in ``varying`` counts as dependent too.
     """
-    parts = [Part(calls, steps) for calls, steps in zip(program.phases, (1, program.steps, 1), strict=True)]
+    parts = [PlannedPhase(calls, steps) for calls, steps in zip(program.phases, (1, program.steps, 1), strict=True)]
     reach = Reach(program.size, [KnownCalls(part.calls, part.steps, part.dependence(functions)) for part in parts])
     outputs = [_words_of(program.outputs[name]) for name in seeded]
     inputs = np.concatenate([_words_of(place) for place in (program.z, *varying)])
@@ -91,7 +91,7 @@ class _Kind(NamedTuple):
     graph: Graph
 
 
-class Part:
+class PlannedPhase:
     """A phase, and once they are known its adjoints and their tapes.
 
     Attributes:
@@ -104,6 +104,7 @@ class Part:
     """
 
     def __init__(self, calls: PhaseCalls, steps: int) -> None:
+        """No adjoints are known yet."""
         self.calls, self.steps = calls, steps
         self.kinds: list[_Kind] = []
         self.kind = np.full(len(calls), NONE, np.int64)
@@ -199,7 +200,9 @@ def _taped_at_once(program: Program) -> bool:
     return program.steps == 1 and not any(call.guard is not None or call.section is not None for call in program.body)
 
 
-def _again(program: Program, body: Part, reach: Reach, functions: DistinctFunctions, noted: bool) -> NDArray[np.bool_]:
+def _again(
+    program: Program, body: PlannedPhase, reach: Reach, functions: DistinctFunctions, noted: bool
+) -> NDArray[np.bool_]:
     """(calls,) which must be run again before the adjoints of a step: those whose scratch is read."""
     spans = body.calls.inputs
     used = [[i for i in range(kind.function.n_in()) if i in functions.arguments(kind.graph)] for kind in body.kinds]
@@ -213,7 +216,7 @@ def _again(program: Program, body: Part, reach: Reach, functions: DistinctFuncti
 
 
 def _put_on_tape(
-    program: Program, body: Part, again: NDArray[np.bool_], functions: DistinctFunctions, room: int
+    program: Program, body: PlannedPhase, again: NDArray[np.bool_], functions: DistinctFunctions, room: int
 ) -> int:
     """Give the calls that are run again a tape if all then still fits into ``room`` words; returns its words."""
     if 2 * program.size > room:

@@ -49,7 +49,10 @@ class _Crowd(ctypes.Structure):
     _fields_ = (
         *((name, WORD) for name in ("rooms", "species", "loops", "words", "state", "given")),
         *((name, WORD) for name in ("found", "looked", "striking")),
-        *((name, POINTER) for name in ("list", "order", "actions", "values", "again", "back", "kinds", "sight", "nears")),
+        *(
+            (name, POINTER)
+            for name in ("list", "order", "actions", "values", "again", "back", "kinds", "sight", "nears")
+        ),
     )
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.pieces import Form
-from symphys.codegen.emit.plan import NONE, Part, with_adjoints
+from symphys.codegen.emit.plan import NONE, with_adjoints
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.neighbours.program import Crowd, MemberCall, Move
 
@@ -33,8 +33,8 @@ class CrowdPlan:
         functions: the C functions, in the order of their numbers.
         work: words of a member of each room, with tapes.
         loops: (loops, 5) room, first action, end, end of what is done where the section is left out, its word or -1.
-        actions: (actions, 9) store, of, offset, room, at, size, entry, entry of the adjoint, guard; see ``neighbours.c``, where
-            the place of the room is part of the offset, and the words of a member stand for the room.
+        actions: (actions, 9) store, of, offset, room, at, size, entry, entry of the adjoint, guard; see
+            ``neighbours.c``, where the offset has the place of the room, and a member's words stand for the room.
         values, again, back: entries of calls: of values alone, with tapes, adjoints.
     """
 

@@ -69,7 +69,7 @@ class MemberCall:
 
 
 @dataclass(frozen=True)
-class Loop:
+class MemberLoop:
     """What each member of a room does before the next one begins.
 
     Attributes:
@@ -101,7 +101,7 @@ class Room:
 
 
 @dataclass(frozen=True)
-class Sight:
+class SightPlaces:
     """Where in the work of a body its position (3) and its reach lie [m]."""
 
     position: int
@@ -142,10 +142,10 @@ class Crowd:
     """
 
     sample: Program
-    loops: tuple[Loop, ...]
+    loops: tuple[MemberLoop, ...]
     rooms: tuple[Room, ...]
     meetings: tuple[Meeting, ...]
-    sights: tuple[Sight, ...]
+    sights: tuple[SightPlaces, ...]
     striking: int
     found: int
     looked: int

@@ -41,7 +41,7 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
     """
     world, settings = context.world, context.settings
     points = Counter((pair.first, pair.second) for pair in world.pairs)
-    if len(points) < FEWEST:
+    if len(points) < FEWEST and not context.sample:
         return ()
     held = {index for joint in world.joints for index in joint.bodies}
     bodies = [_sight(x, body, context, can_measure(body)) for body in world.bodies]

@@ -45,7 +45,7 @@ class Sample:
 
 
 def sample_of(world: World, law: Law) -> Sample:
-    """Of a world of bodies without joints on planes, all with one law."""
+    """Of a world of bodies without joints that are known in numbers, on planes. All touch all, with one law."""
     found: dict[Hashable, list[int]] = {}
     for index, body in enumerate(world.bodies):
         found.setdefault(_kind(body), []).append(index)
@@ -54,7 +54,8 @@ def sample_of(world: World, law: Law) -> Sample:
         replace(world.bodies[own[0]], name=f"{'ab'[k]}{number}") for number, own in enumerate(species) for k in range(2)
     ]
     kinds = [PairKind(s, None, k) for s in range(len(species)) for k in range(len(world.statics))]
-    kinds += [PairKind(s, t) for s in range(len(species)) for t in range(s, len(species))]
+    meet = [(s, t) for s, own in enumerate(species) for t in range(s, len(species)) if s < t or len(own) > 1]
+    kinds += [PairKind(s, t) for s, t in meet]
     pairs, of_kind = list[Pair](), list[tuple[int, ...]]()
     for kind in kinds:
         sides = [_sides(bodies, kind, twin) for twin in range(TWINS)]

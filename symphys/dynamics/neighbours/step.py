@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 
 from symphys.dynamics.arguments import arguments_of, context_of, parts_of
+from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.neighbours.recording import MemberRecorder
 from symphys.dynamics.neighbours.sample import Sample
-from symphys.dynamics.step import take_step
+from symphys.dynamics.step import SPLITS_OFF_CENTRE, take_step
 from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import tracing
 from symphys.dynamics.tracing.guards import with_guards
 from symphys.dynamics.tracing.recording import TracedCall
 from symphys.model.state_layout import Layout
-from symphys.model.world import Scheme
+from symphys.model.world import Scheme, World
 
 Expr = Any
 """casadi SX"""
 
 
 @dataclass(frozen=True)
-class Names:
+class StateNames:
     """Where named parts of a state lie.
 
     Attributes:
@@ -51,7 +52,7 @@ class RecordedStep:
 
     calls: tuple[TracedCall, ...]
     recorder: MemberRecorder
-    names: Names
+    names: StateNames
     sizes: Mapping[str, int]
 
 
@@ -60,6 +61,7 @@ def recorded_step(
 ) -> RecordedStep:
     """The step of a sample; ``exact``: at smoothing 0 only."""
     world = sample.world
+    scheme = replace(scheme, cuts=_cuts(world, scheme))
     x, u, p, smoothing = arguments_of(world, inputs, parameters)
     layout, recorder = Layout(world), MemberRecorder()
     for name, symbols in (("u", u), ("p", p), ("smoothing", smoothing), *parts_of(layout, x).items()):
@@ -67,6 +69,7 @@ def recorded_step(
     owners, offsets = _names(sample, layout)
     with tracing(recorder):
         context = context_of(world, scheme, inputs, [x, u, p, ca.SX(0) if exact else smoothing])
+        context = replace(context, sample=True)
         after, _ = take_step(context, parts_of(layout, x))
         results = {}
         for owner in dict.fromkeys(owners.values()):
@@ -75,7 +78,16 @@ def recorded_step(
     calls = with_guards(without_dead_code(recorder.calls), recorder.guards, recorder.sections)
     calls = _seen_first(calls, recorder.sights)
     sizes = {"u": u.numel(), "p": p.numel(), "smoothing": 1}
-    return RecordedStep(calls, recorder, Names(owners, offsets, results), sizes)
+    return RecordedStep(calls, recorder, StateNames(owners, offsets, results), sizes)
+
+
+def _cuts(world: World, scheme: Scheme) -> int:
+    """How often a step is split, where bodies have several pairs; see ``splits_of``."""
+    if not scheme.time_of_impact:
+        return 0
+    if scheme.cuts is not None:
+        return scheme.cuts
+    return SPLITS_OFF_CENTRE if eccentric_bodies(world) else 1
 
 
 def _seen_first(calls: Sequence[TracedCall], sights: Sequence[int]) -> tuple[TracedCall, ...]:

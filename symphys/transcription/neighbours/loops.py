@@ -12,9 +12,9 @@ from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from symphys.codegen.neighbours.program import Loop, MemberCall, Move, Of, Store
-from symphys.dynamics.neighbours.step import RecordedStep
+from symphys.codegen.neighbours.program import MemberCall, MemberLoop, Move, Of, Store
 from symphys.dynamics.neighbours.sample import TWINS, Sample
+from symphys.dynamics.neighbours.step import RecordedStep
 from symphys.dynamics.tracing.guards import Guard, Part
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.errors import SymphysError
@@ -34,7 +34,7 @@ class LoopStep:
         homes: for the numbers of vectors (room, where they lie in its work).
     """
 
-    loops: tuple[Loop, ...]
+    loops: tuple[MemberLoop, ...]
     work: tuple[int, ...]
     states: tuple[int, ...]
     homes: Mapping[int, tuple[int, int]]
@@ -73,9 +73,9 @@ class _Loop:
     does: list[Move | MemberCall] = field(default_factory=list)
     instead: list[Move] = field(default_factory=list)
 
-    def done(self, section: int | None) -> Loop:
+    def done(self, section: int | None) -> MemberLoop:
         """As it is; ``section``: where its word lies."""
-        return Loop(self.room, tuple(self.does), section, tuple(self.instead))
+        return MemberLoop(self.room, tuple(self.does), section, tuple(self.instead))
 
 
 class _Builder:
@@ -256,8 +256,8 @@ class _Builder:
             {self._first(self._root[v.number]) for v in vectors if v.number in self._root}
             for vectors in (call.inputs, call.outputs)
         )
-        late = any(self._touched.get(chain, False) for chain in read) or any(chain in self._touched for chain in written)
         point = self._point(call)
+        late = any(self._touched.get(chain, False) for chain in read) or not written.isdisjoint(self._touched)
         late = late and not self._reached < point  # the points of a pair follow one another
         section = None if call.section is None else call.section.word
         last = self._loops[-1] if self._loops else None
@@ -286,7 +286,7 @@ class _Builder:
         room, number = loop.room, vector.number
         if number in self._root:
             if self._newest[self._root[number]] != number:
-                raise SymphysError(f"neighbours: what has been handed on is read again: {vector}, newest {self._newest[self._root[number]]}, root {self._root[number]}, member {member}")
+                raise SymphysError(f"neighbours: the number {number} is read after it has been handed on")
             at = self._take(room, vector.size)
             loop.does.append(replace(self._read(vector, member, room, at), guard=guard))
             return at

@@ -8,21 +8,37 @@ from dataclasses import replace
 import casadi as ca
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
-from symphys.codegen.neighbours.program import Crowd, Meeting, MemberCall, Move, Room, Sight
-from symphys.dynamics.neighbours.sample import TWINS, Sample
+from symphys.codegen.neighbours.program import Crowd, Meeting, MemberCall, Move, Room, SightPlaces
+from symphys.dynamics.line_search import UNEQUAL
+from symphys.dynamics.neighbours.sample import TWINS, Sample, sample_of
 from symphys.dynamics.neighbours.step import RecordedStep, recorded_step
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
+from symphys.errors import SymphysError
+from symphys.model.scalar import is_number
 from symphys.model.shapes import Plane
 from symphys.model.state_layout import Layout
-from symphys.model.world import Scheme, World
+from symphys.model.world import Law, Scheme, World
+from symphys.suggest import quote
 from symphys.transcription.neighbours.loops import LoopStep, loops_of
 
 ROOM_FOR = 2
 """Pairs of a kind for each body, for which there is room at first."""
 
 
-def crowd_of(sample: Sample, scheme: Scheme, exact: bool = False) -> Crowd:
-    """The crowd of a sample, whose ``cuts`` are those of the whole world."""
+def crowd_of(world: World, law: Law, scheme: Scheme, exact: bool = False) -> Crowd:
+    """The step of bodies without joints, which are known in numbers, on planes; all touch all with one law.
+
+    Args:
+        world: bodies and planes; its pairs are not looked at.
+        law: of all contacts.
+        scheme: how a step is taken.
+        exact: for smoothing 0 only, whatever is given.
+
+    Raises:
+        SymphysError: names the body or the surface that is none of these.
+    """
+    _check(world)
+    sample = sample_of(world, law)
     recorded = recorded_step(sample, scheme, exact=exact)
     step = loops_of(sample, recorded)
     species, counts = len(sample.species), [len(own) for own in sample.species]
@@ -38,7 +54,7 @@ def crowd_of(sample: Sample, scheme: Scheme, exact: bool = False) -> Crowd:
         meetings.append(Meeting(kind.first, normal=(x, y, z), offset=float(plane.offset)))
     *seen, striking = recorded.recorder.sights
     begin = [step.homes[number][1] for number in seen[::TWINS]]
-    sights = [Sight(position, position + 3) for position in begin]
+    sights = [SightPlaces(position, position + 3) for position in begin]
     rooms = [Room(*each) for each in zip(step.work, step.states, members, strict=True)]
     program, places = step_program(sample.world, recorded.calls, recorded.sizes)
     roots = tuple(place for vector, place in places.items() if vector.number in recorded.recorder.roots)
@@ -108,3 +124,19 @@ def step_program(
         in_order=True,
     )
     return program, places
+
+
+def _check(world: World) -> None:
+    """Refuse what steps of many bodies do not know."""
+    held = {index for joint in world.joints for index in joint.bodies}
+    for index, body in enumerate(world.bodies):
+        if index in held or body.massless:
+            raise SymphysError(f"neighbours: {quote(body.name)} must have a mass and no joint")
+        if not is_number((body.mass, body.inertia, *((shape.centre, shape.sizes) for shape in body.shapes))):
+            raise SymphysError(f"neighbours: no number of {quote(body.name)} may vary")
+    for static in world.statics:
+        if not isinstance(static, Plane):
+            raise SymphysError(f"neighbours: {quote(static.name)} must be a plane")
+    masses = [float(body.mass) for body in world.bodies]
+    if masses and max(masses) > UNEQUAL * min(masses):
+        raise SymphysError(f"neighbours: masses must not differ by more than a factor of {UNEQUAL:g}")
