@@ -224,8 +224,8 @@ def _delay(
     """
     held = {index for joint in context.world.joints for index in joint.bodies}
     for index, body in enumerate(context.world.bodies):
-        names = tuple(f"{body.name}.{part}" for part in POSE)
-        x |= zip(names, opened(tuple(x[name] for name in names), index), strict=True)
+        own = tuple(f"{body.name}.{part}" for part in POSE)
+        x |= zip(own, opened(tuple(x[name] for name in own), index), strict=True)
     for each, impulse, time in zip(constraints, impulses, late, strict=True):
         free = [(k, index) for k, index in enumerate(each.bodies) if index not in held]
         if not free:
