@@ -132,7 +132,8 @@ def main() -> None:
         print(
             f"{count} spheres, {contacts} contacts: built in {built:.1f} s, compiled in "
             f"{compiled:.1f} s; a step {1e6 * ours:.0f} us, {1e6 * ours / contacts:.2f} a contact, with "
-            f"gradient {1e6 * gradient:.0f}, MuJoCo {1e6 * theirs:.0f} by {solver}, ratio {ours / theirs:.2f}; peak {peak:.0f} MiB",
+            f"gradient {1e6 * gradient:.0f}, MuJoCo {1e6 * theirs:.0f} by {solver}, ratio {ours / theirs:.2f}; "
+            f"peak {peak:.0f} MiB",
             flush=True,
         )
     if len(found) > 2:
