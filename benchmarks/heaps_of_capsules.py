@@ -2,9 +2,9 @@
 
     python benchmarks/heaps_of_capsules.py COUNT [build | near]
 
-Each capsule has six points in a pair with another, so that pairs are many: 27 have 1,917 points. ``build`` stops before
-the compiler. ``near`` lists no pairs: each step finds those that are near. Seconds are those of processors, of compilers
-too; a step is timed by the clock, on one thread.
+Each capsule has six points in a pair with another, so that pairs are many: 27 have 1,917 points. ``build`` stops
+before the compiler. ``near`` lists no pairs: each step finds those that are near. Seconds are those of processors, of
+compilers too; a step is timed by the clock, on one thread.
 """
 
 from __future__ import annotations
