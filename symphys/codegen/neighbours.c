@@ -110,7 +110,11 @@ static double at(const scene *s, word body, word species, word which, word l) {
   return LANE(s->m[r->base + body * r->work + w], l);
 }
 
-static int64_t cell_of(double x, double width) { return (int64_t)__builtin_floor(x / width); }
+/* Places that are no numbers, or far beyond all others, share a cell. */
+static int64_t cell_of(double x, double width) {
+  double cell = __builtin_floor(x / width);
+  return cell > -1e15 && cell < 1e15 ? (int64_t)cell : 0;
+}
 
 static int search(const scene *s, word k, word l, word *most) {
   const crowd *c = s->c;

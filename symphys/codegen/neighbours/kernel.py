@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from symphys.codegen.emit.dialect import ONE_LANE, VECTORS
 from symphys.codegen.emit.source import FILES, SourceFile, head_of, resource, spread
 from symphys.codegen.emit.writer import write
-from symphys.codegen.errors import KernelUnavailable
+from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.neighbours.plan import CrowdPlan, Walk, crowd_plan
 from symphys.codegen.neighbours.program import ONLY, Crowd, Store
 from symphys.codegen.runtime.thread_pool import MemoryPool
@@ -65,6 +65,13 @@ class _Scenes(ctypes.Structure):
 class CrowdKernel:
     """Rollouts of many bodies.
 
+    Attributes:
+        crowd: with the room there is for pairs.
+        report: how it was built.
+        threads: blocks that are computed at once.
+        most: by meeting, how many pairs have been near in a step at most.
+        prepare: of new memories, which hold whatever was there.
+
     A state is that of all bodies, species by species, then what is there once. Forces of pairs stay in the kernel: a
     rollout begins without any.
     """
@@ -72,6 +79,7 @@ class CrowdKernel:
     def __init__(self, crowd: Crowd, planned: CrowdPlan, library: Any, report: BuildReport, threads: int) -> None:
         """Use ``compile_crowd``."""
         self.crowd, self.report, self.threads = crowd, report, threads
+        self.prepare: Callable[[Any], None] | None = None
         self.most: NDArray[np.int64] = np.zeros(len(crowd.meetings), np.int64)
         self._planned = planned
         self._roll = library.roll
@@ -93,12 +101,17 @@ class CrowdKernel:
 
     def adjoints(self, starts: Array, given: Array, weights: Array) -> tuple[Array, Array]:
         """All states, and for states weighed with (B, steps + 1, shown) the gradient by the start (B, shown)."""
-        states, slopes = np.empty_like(weights), np.ascontiguousarray(weights, float).copy()
+        if np.ndim(weights) != 3 or np.shape(weights)[::2] != (len(starts), self.shown):
+            raise ProgramError(f"weights have the shape {np.shape(weights)}, not ({len(starts)}, steps, {self.shown})")
+        states, slopes = np.empty(weights.shape), np.array(weights, float, order="C")
         self._run(starts, given, states, slopes)
         return states, slopes[:, 0].copy()
 
     def _run(self, starts: Array, given: Array, states: Array, slopes: Array | None) -> None:
         starts, given = (np.ascontiguousarray(each, float) for each in (starts, given))
+        for name, each, width in (("starts", starts, self.shown), ("given", given, self.crowd.given)):
+            if each.shape != (len(starts), width):
+                raise ProgramError(f"{name} have the shape {each.shape}; wanted is (batch, {width})")
         lanes = self.report.lanes
         blocks = -(-len(starts) // lanes)
         parts = min(blocks, self.threads)
@@ -148,7 +161,8 @@ class CrowdKernel:
             words = max(values.words, taped.words) + taped.words if gradient else values.words
             words += (1 + gradient) * (steps + 1) * values.state + values.given
             bytes_ = steps * (12 * lanes * slots + 4 * len(crowd.meetings)) + 24 * slots + 92 * bodies + 512
-            self._pools = {(steps, gradient): MemoryPool(words + bytes_ // (8 * lanes) + 2, lanes, np.float64)}
+            total = words + bytes_ // (8 * lanes) + 2
+            self._pools = {(steps, gradient): MemoryPool(total, lanes, np.float64, self.prepare)}
         return self._pools[steps, gradient]
 
     def _link(self) -> None:
