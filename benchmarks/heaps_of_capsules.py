@@ -1,9 +1,10 @@
 """Heaps of capsules in a pen: what they take to build and to compile, and a step beside MuJoCo's.
 
-    python benchmarks/heaps_of_capsules.py COUNT [build]
+    python benchmarks/heaps_of_capsules.py COUNT [build | near]
 
-Each capsule has six points in a pair with another, so that pairs are many: 27 have 1,917 points. ``build`` stops before
-the compiler. Seconds are those of processors, of compilers too; a step is timed by the clock, on one thread.
+Each capsule has six points in a pair with another, so that pairs are many: 27 have 1,917 points. ``build`` stops
+before the compiler. ``near`` lists no pairs: each step finds those that are near. Seconds are those of processors, of
+compilers too; a step is timed by the clock, on one thread.
 """
 
 from __future__ import annotations
@@ -21,11 +22,16 @@ from against_mujoco import fastest
 from numpy.typing import NDArray
 from worlds import problem_of
 
+from symphys import Body, Law, Plane, Scheme
 from symphys.codegen import Cache, Program, compile_program
 from symphys.codegen.emit.plan import plan
+from symphys.codegen.neighbours.kernel import compile_crowd
+from symphys.codegen.neighbours.plan import crowd_plan
 from symphys.codegen.program.collection import uncollected
+from symphys.model.world import World
 from symphys.problem import Problem
 from symphys.transcription import rollout_program
+from symphys.transcription.neighbours.program import crowd_of
 from symphys.transcription.rollout import symbolic_rollout
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
@@ -79,9 +85,43 @@ def built(problem: Problem) -> Program:
     return program
 
 
+def found_anew(count: int) -> None:
+    """The same heap, of which each step finds the pairs that are near."""
+    bodies = [
+        Body.capsule(f"b{i}", radius=0.06, length=0.2, mass=1.0, position=tuple(place))
+        for i, place in enumerate(places(count))
+    ]
+    planes = Plane.ground(), Plane("left", (1, 0, 0), -0.3), Plane("right", (-1, 0, 0), -0.3)
+    began = process_time()
+    law, scheme = Law(friction=0.4, restitution=0.5), Scheme(dt=0.01, sweeps=6)
+    crowd = crowd_of(World(tuple(bodies), planes), law, scheme, exact=True)
+    middle = process_time()
+    crowd_plan(crowd)
+    print(f"{count} capsules\n  built in {middle - began:.1f} s, planned in {process_time() - middle:.1f} s", end="")
+    with tempfile.TemporaryDirectory() as folder:
+        before = children()
+        kernel = compile_crowd(crowd, lanes=1, threads=1, cache=Cache(Path(folder)))
+        print(f", compiled in {children() - before:.1f} s of processors by {kernel.report.compiler}", flush=True)
+    random, start = np.random.default_rng(count), np.zeros((count, 19))
+    start[:, :3], start[:, 3] = places(count), 1
+    start[:, 7:10] = velocities = np.array([random.uniform(-1.5, 1.5, 3).round(3) for _ in range(count)])
+    state, given = np.append(start, 0.0)[None], np.zeros((1, crowd.given))
+    ours = fastest(partial(kernel.rollouts, state, given, STEPS)) / STEPS
+    weights = np.ones((1, STEPS + 1, state.shape[1]))
+    gradient = fastest(partial(kernel.adjoints, state, given, weights)) / STEPS
+    model = there(count)
+    theirs = fastest(partial(run, model, mujoco.MjData(model), velocities)) / STEPS
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    print(f"  a step alone: {1e6 * ours:.0f} us, MuJoCo {1e6 * theirs:.0f} us, ratio {ours / theirs:.1f}", end="")
+    print(f"; with gradient {1e6 * gradient:.0f} us; peak {peak:.2f} GiB", flush=True)
+
+
 def main() -> None:
     """A heap."""
     count = int(sys.argv[1])
+    if "near" in sys.argv:
+        found_anew(count)
+        return
     problem = problem_of(heap(["capsule"] * count))
     print(f"{count} capsules", flush=True)
     program = built(problem)

@@ -18,7 +18,7 @@ from symphys.dynamics.joints.assembly import KinematicTrees
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
 from symphys.dynamics.joints.loop_closure import Displacements, TreeDisplacement, close_loops, displaced
 from symphys.dynamics.motion import PredictedMotion, apply
-from symphys.dynamics.tracing.decorator import gathered, repeat, traced
+from symphys.dynamics.tracing.decorator import gathered, opened, repeat, traced
 from symphys.dynamics.unknowns import AllVelocities, GeneralizedVelocities, PlacedConstraint, Velocities
 from symphys.model.joints import kinematic_trees
 
@@ -39,6 +39,7 @@ def displacements(
     late = [_drift(motion, state, duration) for motion, state in zip(trees.motions, solved, strict=True)]
     if not context.settings.scheme.time_of_impact:
         return late
+    late = [opened(each, k) for k, each in enumerate(late)]
     for each, *impulses in zip(constraints, started, given, strict=True):
         turning = tuple(trees.motions[body].inverse_mid for body in each.bodies)
         own = tuple(late[carrier] for carrier in each.carriers)

@@ -37,7 +37,7 @@ from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply, is
 from symphys.dynamics.pgs import apply_start, iterate
 from symphys.dynamics.position_correction import Corrected, close_gaps, displacements
 from symphys.dynamics.prediction import bodies_of, detect_contacts, free_motions, jointed_bodies, predicted_motions
-from symphys.dynamics.tracing.decorator import gathered, traced
+from symphys.dynamics.tracing.decorator import gathered, opened, traced
 from symphys.dynamics.unknowns import Momenta, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.model.state_layout import BODY_FIELDS
@@ -221,7 +221,7 @@ def _store_forces(
 ) -> list[tuple[Expr, Expr]]:
     """Persistent contact forces (impacts left out) into ``values``; returns their sum on each body."""
     scheme = context.settings.scheme
-    total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in context.world.bodies]
+    total = [opened((ca.SX.zeros(3), ca.SX.zeros(3)), k) for k in range(len(context.world.bodies))]
     for pair, each, impulse in zip(context.world.pairs, constraints, impulses, strict=True):
         force, torque = _persistent(each.constraint, impulse, kick, context.shortest_kick)
         values[f"{pair.name}.force"] = force if scheme.warm_start else ca.SX.zeros(3)

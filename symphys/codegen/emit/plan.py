@@ -42,12 +42,7 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
     """
     side_by_side = teamed(program)
     program, functions = side_by_side.program, DistinctFunctions()
-    parts = [_Part(calls, steps) for calls, steps in zip(program.phases, (1, program.steps, 1), strict=True)]
-    reach = Reach(program.size, [KnownCalls(part.calls, part.steps, part.dependence(functions)) for part in parts])
-    outputs = [_words_of(program.outputs[name]) for name in seeded]
-    active = reach.forwards(_words_of(program.z)) & reach.backwards(np.concatenate([np.zeros(0, np.int64), *outputs]))
-    for part in parts:
-        part.find_adjoints(active, functions)
+    parts, reach = with_adjoints(program, seeded, functions)
     body = parts[1]
     at_once = noted and _taped_at_once(program)
     again = np.ones(len(body.calls), bool) if at_once else _again(program, body, reach, functions, noted)
@@ -62,6 +57,23 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
     return Plan(
         tuple(functions.listed), filled, tape, _written(program), guarding, program, side_by_side.teams, callers
     )
+
+
+def with_adjoints(
+    program: Program, seeded: Sequence[str], functions: DistinctFunctions, varying: Sequence[Place] = ()
+) -> tuple[list[PlannedPhase], Reach]:
+    """The phases of a program, with the adjoints of what matters to the seeded outputs and depends on z.
+
+    What is in ``varying`` counts as dependent too.
+    """
+    parts = [PlannedPhase(calls, steps) for calls, steps in zip(program.phases, (1, program.steps, 1), strict=True)]
+    reach = Reach(program.size, [KnownCalls(part.calls, part.steps, part.dependence(functions)) for part in parts])
+    outputs = [_words_of(program.outputs[name]) for name in seeded]
+    inputs = np.concatenate([_words_of(place) for place in (program.z, *varying)])
+    active = reach.forwards(inputs) & reach.backwards(np.concatenate([np.zeros(0, np.int64), *outputs]))
+    for part in parts:
+        part.find_adjoints(active, functions)
+    return parts, reach
 
 
 def _written(program: Program) -> Words:
@@ -79,7 +91,7 @@ class _Kind(NamedTuple):
     graph: Graph
 
 
-class _Part:
+class PlannedPhase:
     """A phase, and once they are known its adjoints and their tapes.
 
     Attributes:
@@ -92,6 +104,7 @@ class _Part:
     """
 
     def __init__(self, calls: PhaseCalls, steps: int) -> None:
+        """No adjoints are known yet."""
         self.calls, self.steps = calls, steps
         self.kinds: list[_Kind] = []
         self.kind = np.full(len(calls), NONE, np.int64)
@@ -187,7 +200,9 @@ def _taped_at_once(program: Program) -> bool:
     return program.steps == 1 and not any(call.guard is not None or call.section is not None for call in program.body)
 
 
-def _again(program: Program, body: _Part, reach: Reach, functions: DistinctFunctions, noted: bool) -> NDArray[np.bool_]:
+def _again(
+    program: Program, body: PlannedPhase, reach: Reach, functions: DistinctFunctions, noted: bool
+) -> NDArray[np.bool_]:
     """(calls,) which must be run again before the adjoints of a step: those whose scratch is read."""
     spans = body.calls.inputs
     used = [[i for i in range(kind.function.n_in()) if i in functions.arguments(kind.graph)] for kind in body.kinds]
@@ -201,7 +216,7 @@ def _again(program: Program, body: _Part, reach: Reach, functions: DistinctFunct
 
 
 def _put_on_tape(
-    program: Program, body: _Part, again: NDArray[np.bool_], functions: DistinctFunctions, room: int
+    program: Program, body: PlannedPhase, again: NDArray[np.bool_], functions: DistinctFunctions, room: int
 ) -> int:
     """Give the calls that are run again a tape if all then still fits into ``room`` words; returns its words."""
     if 2 * program.size > room:

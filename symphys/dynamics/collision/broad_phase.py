@@ -9,7 +9,6 @@ A compiled kernel leaves out the calls of what is far (``symphys.dynamics.tracin
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from math import hypot
 from typing import Any
 
@@ -19,7 +18,7 @@ import numpy as np
 from symphys.dynamics.collision.near_points import Sight, Travel, can_measure, measured, near_points
 from symphys.dynamics.context import State, StepContext, StepSettings
 from symphys.dynamics.motion import inertia_matrix
-from symphys.dynamics.tracing.decorator import guard, traced
+from symphys.dynamics.tracing.decorator import folded, guard, in_sight, opened, traced
 from symphys.maths import rotation
 from symphys.maths.smoothing import length
 from symphys.model.body import Body
@@ -42,12 +41,17 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
     """
     world, settings = context.world, context.settings
     points = Counter((pair.first, pair.second) for pair in world.pairs)
-    if len(points) < FEWEST:
+    if len(points) < FEWEST and not context.sample:
         return ()
     held = {index for joint in world.joints for index in joint.bodies}
     bodies = [_sight(x, body, context, can_measure(body)) for body in world.bodies]
-    fastest = _fastest(tuple(_most(sight, _arm(body)) for sight, body in zip(bodies, world.bodies, strict=True)))
-    reach, found = Travel(settings.scheme.dt, fastest), dict[tuple[Side, Side], list[Expr]]()
+    fastest: Expr = opened(ca.SX(0))
+    sighted = list(zip(bodies, world.bodies, strict=True))
+    for sight, body in sighted:
+        fastest = _faster(fastest, sight, _arm(body))
+    dt = settings.scheme.dt
+    in_sight([(sight.position, _reach(sight, _arm(body), dt)) for sight, body in sighted], dt * fastest)
+    reach, found = Travel(dt, fastest), dict[tuple[Side, Side], list[Expr]]()
     for (first, second), count in points.items():
         radii = _radius(world, first, held), _radius(world, second, held)
         if first.body is None or radii[0] is None or radii[1] is None:
@@ -58,13 +62,13 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
             plane, b, near = shapes[1], None, ca.SX(1)
             assert isinstance(plane, Plane)
             if not measured(shapes, (a, b)):
-                near = guard(_near_plane(a, (plane.normal, plane.offset), radii[0], reach, settings))
+                near = guard(_near_plane(a, (plane.normal, plane.offset), radii[0], reach, settings), (first, second))
         else:
             b = bodies[second.body]
-            near = guard(_near(a, b, radii[0] + radii[1], reach, settings))
+            near = guard(_near(a, b, radii[0] + radii[1], reach, settings), (first, second))
         if measured(shapes, (a, b)):
             words = near_points(shapes, (a, b), near, reach, settings.smoothing)
-            found[first, second] = [guard(word) for (word,) in words]
+            found[first, second] = [guard(word, (first, second)) for (word,) in words]
         else:
             found[first, second] = [near] * count
     lists = {sides: iter(words) for sides, words in found.items()}
@@ -120,15 +124,16 @@ def _arm(body: Body) -> float:
     return max((hypot(*shape.centre) + shape.extent for shape in body.shapes), default=0.0) if is_number(sizes) else 0.0
 
 
-@traced
-def _most(sight: Sight, arm: float) -> Expr:
-    """The greatest speed of a point of a body [m/s]."""
-    return sight.speed + sight.swing(arm)
+@folded
+def _faster(fastest: Expr, sight: Sight, arm: float) -> Expr:
+    """The greatest speed of a point of any body so far [m/s]."""
+    return ca.fmax(fastest, sight.speed + sight.swing(arm))
 
 
 @traced
-def _fastest(speeds: Sequence[Expr]) -> Expr:
-    return ca.mmax(ca.vertcat(*speeds))
+def _reach(sight: Sight, radius: float, dt: Expr) -> Expr:
+    """How far anything of a body comes from where its centre is at the start of a step, if nothing strikes it [m]."""
+    return radius + dt * sight.speed
 
 
 @traced

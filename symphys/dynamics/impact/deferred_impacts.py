@@ -13,7 +13,7 @@ from symphys.dynamics.context import State, StepContext, StepSettings
 from symphys.dynamics.impact.impact import TOUCHING, StepSplit, strikes
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
-from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.tracing.decorator import opened, traced
 from symphys.maths.smoothing import either
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Sphere
@@ -54,20 +54,18 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
     hits = [_hit(context.settings, pair.law, contact, each) for pair, each, contact in looked_at]
     eccentric, sides = eccentric_bodies(world), {k for pair in pairs for k in bodies_of(pair)}
     rebounds = {k for pair in pairs if not is_zero(pair.law.restitution) for k in bodies_of(pair)}
-    first: dict[int, tuple[Expr, Expr]] = dict.fromkeys(sides & (eccentric | rebounds), (duration, ca.SX(0)))
+    first: dict[int, tuple[Expr, Expr]] = {
+        body: opened((duration, ca.SX(0)), body) for body in sorted(sides & (eccentric | rebounds))
+    }
     for pair, contact, (_, meets) in zip(pairs, contacts, hits, strict=True):
         for body in first.keys() & set(bodies_of(pair)):
             first[body] = _sooner(first[body], meets, contact.time, contact.rate)
-    found, chained, plastic = list[Expr](), ca.SX(0), ca.SX(0)
-    touching: dict[int, list[int]] = {}
+    found, chained, plastic = list[Expr](), opened(ca.SX(0)), opened(ca.SX(0))
+    struck = {body: opened(ca.SX(0), body) for body in sorted(first.keys() & eccentric)}
     for j, pair in enumerate(pairs):
-        for body in bodies_of(pair):
-            touching.setdefault(body, []).append(j)
-    struck = {
-        body: _any(tuple(split.struck[j] for split in splits for j in touching[body]))
-        for body in first
-        if body in eccentric
-    }
+        for body in struck.keys() & set(bodies_of(pair)):
+            for split in splits:
+                struck[body] = _or(struck[body], split.struck[j])
     for (pair, each, contact), (fast, meets) in zip(looked_at, hits, strict=True):
         waits = _passes(fast, meets)
         for body in sorted(first.keys() & set(bodies_of(pair))):
@@ -136,8 +134,8 @@ def _passes(fast: Expr, meets: Expr) -> Expr:
 
 
 @traced
-def _any(flags: tuple[Expr, ...]) -> Expr:
-    return ca.mmax(ca.vertcat(*flags))
+def _or(before: Expr, new: Expr) -> Expr:
+    return either(before, new)
 
 
 @traced

@@ -22,7 +22,7 @@ from symphys.dynamics.context import StepContext
 from symphys.dynamics.joints.assembly import KinematicTrees, momenta_of
 from symphys.dynamics.motion import PredictedMotion, apply, inverse_inertia
 from symphys.dynamics.pgs import iterate
-from symphys.dynamics.tracing.decorator import gathered, traced
+from symphys.dynamics.tracing.decorator import folded, gathered, opened, traced
 from symphys.dynamics.unknowns import (
     AnyImpulse,
     GeneralizedVelocities,
@@ -59,12 +59,13 @@ def rebound(
     plastic = iterate(context.world, scheme.sweeps, dead, start, motions)
     between = replace(plastic, momenta=gathered(plastic.momenta)) if context.near else plastic
     newton = iterate(context.world, scheme.sweeps, constraints, between, motions)
-    sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
-    bodies = (momenta_of(context, trees, solution.momenta) for solution in (start, plastic, newton))
+    sums: tuple[Expr, Expr, Expr] = opened((ca.SX(0), ca.SX(0), ca.SX(0)))
+    solutions = replace(start, momenta=trees.states), plastic, newton
+    bodies = (momenta_of(context, trees, solution.momenta) for solution in solutions)
     for motion, *momenta in zip(motions, *bodies, strict=True):
-        sums = sums if motion.massless else _energies(motion, momenta, sums)
+        sums = sums if motion.massless else _energies(sums, motion, momenta)
     for tree, root in zip(trees.coordinates, trees.roots, strict=True):
-        rates = (rotor_rates(tree, solution.momenta[root]) for solution in (start, plastic, newton))
+        rates = (rotor_rates(tree, solution.momenta[root]) for solution in solutions)
         for armature, *turning in zip(tree.tree.armature, *rates, strict=True):
             sums = sums if armature is None else _rotor_energies(armature, turning, sums)
     share = _largest_share(sums)
@@ -82,9 +83,9 @@ def _without_rebound(constraint: Any) -> Any:
     return replace(constraint, target=ca.fmin(constraint.target, 0))
 
 
-@traced
+@folded
 def _energies(
-    motion: PredictedMotion, momenta: list[Momentum], sums: tuple[Expr, Expr, Expr]
+    sums: tuple[Expr, Expr, Expr], motion: PredictedMotion, momenta: list[Momentum]
 ) -> tuple[Expr, Expr, Expr]:
     """Coefficients of the change of kinetic energy, a s^2 + b s + c, at share s of the way to Newton's impulse."""
     before, plastic, newton = momenta

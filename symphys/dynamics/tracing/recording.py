@@ -7,7 +7,7 @@ arguments are recorded once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from itertools import count
 from typing import Any, NamedTuple, TypeVar
 
@@ -63,7 +63,7 @@ class Recorder(Tracer):
         """A slot for an argument of the step."""
         self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
 
-    def guard(self, word: Any) -> None:
+    def guard(self, word: Any, of: Hashable) -> None:
         """See ``decorator.guard``; what is known already guards nothing."""
         (code,) = word.codes if isinstance(word, TracedMatrix) else self._codes(word)
         if not isinstance(code, float):

@@ -77,9 +77,9 @@ class Tracer(ABC):
             state = once(context, state)
         return state
 
-    def guard(self, word: Any) -> None:
+    def guard(self, word: Any, of: Hashable) -> None:
         """What tells which calls are without effect; of use to a recorder alone."""
-        del word
+        del word, of
 
     def section(self, word: Any) -> None:
         """Likewise."""
@@ -88,6 +88,15 @@ class Tracer(ABC):
     def gathered(self, tree: T) -> T:
         """The same tree."""
         return tree
+
+    def opened(self, tree: T, body: int | None) -> T:
+        """The same tree; see ``decorator.opened``."""
+        del body
+        return tree
+
+    def in_sight(self, bodies: Sequence[Any], striking: Any) -> None:
+        """See ``decorator.in_sight``; of use to a recorder of many bodies alone."""
+        del bodies, striking
 
     @abstractmethod
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:

@@ -1,0 +1,252 @@
+"""A compiled crowd: rollouts of many bodies and their adjoints, in batches over threads."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.codegen.emit.dialect import ONE_LANE, VECTORS
+from symphys.codegen.emit.source import FILES, SourceFile, head_of, resource, spread
+from symphys.codegen.emit.writer import write
+from symphys.codegen.errors import KernelUnavailable
+from symphys.codegen.neighbours.plan import CrowdPlan, crowd_plan
+from symphys.codegen.neighbours.program import Crowd, Store
+from symphys.codegen.runtime.thread_pool import MemoryPool
+from symphys.codegen.toolchain.build import shared_library
+from symphys.codegen.toolchain.cache import Cache, default_cache
+from symphys.codegen.toolchain.compiler import processors
+from symphys.codegen.toolchain.processor import processor
+from symphys.codegen.toolchain.report import BuildReport
+
+Array = NDArray[np.float64]
+WORD = ctypes.c_int64
+POINTER = ctypes.c_void_p
+SPARE = 1.25
+"""Times as many pairs as are near, for which there is room from then on."""
+
+
+class _Room(ctypes.Structure):
+    _fields_ = tuple((name, WORD) for name in ("work", "state", "members", "base", "begin"))
+
+
+class _Kind(ctypes.Structure):
+    _fields_ = (
+        *((name, WORD) for name in ("first", "second", "plane")),
+        ("normal", ctypes.c_double * 3),
+        ("offset", ctypes.c_double),
+    )
+
+
+class _Crowd(ctypes.Structure):
+    _fields_ = (
+        *((name, WORD) for name in ("rooms", "species", "loops", "words", "state", "given")),
+        *((name, WORD) for name in ("found", "looked", "striking")),
+        *(
+            (name, POINTER)
+            for name in ("list", "order", "actions", "values", "again", "back", "kinds", "sight", "nears")
+        ),
+    )
+
+
+class _Scenes(ctypes.Structure):
+    _fields_ = (
+        *((name, WORD) for name in ("rows", "steps")),
+        *((name, POINTER) for name in ("start", "given", "states", "slopes")),
+        *((name, WORD) for name in ("shown", "start_size")),
+        ("most", POINTER),
+    )
+
+
+class CrowdKernel:
+    """Rollouts of many bodies.
+
+    A state is that of all bodies, species by species, then what is there once. Forces of pairs stay in the kernel: a
+    rollout begins without any.
+    """
+
+    def __init__(self, crowd: Crowd, planned: CrowdPlan, library: Any, report: BuildReport, threads: int) -> None:
+        """Use ``compile_crowd``."""
+        self.crowd, self.report, self.threads = crowd, report, threads
+        self.most: NDArray[np.int64] = np.zeros(len(crowd.meetings), np.int64)
+        self._planned = planned
+        self._roll = library.roll
+        self._roll.argtypes, self._roll.restype = (POINTER, POINTER, POINTER), WORD
+        self._pools: dict[tuple[int, bool], MemoryPool] = {}
+        self._link()
+
+    @property
+    def shown(self) -> int:
+        """Numbers of a state."""
+        species = self.crowd.rooms[1 : 1 + len(self.crowd.sights)]
+        return sum(room.members * room.state for room in species) + self.crowd.rooms[0].state
+
+    def rollouts(self, starts: Array, given: Array, steps: int) -> Array:
+        """(B, shown), (B, given) -> (B, steps + 1, shown): all states."""
+        states = np.empty((len(starts), steps + 1, self.shown))
+        self._run(starts, given, states, None)
+        return states
+
+    def adjoints(self, starts: Array, given: Array, weights: Array) -> tuple[Array, Array]:
+        """All states, and for states weighed with (B, steps + 1, shown) the gradient by the start (B, shown)."""
+        states, slopes = np.empty_like(weights), np.ascontiguousarray(weights, float).copy()
+        self._run(starts, given, states, slopes)
+        return states, slopes[:, 0].copy()
+
+    def _run(self, starts: Array, given: Array, states: Array, slopes: Array | None) -> None:
+        starts, given = (np.ascontiguousarray(each, float) for each in (starts, given))
+        lanes = self.report.lanes
+        blocks = -(-len(starts) // lanes)
+        parts = min(blocks, self.threads)
+        ends = [min(lanes * (blocks * i // parts), len(starts)) for i in range(parts + 1)]
+        left = list(pairwise(ends))
+        while left:
+            steps = states.shape[1] - 1
+            found: list[tuple[int, int]] = []
+            memory = self._memory(steps, slopes is not None)
+            arrays = starts, given, states, slopes
+            memory.run([partial(self._part, arrays, a, b, found) for a, b in left], self.threads)
+            if found:
+                self._grow()
+            left = found
+
+    def _part(
+        self, arrays: tuple[Array, Array, Array, Array | None], first: int, last: int, rest: list[Any], memory: Any
+    ) -> None:
+        starts, given, states, slopes = (None if each is None else each[first:last] for each in arrays)
+        assert starts is not None and given is not None and states is not None
+        most = np.zeros(max(len(self.most), 1), np.int64)
+        addresses = [each.ctypes.data for each in (starts, given, states)]
+        scenes = _Scenes(
+            last - first, states.shape[1] - 1, *addresses, None if slopes is None else slopes.ctypes.data,
+            self.shown, starts.shape[1], most.ctypes.data,
+        )  # fmt: skip
+        done = self._roll(ctypes.byref(self._data), ctypes.byref(scenes), memory.ctypes.data)
+        np.maximum(self.most, most[: len(self.most)], out=self.most)
+        if done < last - first:
+            rest.append((first + done, last))
+
+    def _grow(self) -> None:
+        """Make room for as many pairs as have been near, and some more."""
+        rooms, first = list(self.crowd.rooms), 1 + len(self.crowd.sights)
+        for k, most in enumerate(self.most.tolist()):
+            if most > rooms[first + k].members:
+                rooms[first + k] = replace(rooms[first + k], members=int(SPARE * most) + 1)
+        self.crowd = replace(self.crowd, rooms=tuple(rooms))
+        self._pools.clear()
+        self._link()
+
+    def _memory(self, steps: int, gradient: bool) -> MemoryPool:
+        if (steps, gradient) not in self._pools:
+            crowd, lanes, data = self.crowd, self.report.lanes, self._data
+            bodies = sum(room.members for room in crowd.rooms[1 : 1 + len(crowd.sights)])
+            slots = sum(room.members for room in crowd.rooms[1 + len(crowd.sights) :])
+            words = 2 * data.words + (1 + gradient) * (steps + 1) * data.state + data.given
+            bytes_ = steps * (12 * lanes * slots + 4 * len(crowd.meetings)) + 24 * slots + 92 * bodies + 512
+            self._pools = {(steps, gradient): MemoryPool(words + bytes_ // (8 * lanes) + 2, lanes, np.float64)}
+        return self._pools[steps, gradient]
+
+    def _link(self) -> None:
+        crowd, planned = self.crowd, self._planned
+        self._kept: list[Any] = []
+        rooms, base, species = (_Room * len(crowd.rooms))(), 0, len(crowd.sights)
+        begins, begin = [0] * len(crowd.rooms), 0
+        for r in [*range(1, 1 + species), 0, *range(1 + species, len(crowd.rooms))]:
+            begins[r] = begin
+            begin += crowd.rooms[r].state * crowd.rooms[r].members
+        for r, (room, work) in enumerate(zip(crowd.rooms, planned.work, strict=True)):
+            rooms[r] = _Room(work, room.state, room.members, base, begins[r])
+            base += work * room.members
+        kinds = (_Kind * max(len(crowd.meetings), 1))()
+        for k, each in enumerate(crowd.meetings):
+            plane = 0 if each.second < 0 else -1
+            kinds[k] = _Kind(each.first, each.second, plane, (ctypes.c_double * 3)(*each.normal), each.offset)
+        self._kept += [rooms, kinds]
+        sights = np.array([(s.position, s.reach) for s in crowd.sights], np.int64)
+        ends = 1 + len(crowd.nears) + np.cumsum([0, *map(len, crowd.nears)])
+        lists = planned.loops, self._actions(begins, planned), planned.values, planned.again, planned.back
+        self._data = _Crowd(
+            *(len(crowd.rooms), species, len(planned.loops), base, begin, crowd.given),
+            *(crowd.found, crowd.looked, crowd.striking),
+            ctypes.addressof(rooms),
+            *(self._put(each) for each in lists),
+            ctypes.addressof(kinds),
+            self._put(sights),
+            self._put(np.array([*ends, *(at for words in crowd.nears for at in words)], np.int64)),
+        )
+
+    def _actions(self, begins: Sequence[int], planned: CrowdPlan) -> NDArray[np.int64]:
+        """With places in the memory in place of rooms."""
+        members = np.array([room.members for room in self.crowd.rooms])
+        work = np.array(planned.work)
+        base = np.cumsum(work * members) - work * members
+        states = np.array([room.state for room in self.crowd.rooms])
+        found = planned.actions.copy()
+        store, room = found[:, 0], found[:, 3].copy()
+        kept = (store == Store.BEFORE) | (store == Store.AFTER)
+        found[:, 3] = np.where(store == Store.WORK, work[room], np.where(kept, states[room], 0))
+        found[:, 2] += np.where(store == Store.WORK, base[room], np.where(kept, np.array(begins)[room], 0))
+        return found
+
+    def _put(self, values: NDArray[Any]) -> int:
+        values = np.ascontiguousarray(values) if values.size else np.zeros(1, np.int64)
+        self._kept.append(values)
+        return int(values.ctypes.data)
+
+
+def compile_crowd(
+    crowd: Crowd, lanes: int | None = None, cache: Cache | None = None, threads: int | None = None
+) -> CrowdKernel:
+    """Build the kernel of a crowd in double precision, or take it from the cache.
+
+    Args:
+        crowd: what to compute.
+        lanes: scenes in a block; None: what fills a register.
+        cache: where kernels are kept; None: the user's.
+        threads: how many blocks are computed at once; None: one for each processor.
+
+    Raises:
+        KernelUnavailable: with one line that says why.
+    """
+    started = time.perf_counter()
+    lanes = processor().lanes(False) if lanes is None else lanes
+    planned = crowd_plan(crowd)
+    with shared_library(_sources(planned, lanes), cache or default_cache()) as built:
+        try:
+            library = ctypes.CDLL(str(built.path))
+        except OSError as error:
+            raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
+    report = BuildReport(
+        compiler=built.compiler.version,
+        flags=built.flags,
+        lanes=lanes,
+        precision="double",
+        functions=len(planned.functions),
+        operations=sum(len(graph.nodes) for graph, _ in planned.functions),
+        bytes_per_lane=16 * sum(w * room.members for w, room in zip(planned.work, crowd.rooms, strict=True)),
+        cached=built.cached,
+        seconds=time.perf_counter() - started,
+        note=built.note,
+    )
+    return CrowdKernel(crowd, planned, library, report, processors() if threads is None else threads)
+
+
+def _sources(planned: CrowdPlan, lanes: int) -> list[SourceFile]:
+    dialect = ONE_LANE if lanes == 1 else VECTORS
+    head, found = head_of(lanes, single=False, dialect=dialect), list[SourceFile]()
+    for backward in (False, True):
+        mine = [i for i, (_, form) in enumerate(planned.functions) if form.backward == backward]
+        texts = [write(f"f{i}", *planned.functions[i], dialect, ()) for i in mine]
+        for group in spread(texts, [len(planned.functions[i][0].nodes) for i in mine], FILES):
+            found.append(SourceFile("\n".join([head, *group]), straight=True))
+    names = [f"f{number}" for number in range(len(planned.functions))]
+    declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
+    listed = f"static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{', '.join(names) or '0'}}};\n"
+    return [*found, SourceFile(head_of(lanes, single=False) + declared + listed + resource("neighbours.c"))]

@@ -1,0 +1,1 @@
+"""Rollouts of many bodies: programs of loops, and what evaluates them."""
