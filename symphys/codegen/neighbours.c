@@ -16,7 +16,7 @@ typedef struct {
   const room *list;
   const loop *order;
   const action *actions;
-  const word *values, *again, *back; /* entries of calls */
+  const word *entries, *back; /* of calls and of their adjoints */
   const kind *kinds;
   const word *sight, *nears; /* by species: where a position and a reach lie; by kind where in nears
                                 words begin, of which one is not 0 if a pair is near */
@@ -110,7 +110,11 @@ static double at(const scene *s, word body, word species, word which, word l) {
   return LANE(s->m[r->base + body * r->work + w], l);
 }
 
-static int64_t cell_of(double x, double width) { return (int64_t)__builtin_floor(x / width); }
+/* Places that are no numbers, or far beyond all others, share a cell. */
+static int64_t cell_of(double x, double width) {
+  double cell = __builtin_floor(x / width);
+  return cell > -1e15 && cell < 1e15 ? (int64_t)cell : 0;
+}
 
 static int search(const scene *s, word k, word l, word *most) {
   const crowd *c = s->c;
@@ -256,7 +260,7 @@ static round round_of(const scene *s, word n, word k) {
   return r;
 }
 
-static int step(const scene *s, word k, const word *entries, word *most) {
+static int step(const scene *s, word k, word *most) {
   const crowd *c = s->c;
   word kinds = c->rooms - 1 - c->species;
   V *stores[] = {s->m, s->x + k * c->state, s->x + (k + 1) * c->state, s->given};
@@ -276,7 +280,7 @@ static int step(const scene *s, word k, const word *entries, word *most) {
       for (const action *a = r.first; a < r.end; a++)
         if (a->guard >= 0 && !any(here + a->guard)) {
           if (a->store == CALLED) memset(here + a->at, 0, a->size * sizeof(V));
-        } else if (a->store == CALLED) CALL(entries + a->entry, here, 0, 0);
+        } else if (a->store == CALLED) CALL(c->entries + a->entry, here, 0, 0);
         else copy(a, p, i, stores, here, 0);
     }
   }
@@ -303,13 +307,14 @@ static void step_back(const scene *s, word k) {
   }
 }
 
-/* The rows of scenes; returns how many fit: the pairs of the next row are more than there is room for. */
-API word roll(const crowd *c, const scenes *q, V *memory) {
+/* The rows of scenes, whose values and whose adjoints are walked apart; returns how many fit: the pairs of the next row are more than there is room for. */
+API word roll(const crowd *c, const crowd *taped, const scenes *q, V *memory) {
+  const word words = q->slopes && taped->words > c->words ? taped->words : c->words;
   word kinds = c->rooms - 1 - c->species, steps = q->steps, slots = 0;
   for (word r = 1 + c->species; r < c->rooms; r++) slots += c->list[r].members;
   scene s = {.c = c, .m = memory, .slots = slots};
-  s.b = s.m + c->words;
-  s.x = s.b + c->words;
+  s.b = s.m + words;
+  s.x = s.b + (q->slopes ? taped->words : 0);
   s.y = s.x + (steps + 1) * c->state;
   s.given = s.y + (q->slopes ? (steps + 1) * c->state : 0);
   s.pairs = (near *)(s.given + c->given);
@@ -324,21 +329,23 @@ API word roll(const crowd *c, const scenes *q, V *memory) {
       for (word w = 0; w < q->start_size; w++) LANE(s.x[w], l) = (R)q->start[from * q->start_size + w];
       for (word w = 0; w < c->given; w++) LANE(s.given[w], l) = (R)q->given[from * c->given + w];
     }
+    s.c = c;
     for (word k = 0; k < steps; k++)
-      if (!step(&s, k, c->values, q->most)) return row;
+      if (!step(&s, k, q->most)) return row;
     for (word l = 0; l < rows; l++)
       for (word k = 0; k <= steps; k++)
         for (word w = 0; w < q->shown; w++)
           q->states[((row + l) * (steps + 1) + k) * q->shown + w] = (double)LANE(s.x[k * c->state + w], l);
     if (!q->slopes) continue;
     memset(s.y, 0, (steps + 1) * c->state * sizeof(V));
-    memset(s.b, 0, c->words * sizeof(V));
+    memset(s.b, 0, taped->words * sizeof(V));
+    s.c = taped;
     for (word l = 0; l < rows; l++)
       for (word k = 0; k <= steps; k++)
         for (word w = 0; w < q->shown; w++)
           LANE(s.y[k * c->state + w], l) = (R)q->slopes[((row + l) * (steps + 1) + k) * q->shown + w];
     for (word k = steps - 1; k >= 0; k--) {
-      step(&s, k, c->again, 0);
+      step(&s, k, 0);
       step_back(&s, k);
     }
     for (word l = 0; l < rows; l++)

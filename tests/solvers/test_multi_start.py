@@ -86,7 +86,7 @@ class Pressed(Counted):
     def evaluate(self, kind: str, Z: Any, smoothing: float) -> Values:
         if sum(self.calls.values()) == 2:
             os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(0.2)
+            time.sleep(1)  # until the main thread hears of it
         return super().evaluate(kind, Z, smoothing)
 
 

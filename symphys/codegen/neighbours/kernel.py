@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from symphys.codegen.emit.dialect import ONE_LANE, VECTORS
 from symphys.codegen.emit.source import FILES, SourceFile, head_of, resource, spread
 from symphys.codegen.emit.writer import write
-from symphys.codegen.errors import KernelUnavailable
-from symphys.codegen.neighbours.plan import CrowdPlan, crowd_plan
-from symphys.codegen.neighbours.program import Crowd, Store
+from symphys.codegen.errors import KernelUnavailable, ProgramError
+from symphys.codegen.neighbours.plan import CrowdPlan, Walk, crowd_plan
+from symphys.codegen.neighbours.program import ONLY, Crowd, Store
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.toolchain.build import shared_library
 from symphys.codegen.toolchain.cache import Cache, default_cache
@@ -49,10 +49,7 @@ class _Crowd(ctypes.Structure):
     _fields_ = (
         *((name, WORD) for name in ("rooms", "species", "loops", "words", "state", "given")),
         *((name, WORD) for name in ("found", "looked", "striking")),
-        *(
-            (name, POINTER)
-            for name in ("list", "order", "actions", "values", "again", "back", "kinds", "sight", "nears")
-        ),
+        *((name, POINTER) for name in ("list", "order", "actions", "entries", "back", "kinds", "sight", "nears")),
     )
 
 
@@ -68,6 +65,13 @@ class _Scenes(ctypes.Structure):
 class CrowdKernel:
     """Rollouts of many bodies.
 
+    Attributes:
+        crowd: with the room there is for pairs.
+        report: how it was built.
+        threads: blocks that are computed at once.
+        most: by meeting, how many pairs have been near in a step at most.
+        prepare: of new memories, which hold whatever was there.
+
     A state is that of all bodies, species by species, then what is there once. Forces of pairs stay in the kernel: a
     rollout begins without any.
     """
@@ -75,10 +79,11 @@ class CrowdKernel:
     def __init__(self, crowd: Crowd, planned: CrowdPlan, library: Any, report: BuildReport, threads: int) -> None:
         """Use ``compile_crowd``."""
         self.crowd, self.report, self.threads = crowd, report, threads
+        self.prepare: Callable[[Any], None] | None = None
         self.most: NDArray[np.int64] = np.zeros(len(crowd.meetings), np.int64)
         self._planned = planned
         self._roll = library.roll
-        self._roll.argtypes, self._roll.restype = (POINTER, POINTER, POINTER), WORD
+        self._roll.argtypes, self._roll.restype = (POINTER,) * 4, WORD
         self._pools: dict[tuple[int, bool], MemoryPool] = {}
         self._link()
 
@@ -96,12 +101,17 @@ class CrowdKernel:
 
     def adjoints(self, starts: Array, given: Array, weights: Array) -> tuple[Array, Array]:
         """All states, and for states weighed with (B, steps + 1, shown) the gradient by the start (B, shown)."""
-        states, slopes = np.empty_like(weights), np.ascontiguousarray(weights, float).copy()
+        if np.ndim(weights) != 3 or np.shape(weights)[::2] != (len(starts), self.shown):
+            raise ProgramError(f"weights have the shape {np.shape(weights)}, not ({len(starts)}, steps, {self.shown})")
+        states, slopes = np.empty(weights.shape), np.array(weights, float, order="C")
         self._run(starts, given, states, slopes)
         return states, slopes[:, 0].copy()
 
     def _run(self, starts: Array, given: Array, states: Array, slopes: Array | None) -> None:
         starts, given = (np.ascontiguousarray(each, float) for each in (starts, given))
+        for name, each, width in (("starts", starts, self.shown), ("given", given, self.crowd.given)):
+            if each.shape != (len(starts), width):
+                raise ProgramError(f"{name} have the shape {each.shape}; wanted is (batch, {width})")
         lanes = self.report.lanes
         blocks = -(-len(starts) // lanes)
         parts = min(blocks, self.threads)
@@ -128,7 +138,7 @@ class CrowdKernel:
             last - first, states.shape[1] - 1, *addresses, None if slopes is None else slopes.ctypes.data,
             self.shown, starts.shape[1], most.ctypes.data,
         )  # fmt: skip
-        done = self._roll(ctypes.byref(self._data), ctypes.byref(scenes), memory.ctypes.data)
+        done = self._roll(*map(ctypes.byref, self._walks), ctypes.byref(scenes), memory.ctypes.data)
         np.maximum(self.most, most[: len(self.most)], out=self.most)
         if done < last - first:
             rest.append((first + done, last))
@@ -145,54 +155,59 @@ class CrowdKernel:
 
     def _memory(self, steps: int, gradient: bool) -> MemoryPool:
         if (steps, gradient) not in self._pools:
-            crowd, lanes, data = self.crowd, self.report.lanes, self._data
+            crowd, lanes, (values, taped) = self.crowd, self.report.lanes, self._walks
             bodies = sum(room.members for room in crowd.rooms[1 : 1 + len(crowd.sights)])
             slots = sum(room.members for room in crowd.rooms[1 + len(crowd.sights) :])
-            words = 2 * data.words + (1 + gradient) * (steps + 1) * data.state + data.given
+            words = max(values.words, taped.words) + taped.words if gradient else values.words
+            words += (1 + gradient) * (steps + 1) * values.state + values.given
             bytes_ = steps * (12 * lanes * slots + 4 * len(crowd.meetings)) + 24 * slots + 92 * bodies + 512
-            self._pools = {(steps, gradient): MemoryPool(words + bytes_ // (8 * lanes) + 2, lanes, np.float64)}
+            total = words + bytes_ // (8 * lanes) + 2
+            self._pools = {(steps, gradient): MemoryPool(total, lanes, np.float64, self.prepare)}
         return self._pools[steps, gradient]
 
     def _link(self) -> None:
-        crowd, planned = self.crowd, self._planned
+        """What the driver walks, with room for so many members."""
         self._kept: list[Any] = []
-        rooms, base, species = (_Room * len(crowd.rooms))(), 0, len(crowd.sights)
+        crowd, species = self.crowd, len(self.crowd.sights)
         begins, begin = [0] * len(crowd.rooms), 0
-        for r in [*range(1, 1 + species), 0, *range(1 + species, len(crowd.rooms))]:
+        for r in [*range(1, 1 + species), ONLY, *range(1 + species, len(crowd.rooms))]:
             begins[r] = begin
             begin += crowd.rooms[r].state * crowd.rooms[r].members
-        for r, (room, work) in enumerate(zip(crowd.rooms, planned.work, strict=True)):
-            rooms[r] = _Room(work, room.state, room.members, base, begins[r])
-            base += work * room.members
         kinds = (_Kind * max(len(crowd.meetings), 1))()
         for k, each in enumerate(crowd.meetings):
             plane = 0 if each.second < 0 else -1
             kinds[k] = _Kind(each.first, each.second, plane, (ctypes.c_double * 3)(*each.normal), each.offset)
-        self._kept += [rooms, kinds]
-        sights = np.array([(s.position, s.reach) for s in crowd.sights], np.int64)
+        self._kept.append(kinds)
+        walks = self._planned.values, self._planned.taped
+        self._walks = tuple(self._walked(walk, begins, begin, ctypes.addressof(kinds)) for walk in walks)
+
+    def _walked(self, walk: Walk, begins: Sequence[int], state: int, kinds: int) -> _Crowd:
+        crowd, members = walk.crowd, [room.members for room in self.crowd.rooms]
+        rooms = (_Room * len(members))()
+        bases = np.cumsum([0, *(work * count for work, count in zip(walk.work, members, strict=True))])
+        for r, room in enumerate(crowd.rooms):
+            rooms[r] = _Room(walk.work[r], room.state, members[r], int(bases[r]), begins[r])
+        self._kept.append(rooms)
         ends = 1 + len(crowd.nears) + np.cumsum([0, *map(len, crowd.nears)])
-        lists = planned.loops, self._actions(begins, planned), planned.values, planned.again, planned.back
-        self._data = _Crowd(
-            *(len(crowd.rooms), species, len(planned.loops), base, begin, crowd.given),
+        lists = walk.loops, self._actions(walk, begins, bases), walk.entries, walk.back
+        return _Crowd(
+            *(len(members), len(crowd.sights), len(walk.loops), int(bases[-1]), state, crowd.given),
             *(crowd.found, crowd.looked, crowd.striking),
             ctypes.addressof(rooms),
             *(self._put(each) for each in lists),
-            ctypes.addressof(kinds),
-            self._put(sights),
+            kinds,
+            self._put(np.array([(sight.position, sight.reach) for sight in crowd.sights], np.int64)),
             self._put(np.array([*ends, *(at for words in crowd.nears for at in words)], np.int64)),
         )
 
-    def _actions(self, begins: Sequence[int], planned: CrowdPlan) -> NDArray[np.int64]:
+    def _actions(self, walk: Walk, begins: Sequence[int], bases: NDArray[np.int64]) -> NDArray[np.int64]:
         """With places in the memory in place of rooms."""
-        members = np.array([room.members for room in self.crowd.rooms])
-        work = np.array(planned.work)
-        base = np.cumsum(work * members) - work * members
-        states = np.array([room.state for room in self.crowd.rooms])
-        found = planned.actions.copy()
+        states = np.array([room.state for room in walk.crowd.rooms])
+        found = walk.actions.copy()
         store, room = found[:, 0], found[:, 3].copy()
         kept = (store == Store.BEFORE) | (store == Store.AFTER)
-        found[:, 3] = np.where(store == Store.WORK, work[room], np.where(kept, states[room], 0))
-        found[:, 2] += np.where(store == Store.WORK, base[room], np.where(kept, np.array(begins)[room], 0))
+        found[:, 3] = np.where(store == Store.WORK, np.array(walk.work)[room], np.where(kept, states[room], 0))
+        found[:, 2] += np.where(store == Store.WORK, bases[room], np.where(kept, np.array(begins)[room], 0))
         return found
 
     def _put(self, values: NDArray[Any]) -> int:
@@ -230,7 +245,7 @@ def compile_crowd(
         precision="double",
         functions=len(planned.functions),
         operations=sum(len(graph.nodes) for graph, _ in planned.functions),
-        bytes_per_lane=16 * sum(w * room.members for w, room in zip(planned.work, crowd.rooms, strict=True)),
+        bytes_per_lane=16 * sum(w * room.members for w, room in zip(planned.taped.work, crowd.rooms, strict=True)),
         cached=built.cached,
         seconds=time.perf_counter() - started,
         note=built.note,

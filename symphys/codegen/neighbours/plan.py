@@ -1,7 +1,8 @@
 """From a crowd to what is compiled, and to what the driver walks.
 
-Work of a member is laid out by the loops; the tapes of its calls come after it. Entries of calls have no strides: the
-driver gives a call the work of its member as the whole memory.
+Values and adjoints are walked apart. Where adjoints follow, the work of a member is laid out by the loops, and the
+tapes of its calls come after it. For values alone words are used again. Entries of calls have no strides: the driver
+gives a call the work of its member as the whole memory.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 
 from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.pieces import Form
-from symphys.codegen.emit.plan import NONE, with_adjoints
+from symphys.codegen.emit.plan import NONE, PlannedPhase, with_adjoints
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.neighbours.program import Crowd, MemberCall, Move
+from symphys.codegen.neighbours.reuse import reused
 
 Words = NDArray[np.int64]
 CALLED = 4
@@ -26,42 +28,59 @@ OUT = 8
 
 
 @dataclass(frozen=True)
+class Walk:
+    """What the driver walks.
+
+    Attributes:
+        crowd: with the places of its words.
+        work: words of a member of each room, with tapes.
+        loops: (loops, 5) room, first action, end, end of what is done where the section is left out, its word or -1.
+        actions: (actions, 9) store, of, offset, room, at, size, entry, entry of the adjoint, guard; see
+            ``neighbours.c``, where the offset has the place of the room, and a member's words stand for the room.
+        entries: of calls.
+        back: of adjoints.
+    """
+
+    crowd: Crowd
+    work: tuple[int, ...]
+    loops: Words
+    actions: Words
+    entries: Words
+    back: Words
+
+
+@dataclass(frozen=True)
 class CrowdPlan:
     """What the compiler and the driver need.
 
     Attributes:
         functions: the C functions, in the order of their numbers.
-        work: words of a member of each room, with tapes.
-        loops: (loops, 5) room, first action, end, end of what is done where the section is left out, its word or -1.
-        actions: (actions, 9) store, of, offset, room, at, size, entry, entry of the adjoint, guard; see
-            ``neighbours.c``, where the offset has the place of the room, and a member's words stand for the room.
-        values, again, back: entries of calls: of values alone, with tapes, adjoints.
+        values: for values alone.
+        taped: for values and adjoints.
     """
 
     functions: tuple[tuple[Graph, Form], ...]
-    work: tuple[int, ...]
-    loops: Words
-    actions: Words
-    values: Words
-    again: Words
-    back: Words
+    values: Walk
+    taped: Walk
 
 
 def crowd_plan(crowd: Crowd) -> CrowdPlan:
     """Of a crowd."""
-    return _Planner(crowd).plan()
+    functions = DistinctFunctions()
+    part = with_adjoints(crowd.sample, ["x"], functions, crowd.chains)[0][1]
+    values = _Planner(reused(crowd), part, functions, taped=False).walk()
+    taped = _Planner(crowd, part, functions, taped=True).walk()
+    return CrowdPlan(tuple(functions.listed), values, taped)
 
 
 class _Planner:
-    def __init__(self, crowd: Crowd) -> None:
-        self._crowd, self._functions = crowd, DistinctFunctions()
-        self._part = with_adjoints(crowd.sample, ["x"], self._functions, crowd.chains)[0][1]
+    def __init__(self, crowd: Crowd, part: PlannedPhase, functions: DistinctFunctions, taped: bool) -> None:
+        self._crowd, self._part, self._functions, self._taped = crowd, part, functions, taped
         self._work = [room.work for room in crowd.rooms]
-        self._values: list[int] = []
-        self._again: list[int] = []
+        self._entries: list[int] = []
         self._back: list[int] = []
 
-    def plan(self) -> CrowdPlan:
+    def walk(self) -> Walk:
         """Loops in order, and entries of their calls."""
         loops, actions = list[tuple[int, ...]](), list[tuple[int, ...]]()
         for loop in self._crowd.loops:
@@ -71,41 +90,29 @@ class _Planner:
             end = len(actions)
             actions += [_moved(move) for move in loop.instead]
             loops.append((loop.room, first, end, len(actions), NONE if loop.section is None else loop.section))
-        lists = (np.array(each, np.int64) for each in (loops, actions, self._values, self._again, self._back))
-        return CrowdPlan(tuple(self._functions.listed), tuple(self._work), *lists)
+        lists = (np.array(each, np.int64) for each in (loops, actions, self._entries, self._back))
+        return Walk(self._crowd, tuple(self._work), *lists)
 
     def _called(self, call: MemberCall, room: int) -> tuple[int, ...]:
         part, functions = self._part, self._functions
         function, kind = part.calls.calls[call.number].function, int(part.kind[call.number])
-        forward, reads = functions.forward(function), Form(primal=function.n_in(), adds=False)
-        places, size = [*call.inputs, *call.outputs], sum(map(len, forward.results))
+        forward = functions.forward(function)
+        entry, back, tape = len(self._entries), NONE, list[int]()
+        if self._taped and kind != NONE:
+            adjoint, back = part.kinds[kind], len(self._back)
+            pulled = adjoint.graph
+            if (pair := functions.taped(forward, adjoint.graph)) is not None:
+                tape, forward, pulled = [self._work[room]], pair.forward, pair.adjoint
+                self._work[room] += pair.size
+            primal = [*call.inputs, *tape]
+            form = Form(primal=len(primal), adds=True, backward=True, clears=True)
+            marked = [*_marked(call.outputs, adjoint.outputs), *_marked(call.inputs, adjoint.inputs)]
+            self._back += _entry(functions.number(pulled, form), [*primal, *marked])
+        number = functions.number(forward, Form(primal=function.n_in(), adds=False))
+        self._entries += _entry(number, [*call.inputs, *call.outputs, *tape])
+        size = sum(function.numel_out(k) for k in range(function.n_out()))
         guard = NONE if call.guard is None else call.guard
-        entry = len(self._values)
-        self._values += _entry(functions.number(forward, reads), places)
-        if kind == NONE:
-            self._again += _entry(functions.number(forward, reads), places)
-            self._level()
-            return CALLED, 0, 0, 0, call.outputs[0], size, entry, NONE, guard
-        adjoint = part.kinds[kind]
-        pair = functions.taped(forward, adjoint.graph)
-        tape = []
-        if pair is not None:
-            tape = [self._work[room]]
-            self._work[room] += pair.size
-        self._again += _entry(functions.number(pair.forward if pair else forward, reads), [*places, *tape])
-        self._level()
-        primal = [*call.inputs, *tape]
-        form = Form(primal=len(primal), adds=True, backward=True, clears=True)
-        marked = [*_marked(call.outputs, adjoint.outputs), *_marked(call.inputs, adjoint.inputs)]
-        back = len(self._back)
-        self._back += _entry(functions.number(pair.adjoint if pair else adjoint.graph, form), [*primal, *marked])
         return CALLED, 0, 0, 0, call.outputs[0], size, entry, back, guard
-
-    def _level(self) -> None:
-        """Entries of both lists begin at the same places."""
-        most = max(len(self._values), len(self._again))
-        for each in (self._values, self._again):
-            each += [0] * (most - len(each))
 
 
 def _moved(move: Move) -> tuple[int, ...]:

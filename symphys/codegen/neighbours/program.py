@@ -7,6 +7,9 @@ from enum import IntEnum
 
 from symphys.codegen.program.program import Place, Program
 
+ONLY = 0
+"""The number of the room of what is there once."""
+
 
 class Of(IntEnum):
     """Whose words are copied: a member's own, those of a pair's bodies, what is there once, what a pair had then."""

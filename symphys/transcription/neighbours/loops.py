@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from symphys.codegen.neighbours.program import MemberCall, MemberLoop, Move, Of, Store
+from symphys.codegen.neighbours.program import ONLY, MemberCall, MemberLoop, Move, Of, Store
 from symphys.dynamics.neighbours.sample import TWINS, Sample
 from symphys.dynamics.neighbours.step import RecordedStep
 from symphys.dynamics.tracing.guards import Guard, Part
@@ -20,8 +20,6 @@ from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.errors import SymphysError
 
 NONE = -1
-ONLY = 0
-"""The number of the room of what is there once."""
 
 
 @dataclass(frozen=True)

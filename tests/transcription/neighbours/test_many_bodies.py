@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from symphys import Body, Law, Plane, Scheme
 from symphys.codegen import compile_program
+from symphys.codegen.errors import ProgramError
 from symphys.codegen.neighbours.kernel import CrowdKernel, compile_crowd
 from symphys.codegen.runtime.kernel import ProcessorKernel
 from symphys.dynamics import pgs
@@ -154,6 +155,24 @@ def test_room_for_pairs_grows() -> None:
         alone = kernel.adjoints(row[None], given(kernel, 1), weights[:1])
         assert (alone[0][0] == own).all()
         assert (alone[1][0] == slope).all()
+
+
+def test_no_number_is_read_before_it_is_computed() -> None:
+    """Memories of work that hold no numbers give the same."""
+    world = World(bodies(["sphere"] * 6), PLANES)
+    rows, found = starts(world, 2), []
+    for spoiled in (False, True):
+        kernel = compile_crowd(crowd_of(world, LAW, SCHEME, exact=True), lanes=2, threads=1)
+        if spoiled:
+            kernel.prepare = lambda memory: memory.fill(np.nan)
+        weights = np.zeros((2, 21, rows.shape[1]))
+        weights[:, -1] = 1
+        found.append((kernel.rollouts(rows, given(kernel, 2), 20), *kernel.adjoints(rows, given(kernel, 2), weights)))
+    for one, other in zip(*found, strict=True):
+        assert np.isfinite(one).all()
+        assert (one == other).all()
+    with pytest.raises(ProgramError, match=r"starts have the shape \(2, 3\); wanted is \(batch, 115\)"):
+        kernel.rollouts(rows[:, :3], given(kernel, 2), 1)
 
 
 def test_momentum_and_energy_stay() -> None:
