@@ -50,12 +50,16 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
         start = _team(calls, single) if calls > 1 else head_of(lanes, single, dialect)
         for group in spread(texts, work, FILES):
             found.append(SourceFile("\n".join([start, *group]), narrow=narrow, straight=True))
-    names = [f"f{number}" for number in range(len(plan.functions))]
+    driver = head_of(lanes, single) + listed(len(plan.functions)) + "".join(map(resource, (*DRIVER, "phases.c")))
+    return [*found, SourceFile(driver)]
+
+
+def listed(count: int) -> str:
+    """The functions f0, f1 .. in C, by number, as a driver calls them."""
+    names = [f"f{number}" for number in range(count)]
     declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
-    listed = f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
-    driver = head_of(lanes, single) + listed + "".join(map(resource, (*DRIVER, "phases.c")))
-    return [*found, SourceFile(driver)]
+    return f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
 
 
 def head_of(lanes: int, single: bool, dialect: Dialect = VECTORS) -> str:

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.emit.dialect import ONE_LANE, VECTORS
-from symphys.codegen.emit.source import FILES, SourceFile, head_of, resource, spread
+from symphys.codegen.emit.source import FILES, SourceFile, head_of, listed, resource, spread
 from symphys.codegen.emit.writer import write
-from symphys.codegen.errors import KernelUnavailable, ProgramError
+from symphys.codegen.errors import ProgramError
 from symphys.codegen.neighbours.plan import CrowdPlan, Walk, crowd_plan
 from symphys.codegen.neighbours.program import ONLY, Crowd, Store
+from symphys.codegen.runtime.library import loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.toolchain.build import shared_library
 from symphys.codegen.toolchain.cache import Cache, default_cache
@@ -234,10 +235,7 @@ def compile_crowd(
     lanes = processor().lanes(False) if lanes is None else lanes
     planned = crowd_plan(crowd)
     with shared_library(_sources(planned, lanes), cache or default_cache()) as built:
-        try:
-            library = ctypes.CDLL(str(built.path))
-        except OSError as error:
-            raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
+        library = loaded(built.path)
     report = BuildReport(
         compiler=built.compiler.version,
         flags=built.flags,
@@ -261,7 +259,5 @@ def _sources(planned: CrowdPlan, lanes: int) -> list[SourceFile]:
         texts = [write(f"f{i}", *planned.functions[i], dialect, ()) for i in mine]
         for group in spread(texts, [len(planned.functions[i][0].nodes) for i in mine], FILES):
             found.append(SourceFile("\n".join([head, *group]), straight=True))
-    names = [f"f{number}" for number in range(len(planned.functions))]
-    declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
-    listed = f"static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{', '.join(names) or '0'}}};\n"
-    return [*found, SourceFile(head_of(lanes, single=False) + declared + listed + resource("neighbours.c"))]
+    driver = head_of(lanes, single=False) + listed(len(planned.functions)) + resource("neighbours.c")
+    return [*found, SourceFile(driver)]

@@ -94,6 +94,14 @@ class LinkedCodes:
         return self._addresses.ctypes.data_as(ctypes.c_void_p)
 
 
+def loaded(path: Path) -> ctypes.CDLL:
+    """A compiled library; KernelUnavailable if the system refuses."""
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
+
+
 class Loaded:
     """A kernel's library with the program that it runs."""
 
@@ -101,10 +109,7 @@ class Loaded:
         self, path: Path, program: Program, plan: Plan, seeded: Sequence[str], codes: LinkedCodes | None = None
     ) -> None:
         """Load the library; KernelUnavailable if the system refuses. ``codes``: if it is an interpreter."""
-        try:
-            library = ctypes.CDLL(str(path))
-        except OSError as error:
-            raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
+        library = loaded(path)
         self._evaluate = _prepared(library.evaluate, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
         self._prepare = _prepared(library.prepare, ctypes.c_void_p, ctypes.c_void_p)
         self._begin = _prepared(library.begin, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.codegen.emit.source import FILES, SourceFile, resource, spread
+from symphys.codegen.emit.source import FILES, SourceFile, listed, resource, spread
 from symphys.codegen.emit.writer import write
-from symphys.codegen.errors import KernelUnavailable, ProgramError
+from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.program import Program
+from symphys.codegen.runtime.library import loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.slopes.plan import SlopePlan, slope_plan
 from symphys.codegen.toolchain.build import shared_library
@@ -179,10 +180,7 @@ def compile_slopes(
     if program.zeroed or program.constants:
         raise ProgramError("slopes are of programs without constants")
     with shared_library(_sources(planned, lanes), cache or default_cache()) as built:
-        try:
-            library = ctypes.CDLL(str(built.path))
-        except OSError as error:
-            raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
+        library = loaded(built.path)
     report = BuildReport(
         compiler=built.compiler.version,
         flags=built.flags,
@@ -208,7 +206,4 @@ def _sources(planned: SlopePlan, lanes: int) -> list[SourceFile]:
         work = [len(planned.functions[i][0].nodes) for i in mine]
         for group in spread([texts[i] for i in mine], work, FILES):
             found.append(SourceFile("\n".join([head, *group]), straight=True))
-    names = [f"f{number}" for number in range(len(texts))]
-    declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
-    listed = f"static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{', '.join(names) or '0'}}};\n"
-    return [*found, SourceFile(head + declared + listed + resource("slopes.c"))]
+    return [*found, SourceFile(head + listed(len(planned.functions)) + resource("slopes.c"))]
