@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import re
+from contextlib import suppress
 from dataclasses import is_dataclass
+from inspect import get_annotations
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -111,9 +113,20 @@ def keep_sentences(app: Sphinx, what: str, name: str, described: object, options
             lines[k] = line.replace(shared[1], shared[1].replace(", ", "/"), 1)
 
 
+def known_hints(described: type) -> dict[str, Any]:
+    """Types of a class's fields; those that a module imports for type checkers alone are left out."""
+    found: dict[str, Any] = {}
+    for base in reversed(described.__mro__):
+        for field, text in get_annotations(base).items():
+            one = type("One", (), {"__annotations__": {field: text}, "__module__": base.__module__})
+            with suppress(NameError):
+                found |= get_type_hints(one, include_extras=True)
+    return found
+
+
 def show_shapes(app: Sphinx, what: str, name: str, described: object, options: object, lines: list[str]) -> None:
     """``Annotated[Array, "N, B, 3"]`` of a field becomes (N, B, 3); public classes go by their names alone."""
-    hints = get_type_hints(described, include_extras=True) if is_dataclass(described) else {}
+    hints = known_hints(described) if is_dataclass(described) and isinstance(described, type) else {}
     texts = {field: getattr(hint, "__metadata__", ("",))[0] for field, hint in hints.items()}
     shapes = {
         field: text if "," in text else f"{text}," for field, text in texts.items() if isinstance(text, str) and text
