@@ -75,7 +75,8 @@ def floors(program: Program) -> None:
 
 def told(program: Program, architecture: str) -> None:
     """Registers and spills, from the compiler."""
-    texts, began = device_sources(plan(program, ["merit"], FAST_MEMORY), 32, WARPS, single=False), time.perf_counter()
+    planned, began = plan(program, ["merit"], FAST_MEMORY, noted=False), time.perf_counter()
+    texts = device_sources(planned, program.steps, 32, WARPS, single=False)
     try:
         log = "\n".join(said for _, said in compiled(texts, architecture, ["--ptxas-options=-v"]))
     except KernelUnavailable as error:

@@ -125,7 +125,7 @@ def compile_on(
     began, single = time.perf_counter(), precision == "single"
     names = names_of(program, seeded)
     planned = plan(program, names, FAST_MEMORY, noted=False)  # without a tape: memory is what a device waits for
-    texts = device_sources(planned, device.lanes, warps, single)
+    texts = device_sources(planned, program.steps, device.lanes, warps, single)
     module, compiler, cached, note = device.load(texts)
     report = BuildReport(
         compiler=compiler,

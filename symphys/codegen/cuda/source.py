@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
+from symphys.codegen.cuda.apart import results_apart
 from symphys.codegen.emit import source
 from symphys.codegen.emit.dialect import DEVICE
 from symphys.codegen.emit.planned import Plan
@@ -17,10 +18,14 @@ FILES = 24
 SIGNATURE = "(V *m, V *b, const word *t, word k)"
 
 
-def device_sources(planned: Plan, lanes: int, warps: int, single: bool) -> list[str]:
+def device_sources(planned: Plan, steps: int, lanes: int, warps: int, single: bool) -> list[str]:
     """The texts of a plan's kernels, for blocks of so many robots and warps; the last one is the driver's."""
     head = f"#define LANES {lanes}\n#define WARPS {warps}\n#define SINGLE {int(single)}\n{resource('device.h')}"
-    texts = [write(f"f{number}", graph, form, DEVICE) for number, (graph, form) in enumerate(planned.functions)]
+    apart = results_apart(planned, steps)
+    texts = [
+        write(f"f{number}", graph, form, DEVICE, apart=apart[number] if form.adds else ())
+        for number, (graph, form) in enumerate(planned.functions)
+    ]
     work = [len(graph.nodes) for graph, _ in planned.functions]
     names = [f"f{number}" for number in range(len(texts))]
     declared = "".join(f"{DEVICE.entry} {name}{SIGNATURE};\n" for name in names)

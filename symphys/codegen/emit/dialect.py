@@ -22,6 +22,7 @@ class Dialect:
         entry: how a function begins that the driver calls.
         memory: type of the memories.
         fuses: whether adjoints have fused products, written out: all compilers give the same bits, at any level.
+        ahead: loads that come together, ahead of what uses them; 0: each where it is used.
     """
 
     forms: Mapping[str, str]
@@ -34,6 +35,7 @@ class Dialect:
     entry: str = "void"
     memory: str = "V *"
     fuses: bool = True
+    ahead: int = 0
 
 
 VECTORS = Dialect(FORMS)
@@ -49,5 +51,6 @@ DEVICE = Dialect(
     apart="static __device__ __noinline__ void",
     entry='extern "C" __device__ void',
     fuses=False,
+    ahead=64,
 )
 """Memories are interleaved: LANES apart lie the words of one thread."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from symphys.codegen.emit.dialect import VECTORS, Dialect
+from symphys.codegen.emit.lines import Lines
 from symphys.codegen.emit.pieces import Form, GraphPiece, pieces_of
 from symphys.codegen.emit.shapes import PlaceWords, Shape, TeamWords
 from symphys.codegen.graph.graph import Graph
@@ -19,14 +20,16 @@ def write(
     dialect: Dialect = VECTORS,
     moving: Collection[int] | None = None,
     shape: Shape | None = None,
+    apart: Collection[int] = (),
 ) -> str:
     """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step.
 
-    ``moving``: the pairs that may have a stride; None: all. ``shape``: of a function for one rollout alone.
+    ``moving``: the pairs that may have a stride; None: all. ``shape``: of a function for one rollout alone. ``apart``:
+    the results that meet no other in any call.
     """
     words = PlaceWords(dialect.word) if shape is None else TeamWords(shape, len(graph.sizes), form.backward)
     cut = pieces_of(graph, form, dialect.fuses)
-    graph, pieces = cut.graph, [_Written(piece, dialect, words) for piece in cut.pieces]
+    graph, pieces = cut.graph, [_Written(piece, dialect, words, apart) for piece in cut.pieces]
     pointers = _pointers(graph, form, dialect, words)
     parameters = ", ".join(f"{kind}{pointer}" for kind, pointer, _ in pointers) + ", V *restrict w"
     text = []
@@ -49,30 +52,31 @@ class _Written:
     piece: GraphPiece
     dialect: Dialect
     words: PlaceWords
+    apart: Collection[int] = ()
 
     def statements(self, graph: Graph, form: Form) -> list[str]:
         """Its C statements."""
         names: dict[int, str] = {}
-        lines: list[str] = []
+        lines = Lines(self.dialect.ahead)
         piece = self.piece
         for x in piece.nodes:
             node = graph.nodes[x]
             operands = [self._use(graph, y, names, lines, form) for y in node.operands]
             if x in piece.fused:
                 product = f"FMA({operands[0]}, {operands[1]}, {{}})"
-                lines += (self.words.add(f"o{r}", word, product) for r, word, _ in piece.targets[x])
+                for r, word, _ in piece.targets[x]:
+                    lines.store(self.words.add(f"o{r}", word, product))
                 continue
-            lines.append(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
+            lines.compute(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
             names[x] = f"v{x}"
             if x in piece.slots:
-                lines.append(f"w[{piece.slots[x]}] = (V)v{x};")
-            lines += self._stores(graph, x, names[x], form.adds)
+                lines.compute(f"w[{piece.slots[x]}] = (V)v{x};")
+            self._stores(graph, x, names[x], lines, form.adds)
         for x in piece.copied():
-            value = self._use(graph, x, names, lines, form)
-            lines += self._stores(graph, x, value, form.adds)
-        return lines
+            self._stores(graph, x, self._use(graph, x, names, lines, form), lines, form.adds)
+        return lines.all()
 
-    def _use(self, graph: Graph, x: int, names: dict[int, str], lines: list[str], form: Form) -> str:
+    def _use(self, graph: Graph, x: int, names: dict[int, str], lines: Lines, form: Form) -> str:
         """How a value is called here; what comes from elsewhere is loaded first."""
         node = graph.nodes[x]
         if node.op == "const":
@@ -82,16 +86,20 @@ class _Written:
             source = self.words.load(f"i{node.at[0]}", node.at[1]) if given else f"w[{self.piece.slots[x]}]"
             names[x] = f"v{x}"
             value = f"ALL({source})" if given and form.shared and node.at[0] < form.primal else source
-            lines.append(f"const {_type(node.op)} v{x} = ({_type(node.op)}){value};")
+            lines.load(f"const {_type(node.op)} v{x} = ({_type(node.op)}){value};")
         return names[x]
 
-    def _stores(self, graph: Graph, x: int, value: str, adds: bool) -> Iterator[str]:
+    def _stores(self, graph: Graph, x: int, value: str, lines: Lines, adds: bool) -> None:
         node = graph.nodes[x]
         if adds and node.op == "const" and float.fromhex(node.value) == 0:
             return
         for r, first, count in self.piece.targets.get(x, ()):
+            if adds and count == 1 and r in self.apart:
+                lines.add(self.words.load(f"o{r}", first), value)
+                continue
             loop = f"for (int j = {first}; j < {first + count}; j++) " if count > 1 else ""
-            yield loop + (self.words.add if adds else self.words.store)(f"o{r}", first if count == 1 else "j", value)
+            write = self.words.add if adds else self.words.store
+            lines.store(loop + write(f"o{r}", first if count == 1 else "j", value))
 
 
 def _type(op: str) -> str:

@@ -76,7 +76,7 @@ def test_a_hundred_steps_with_contact_are_the_processors(tmp_path: Path) -> None
 
 def test_nvrtc_compiles_and_links_it_for_recent_architectures() -> None:
     pytest.importorskip("cuda.bindings.nvrtc", reason="NVRTC is part of the extra symphys[cuda]")
-    texts = device_sources(plan(hopping(), SEEDED, FAST_MEMORY), 32, 4, single=False)
+    texts = device_sources(plan(hopping(), SEEDED, FAST_MEMORY), hopping().steps, 32, 4, single=False)
     ((_, said),) = compiled(texts[-1:], "sm_120", ["--ptxas-options=-v"])
     assert re.search("Compiling entry function 'advance' for 'sm_120'", said)
     objects = [part for part, _ in compiled(texts, "sm_90")]
@@ -90,7 +90,7 @@ def test_nvrtc_compiles_and_links_it_for_recent_architectures() -> None:
 def test_what_was_compiled_is_kept(tmp_path: Path) -> None:
     pytest.importorskip("cuda.bindings.nvrtc", reason="NVRTC is part of the extra symphys[cuda]")
     cache = Cache(tmp_path / "cache")
-    texts = device_sources(plan(programs.pendulum(), SEEDED, FAST_MEMORY), 32, 1, single=True)
+    texts = device_sources(plan(programs.pendulum(), SEEDED, FAST_MEMORY), programs.STEPS, 32, 1, single=True)
     first, again = (image(texts, "sm_90", cache, tmp_path) for _ in range(2))
     assert (first.cached, again.cached, first.path) == (False, True, again.path)
     assert first.path.suffix == ".cubin"
@@ -127,5 +127,10 @@ def test_a_gpu_gives_the_processors_numbers(gpu: Any, warps: int) -> None:
 
 @pytest.mark.gpu
 def test_a_gpu_in_single_precision(gpu: Any) -> None:
+    """Of some starts its gradient cancels to nothing that is right, on a processor too."""
     here = compile_program(hopping(), seeded=SEEDED, threads=1)
-    agree(compile_on(gpu, hopping(), "single", SEEDED), here, points(33), 1e-2)
+    there = compile_on(gpu, hopping(), "single", SEEDED)
+    (outputs, gradient), (wanted, slopes) = (kernel.gradient(points(33), [1.0], [0.0]) for kernel in (there, here))
+    np.testing.assert_allclose(outputs["merit"], wanted["merit"], rtol=1e-5)
+    errors = np.linalg.norm(gradient - slopes, axis=1) / np.linalg.norm(slopes, axis=1)
+    assert 1e-9 < np.median(errors) < 1e-5
