@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +14,12 @@ from symphys.codegen.cuda.compiler import ADVICE, image
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.build import temporary_folder
 from symphys.codegen.toolchain.cache import Cache, default_cache
-from symphys.codegen.toolchain.temporary import TemporaryFolder
 
 SPARED = 2**28
 """[bytes] left to others, and to what a launch needs: stacks of all resident threads."""
+
+FIRST = "begin"
+"""A kernel that all modules have."""
 
 
 class Gpu:
@@ -31,16 +32,14 @@ class Gpu:
         self.name, self.lanes = properties["name"].decode(), int(properties["warpSize"])
         self.architecture = f"sm_{properties['major']}{properties['minor']}"
 
-    @cached_property
-    def folder(self) -> TemporaryFolder:
-        """For images that no cache takes; KernelUnavailable if there is no room for one."""
-        return temporary_folder("symphys-cuda-")
-
     def load(self, texts: Sequence[str]) -> tuple[Any, str, bool, str]:
         """See ``Device``."""
-        found = image(texts, self.architecture, self.cache, Path(self.folder.name))
-        with self._told():
-            return self.cupy.RawModule(path=str(found.path)), found.compiler, found.cached, found.note
+        with temporary_folder("symphys-cuda-") as folder:
+            found = image(texts, self.architecture, self.cache, Path(folder))
+            with self._told():
+                module = self.cupy.RawModule(path=str(found.path))
+                module.get_function(FIRST)  # CuPy reads the file when it is asked for the first kernel
+        return module, found.compiler, found.cached, found.note
 
     def free(self) -> int:
         """See ``Device``."""

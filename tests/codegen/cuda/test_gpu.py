@@ -12,6 +12,7 @@ import pytest
 
 from symphys.codegen import Cache, KernelUnavailable
 from symphys.codegen.cuda import find_gpu
+from symphys.codegen.cuda.compiler import Image
 from symphys.codegen.cuda.gpu import Gpu
 
 
@@ -83,3 +84,27 @@ def test_a_fault_of_ours_is_not_cudas(tmp_path: Path) -> None:
     gpu = Gpu(cupy(), Cache(tmp_path))
     with pytest.raises(TypeError):
         gpu.empty(("three",), float)  # type: ignore[arg-type]
+
+
+def test_an_image_that_no_cache_takes_is_read_before_its_folder_goes(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    read = []
+
+    class Module:
+        """CuPy's, which opens its file late."""
+
+        def __init__(self, path: str) -> None:
+            self.path = Path(path)
+
+        def get_function(self, name: str) -> None:
+            read.append((name, self.path.read_bytes()))
+
+    def built(texts: object, architecture: str, cache: Cache, folder: Path) -> Image:
+        (folder / "image").write_bytes(b"of a kernel")
+        return Image(folder / "image", "nvrtc 12.9", cached=False, note="not kept")
+
+    monkeypatch.setattr("symphys.codegen.cuda.gpu.image", built)
+    module, *told = Gpu(cupy(RawModule=Module), Cache(tmp_path)).load([])
+    assert (read, told) == ([("begin", b"of a kernel")], ["nvrtc 12.9", False, "not kept"])
+    assert not module.path.parent.exists()
