@@ -45,23 +45,37 @@ typedef struct {
   char *scratch;
 } scene;
 
+/* A vector of a word of each lane, put together before it is stored: a processor waits long for a wide load of what was
+   stored in parts just before. And the other way, where compilers' scatters are slow. */
+static inline V gathered(R *const *other, word w) {
+  V x = S(0.0);
+  for (word l = 0; l < LANES; l++) LANE(x, l) = other[l][w * LANES];
+  return x;
+}
+
+static inline void scatter(R *const *other, word w, V x) {
+  for (word l = 0; l < LANES; l++) *(volatile R *)(other[l] + w * LANES) = LANE(x, l);
+}
+
 /* A copy in which each lane has members of its own; lanes without a pair have no effect. */
-static NOINLINE void copy_lanes(const action *a, const near *p, V *there, V *here, int gains) {
-  word out = a->of & OUT, of = a->of & ~OUT;
+static NOINLINE void copy_lanes(const action *a, const near *p, V *there, V *own, int gains) {
+  word out = a->of & OUT, of = a->of & ~OUT, missing = 0;
+  R spare[a->size * LANES], *other[LANES];
   for (word l = 0; l < LANES; l++) {
     word k = of == FIRST ? p->first[l] : of == SECOND ? p->second[l] : of == THEN ? p->before[l] : 0;
-    if (k < 0 || (out && p->before[l] == -2)) {
-      if (!out)
-        for (word w = 0; w < a->size; w++) LANE(here[a->at + w], l) = 0;
-      continue;
-    }
-    V *other = there + k * a->pitch, *own = here + a->at;
-    for (word w = 0; w < a->size; w++)
-      if (gains && out) LANE(own[w], l) += LANE(other[w], l), LANE(other[w], l) = 0;
-      else if (gains) LANE(other[w], l) += LANE(own[w], l), LANE(own[w], l) = 0;
-      else if (out) LANE(other[w], l) = LANE(own[w], l);
-      else LANE(own[w], l) = LANE(other[w], l);
+    int is = k >= 0 && !(out && p->before[l] == -2);
+    other[l] = is ? (R *)(there + k * a->pitch) + l : spare;
+    missing |= !is;
   }
+  if (missing) memset(spare, 0, sizeof(spare));
+  if (out && gains)
+    for (word w = 0; w < a->size; w++) own[w] += gathered(other, w), scatter(other, w, S(0.0));
+  else if (gains)
+    for (word w = 0; w < a->size; w++) scatter(other, w, gathered(other, w) + own[w]), own[w] = S(0.0);
+  else if (out)
+    for (word w = 0; w < a->size; w++) scatter(other, w, own[w]);
+  else
+    for (word w = 0; w < a->size; w++) own[w] = gathered(other, w);
 }
 
 /* Word by word: a processor waits long for a wide load of what was stored in parts just before. */
@@ -75,7 +89,7 @@ static inline __attribute__((always_inline)) void copy(
   word out = a->of & OUT, of = a->of & ~OUT;
 #if LANES > 1
   if (of == FIRST || of == SECOND || of == THEN || (out && of == ONCE && p)) {
-    copy_lanes(a, p, there, here, gains);
+    copy_lanes(a, p, there, own, gains);
     return;
   }
   word k = of == OWN ? i : 0;
