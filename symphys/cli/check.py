@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 BUILDING, BUILDING_TAKES = "building the problem", 8.0
 """What comes before an examination, and about how long it takes beside the parts of that."""
 
+FOUND = "of all with all; each step finds the pairs that are near"
+
 
 @click.command()
 @click.argument("source", metavar="FILE", shell_complete=complete_problem)
@@ -98,13 +100,14 @@ def describe(problem: Problem) -> list[str]:
     from symphys.problem.recordings.summary import recording_lines
 
     world, simulation = problem.world(), problem.simulation
+    pairs = dict.fromkeys(pair.name.partition(":")[0] for pair in world.pairs)
     free = ", before a variable sets it" if problem.free_duration else ""
     lines = [
         f"{problem.name}: {problem.title}",
         f"  time         {simulation.duration:g} s in {simulation.steps} steps of {simulation.dt:g} s{free}",
         f"  bodies       {listed(body.name for body in world.bodies)}",
         f"  planes       {listed(plane.name for plane in world.statics)}",
-        f"  contacts     {listed(dict.fromkeys(pair.name.partition(':')[0] for pair in world.pairs))}",
+        f"  contacts     {FOUND if problem.parametric.finds_pairs else listed(pairs)}",
     ]
     if world.joints:
         lines.append(f"  joints       {listed(f'{joint.name} ({joint.kind.name})' for joint in world.joints)}")

@@ -41,33 +41,46 @@ typedef struct {
   int32_t *used;            /* (steps, kinds) */
   int32_t *active, *count;  /* (slots) those that are near in the step, by kind; (kinds) how many */
   word slots;
+  const word *before; /* (kinds) the number of the first pair of a kind among all */
   char *scratch;
 } scene;
 
-/* The number of the first pair of a room among all. */
-static word slots_before(const crowd *c, word room) {
-  word slots = 0;
-  for (word r = 1 + c->species; r < room; r++) slots += c->list[r].members;
-  return slots;
+/* A vector of a word of each lane, put together before it is stored: a processor waits long for a wide load of what was
+   stored in parts just before. And the other way, where compilers' scatters are slow. */
+static inline V gathered(R *const *other, word w) {
+  V x = S(0.0);
+  for (word l = 0; l < LANES; l++) LANE(x, l) = other[l][w * LANES];
+  return x;
+}
+
+static inline void scatter(R *const *other, word w, V x) {
+  for (word l = 0; l < LANES; l++) *(volatile R *)(other[l] + w * LANES) = LANE(x, l);
 }
 
 /* A copy in which each lane has members of its own; lanes without a pair have no effect. */
-static NOINLINE void copy_lanes(const action *a, const near *p, V *there, V *here, int gains) {
-  word out = a->of & OUT, of = a->of & ~OUT;
+static NOINLINE void copy_lanes(const action *a, const near *p, V *there, V *own, int gains) {
+  word out = a->of & OUT, of = a->of & ~OUT, missing = 0;
+  R spare[a->size * LANES], *other[LANES];
   for (word l = 0; l < LANES; l++) {
     word k = of == FIRST ? p->first[l] : of == SECOND ? p->second[l] : of == THEN ? p->before[l] : 0;
-    if (k < 0 || (out && p->before[l] == -2)) {
-      if (!out)
-        for (word w = 0; w < a->size; w++) LANE(here[a->at + w], l) = 0;
-      continue;
-    }
-    V *other = there + k * a->pitch, *own = here + a->at;
-    for (word w = 0; w < a->size; w++)
-      if (gains && out) LANE(own[w], l) += LANE(other[w], l), LANE(other[w], l) = 0;
-      else if (gains) LANE(other[w], l) += LANE(own[w], l), LANE(own[w], l) = 0;
-      else if (out) LANE(other[w], l) = LANE(own[w], l);
-      else LANE(own[w], l) = LANE(other[w], l);
+    int is = k >= 0 && !(out && p->before[l] == -2);
+    other[l] = is ? (R *)(there + k * a->pitch) + l : spare;
+    missing |= !is;
   }
+  if (missing) memset(spare, 0, sizeof(spare));
+  if (out && gains)
+    for (word w = 0; w < a->size; w++) own[w] += gathered(other, w), scatter(other, w, S(0.0));
+  else if (gains)
+    for (word w = 0; w < a->size; w++) scatter(other, w, gathered(other, w) + own[w]), own[w] = S(0.0);
+  else if (out)
+    for (word w = 0; w < a->size; w++) scatter(other, w, own[w]);
+  else
+    for (word w = 0; w < a->size; w++) own[w] = gathered(other, w);
+}
+
+/* Word by word: a processor waits long for a wide load of what was stored in parts just before. */
+static inline void move(V *to, const V *from, word size) {
+  for (word w = 0; w < size; w++) ((volatile V *)to)[w] = ((const volatile V *)from)[w];
 }
 
 static inline __attribute__((always_inline)) void copy(
@@ -76,7 +89,7 @@ static inline __attribute__((always_inline)) void copy(
   word out = a->of & OUT, of = a->of & ~OUT;
 #if LANES > 1
   if (of == FIRST || of == SECOND || of == THEN || (out && of == ONCE && p)) {
-    copy_lanes(a, p, there, here, gains);
+    copy_lanes(a, p, there, own, gains);
     return;
   }
   word k = of == OWN ? i : 0;
@@ -88,11 +101,11 @@ static inline __attribute__((always_inline)) void copy(
   }
 #endif
   there += k * a->pitch;
-  for (word w = 0; w < a->size; w++)
-    if (gains && out) own[w] += there[w], there[w] = S(0.0);
-    else if (gains) there[w] += own[w], own[w] = S(0.0);
-    else if (out) there[w] = own[w];
-    else own[w] = there[w];
+  if (!gains && out) move(there, own, a->size);
+  else if (!gains) move(own, there, a->size);
+  for (word w = 0; gains && w < a->size; w++)
+    if (out) own[w] += there[w], there[w] = S(0.0);
+    else there[w] += own[w], own[w] = S(0.0);
 }
 
 /* Which pairs may act: reaches and what strikes are at least what the calls go by. */
@@ -116,6 +129,70 @@ static int64_t cell_of(double x, double width) {
   return cell > -1e15 && cell < 1e15 ? (int64_t)cell : 0;
 }
 
+enum { FEW = 32 };
+typedef struct {
+  const crowd *c;
+  word bodies;
+  double strikes;
+  double (*seen)[4];
+  int32_t *whose, *number; /* species of a body, and which of it */
+  found *list;
+  word *counts, *starts;
+} hunt;
+
+static inline void put(const hunt *h, word q, word first, word second, uint64_t key) {
+  if (h->counts[q] < h->c->list[1 + h->c->species + q].members)
+    h->list[h->starts[q] + h->counts[q]] = (found){key, h->number[first], h->number[second]};
+  h->counts[q]++;
+}
+
+static void meet_planes(const hunt *h, word n) {
+  word kinds = h->c->rooms - 1 - h->c->species;
+  for (word q = 0; q < kinds; q++) {
+    const kind *e = h->c->kinds + q;
+    if (e->plane < 0 || e->first != h->whose[n]) continue;
+    double height = -e->offset;
+    for (word w = 0; w < 3; w++) height += e->normal[w] * h->seen[n][w];
+    if (!(height > h->seen[n][3] + h->strikes)) put(h, q, n, n, n);
+  }
+}
+
+static inline void meet(const hunt *h, word n, word o) {
+  double square = 0, reach = h->seen[n][3] + h->seen[o][3] + h->strikes;
+  for (word w = 0; w < 3; w++) square += (h->seen[n][w] - h->seen[o][w]) * (h->seen[n][w] - h->seen[o][w]);
+  if (square > reach * reach * (1 + 1e-9)) return;
+  word kinds = h->c->rooms - 1 - h->c->species;
+  for (word q = 0; q < kinds; q++) {
+    const kind *e = h->c->kinds + q;
+    if (e->plane >= 0) continue;
+    word i = -1, j = -1;
+    if (e->first == h->whose[o] && e->second == h->whose[n]) i = o, j = n;
+    else if (e->first == h->whose[n] && e->second == h->whose[o]) i = n, j = o;
+    if (i < 0) continue;
+    put(h, q, i, j, (uint64_t)((i + j) % h->bodies) * h->bodies + i);
+    return;
+  }
+}
+
+static uint64_t bucket_of(int64_t x, int64_t y, int64_t z, word buckets) {
+  return ((uint64_t)x * 73856093u ^ (uint64_t)y * 19349663u ^ (uint64_t)z * 83492791u) & (buckets - 1);
+}
+
+/* Bodies meet those before them in the cells around their own, which are as wide as the farthest that two can act. */
+static void meet_neighbours(const hunt *h, double width, int64_t (*cells)[3], int32_t *next, int32_t *heads, word buckets) {
+  memset(heads, -1, buckets * sizeof(*heads));
+  for (word n = 0; n < h->bodies; n++) {
+    for (word w = 0; w < 3; w++) cells[n][w] = cell_of(h->seen[n][w], width);
+    for (int beside = 0; beside < 27; beside++) {
+      int64_t x = cells[n][0] + beside % 3 - 1, y = cells[n][1] + beside / 3 % 3 - 1, z = cells[n][2] + beside / 9 - 1;
+      for (int32_t o = heads[bucket_of(x, y, z, buckets)]; o >= 0; o = next[o])
+        if (cells[o][0] == x && cells[o][1] == y && cells[o][2] == z) meet(h, n, o);
+    }
+    int32_t *head = heads + bucket_of(cells[n][0], cells[n][1], cells[n][2], buckets);
+    next[n] = *head, *head = n;
+  }
+}
+
 static int search(const scene *s, word k, word l, word *most) {
   const crowd *c = s->c;
   word kinds = c->rooms - 1 - c->species, bodies = 0;
@@ -123,7 +200,7 @@ static int search(const scene *s, word k, word l, word *most) {
   double (*seen)[4] = (double (*)[4])s->scratch;
   int64_t (*cells)[3] = (int64_t (*)[3])(seen + bodies);
   int32_t *whose = (int32_t *)(cells + bodies), *number = whose + bodies, *next = number + bodies, *heads = next + bodies;
-  word buckets = 1;
+  word buckets = 1, counts[kinds + 1], starts[kinds + 1];
   while (buckets < 2 * bodies) buckets *= 2;
   found *list = (found *)(((uintptr_t)(heads + buckets) + 7) / 8 * 8);
   double strikes = LANE(s->m[c->list[0].base + c->striking], l), width = 0;
@@ -133,53 +210,13 @@ static int search(const scene *s, word k, word l, word *most) {
       whose[n] = q, number[n] = i;
       if (seen[n][3] > width) width = seen[n][3];
     }
-  width = 2 * width + strikes;
-  memset(heads, -1, buckets * sizeof(*heads));
-  word counts[kinds], starts[kinds], room = 0;
-  for (word q = 0; q < kinds; q++) counts[q] = 0, starts[q] = room, room += c->list[1 + c->species + q].members;
-#define PUT(q, i, j, lead) { \
-    if (counts[q] < c->list[1 + c->species + q].members) \
-      list[starts[q] + counts[q]] = (found){(uint64_t)(((i) + (j)) % bodies) * bodies + (lead), 0, 0}, \
-      list[starts[q] + counts[q]].first = number[i], list[starts[q] + counts[q]].second = number[j]; \
-    counts[q]++; \
-  }
+  for (word q = 0; q < kinds; q++) counts[q] = 0, starts[q] = s->before[q];
+  hunt h = {c, bodies, strikes, seen, whose, number, list, counts, starts};
   for (word n = 0; n < bodies; n++) {
-    for (word w = 0; w < 3; w++) cells[n][w] = cell_of(seen[n][w], width);
-    for (word q = 0; q < kinds; q++) {
-      const kind *e = c->kinds + q;
-      if (e->plane < 0 || e->first != whose[n]) continue;
-      double height = -e->offset;
-      for (word w = 0; w < 3; w++) height += e->normal[w] * seen[n][w];
-      if (!(height > seen[n][3] + strikes)) {
-        if (counts[q] < c->list[1 + c->species + q].members)
-          list[starts[q] + counts[q]] = (found){(uint64_t)n, number[n], number[n]};
-        counts[q]++;
-      }
-    }
-    for (int near_by = 0; near_by < 27; near_by++) {
-      int64_t x = cells[n][0] + near_by % 3 - 1, y = cells[n][1] + near_by / 3 % 3 - 1, z = cells[n][2] + near_by / 9 - 1;
-      uint64_t bucket = ((uint64_t)x * 73856093u ^ (uint64_t)y * 19349663u ^ (uint64_t)z * 83492791u) & (buckets - 1);
-      for (int32_t o = heads[bucket]; o >= 0; o = next[o]) {
-        if (cells[o][0] != x || cells[o][1] != y || cells[o][2] != z) continue;
-        double square = 0, reach = seen[n][3] + seen[o][3] + strikes;
-        for (word w = 0; w < 3; w++) square += (seen[n][w] - seen[o][w]) * (seen[n][w] - seen[o][w]);
-        if (square > reach * reach * (1 + 1e-9)) continue;
-        for (word q = 0; q < kinds; q++) {
-          const kind *e = c->kinds + q;
-          if (e->plane >= 0) continue;
-          word i = -1, j = -1;
-          if (e->first == whose[o] && e->second == whose[n]) i = o, j = n;
-          else if (e->first == whose[n] && e->second == whose[o]) i = n, j = o;
-          if (i < 0) continue;
-          PUT(q, i, j, i)
-          break;
-        }
-      }
-    }
-    uint64_t bucket = ((uint64_t)cells[n][0] * 73856093u ^ (uint64_t)cells[n][1] * 19349663u ^
-                       (uint64_t)cells[n][2] * 83492791u) & (buckets - 1);
-    next[n] = heads[bucket], heads[bucket] = n;
+    meet_planes(&h, n);
+    for (word o = 0; bodies <= FEW && o < n; o++) meet(&h, n, o);
   }
+  if (bodies > FEW) meet_neighbours(&h, 2 * width + strikes, cells, next, heads, buckets);
   int fits = 1;
   for (word q = 0; q < kinds; q++) {
     word room_for = c->list[1 + c->species + q].members;
@@ -227,7 +264,7 @@ static void list_near(const scene *s, word k) {
   const crowd *c = s->c;
   word kinds = c->rooms - 1 - c->species;
   for (word q = 0; q < kinds; q++) {
-    word room = 1 + c->species + q, first = slots_before(c, room), n = 0;
+    word room = 1 + c->species + q, first = s->before[q], n = 0;
     const word *near_words = c->nears + c->nears[q], *end = c->nears + c->nears[q + 1];
     for (word i = 0; i < s->used[k * kinds + q]; i++) {
       const V *here = s->m + c->list[room].base + i * c->list[room].work;
@@ -241,43 +278,51 @@ static void list_near(const scene *s, word k) {
   }
 }
 
-/* Which members a loop goes through, and its actions. */
-typedef struct { word count; const int32_t *listed; const near *pairs; const action *first, *end; } round;
+/* The members that loops go through, by room: the pairs that were found, then those that are near. */
+typedef struct { word count; const int32_t *listed; const near *pairs; } round;
 
-static round round_of(const scene *s, word n, word k) {
+static void rounds_of(const scene *s, word k, int listed, round *rounds) {
   const crowd *c = s->c;
-  const loop *o = c->order + n;
-  word kinds = c->rooms - 1 - c->species, q = o->room - 1 - c->species, slots = slots_before(c, o->room);
+  word kinds = c->rooms - 1 - c->species;
+  for (word r = 0; r <= c->species; r++) rounds[r] = (round){c->list[r].members, 0, 0};
+  for (word q = 0; q < kinds; q++)
+    rounds[1 + c->species + q] = (round){
+        listed ? s->count[q] : s->used[k * kinds + q], listed ? s->active + s->before[q] : 0,
+        s->pairs + k * s->slots + s->before[q]};
+}
+
+/* What a loop does: where a section is without effect, something else. */
+static const action *actions_of(const scene *s, const loop *o, const action **end) {
+  const crowd *c = s->c;
   int other = o->section >= 0 && !any(s->m + c->list[0].base + o->section);
-  round r = {.first = c->actions + (other ? o->end : o->first), .end = c->actions + (other ? o->other : o->end)};
-  if (q < 0) r.count = c->list[o->room].members;
-  else {
-    r.pairs = s->pairs + k * s->slots + slots;
-    r.count = n < c->looked ? s->used[k * kinds + q] : s->count[q];
-    if (n >= c->looked) r.listed = s->active + slots;
-  }
-  if (r.first == r.end) r.count = 0;
-  return r;
+  *end = c->actions + (other ? o->other : o->end);
+  return c->actions + (other ? o->end : o->first);
 }
 
 static int step(const scene *s, word k, word *most) {
   const crowd *c = s->c;
   word kinds = c->rooms - 1 - c->species;
   V *stores[] = {s->m, s->x + k * c->state, s->x + (k + 1) * c->state, s->given};
+  round rounds[c->rooms];
+  rounds_of(s, k, 0, rounds);
   for (word n = 0; n < c->loops; n++) {
     if (n == c->found && most) {
       memset(s->used + k * kinds, 0, kinds * sizeof(*s->used));
       for (word l = 0; l < LANES; l++)
         if (!search(s, k, l, most)) return 0;
+      rounds_of(s, k, 0, rounds);
     }
-    if (n == c->looked) list_near(s, k);
-    round r = round_of(s, n, k);
-    const room *own = c->list + c->order[n].room;
+    if (n == c->looked) list_near(s, k), rounds_of(s, k, 1, rounds);
+    const loop *o = c->order + n;
+    const round r = rounds[o->room];
+    if (!r.count) continue;
+    const room *own = c->list + o->room;
+    const action *end, *first = actions_of(s, o, &end);
     for (word j = 0; j < r.count; j++) {
       word i = r.listed ? r.listed[j] : j;
       V *here = s->m + own->base + i * own->work;
       const near *p = r.pairs ? r.pairs + i : 0;
-      for (const action *a = r.first; a < r.end; a++)
+      for (const action *a = first; a < end; a++)
         if (a->guard >= 0 && !any(here + a->guard)) {
           if (a->store == CALLED) memset(here + a->at, 0, a->size * sizeof(V));
         } else if (a->store == CALLED) CALL(c->entries + a->entry, here, 0, 0);
@@ -290,14 +335,19 @@ static int step(const scene *s, word k, word *most) {
 static void step_back(const scene *s, word k) {
   const crowd *c = s->c;
   V *stores[] = {s->b, s->y + k * c->state, s->y + (k + 1) * c->state, 0};
+  round rounds[c->rooms];
+  rounds_of(s, k, 1, rounds);
   for (word n = c->loops - 1; n >= 0; n--) {
-    round r = round_of(s, n, k);
-    const room *own = c->list + c->order[n].room;
+    if (n == c->looked - 1) rounds_of(s, k, 0, rounds);
+    const loop *o = c->order + n;
+    const round r = rounds[o->room];
+    const room *own = c->list + o->room;
+    const action *end, *first = actions_of(s, o, &end);
     for (word j = r.count - 1; j >= 0; j--) {
       word i = r.listed ? r.listed[j] : j;
       V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
       const near *p = r.pairs ? r.pairs + i : 0;
-      for (const action *a = r.end - 1; a >= r.first; a--)
+      for (const action *a = end - 1; a >= first; a--)
         if (a->guard >= 0 && !any(here + a->guard)) {
           if (a->store == CALLED) memset(gains + a->at, 0, a->size * sizeof(V));
         } else if (a->store == CALLED && a->back >= 0) CALL(c->back + a->back, here, gains, 0);
@@ -310,9 +360,9 @@ static void step_back(const scene *s, word k) {
 /* The rows of scenes, whose values and whose adjoints are walked apart; returns how many fit: the pairs of the next row are more than there is room for. */
 API word roll(const crowd *c, const crowd *taped, const scenes *q, V *memory) {
   const word words = q->slopes && taped->words > c->words ? taped->words : c->words;
-  word kinds = c->rooms - 1 - c->species, steps = q->steps, slots = 0;
-  for (word r = 1 + c->species; r < c->rooms; r++) slots += c->list[r].members;
-  scene s = {.c = c, .m = memory, .slots = slots};
+  word kinds = c->rooms - 1 - c->species, steps = q->steps, slots = 0, before[kinds + 1];
+  for (word r = 0; r < kinds; r++) before[r] = slots, slots += c->list[1 + c->species + r].members;
+  scene s = {.c = c, .m = memory, .slots = slots, .before = before};
   s.b = s.m + words;
   s.x = s.b + (q->slopes ? taped->words : 0);
   s.y = s.x + (steps + 1) * c->state;

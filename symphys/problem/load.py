@@ -22,7 +22,6 @@ from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
 from symphys.problem.guess.table import read_guess
 from symphys.problem.include.files import appendix
 from symphys.problem.model import ALIVE, Array, ProblemData, Simulation, Termination, Variable
-from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.forward_kinematics import forward_kinematics
 from symphys.problem.parametric.parts import Part
 from symphys.problem.parametric.reposition import check_anchors
@@ -305,7 +304,7 @@ def read_world(document: Document, faults: Faults) -> tuple[ParametricWorld, dic
     couplings = read_couplings(document.coupling, joints, faults)
     law = read_contact(document.contact)
     parametric = ParametricWorld(bodies, statics, pairs, law, (x, y, z), joints, couplings, sites)
-    check_pair_limit(CollisionFilter(parametric.parts, (*pairs, *parametric.jointed)), faults)
+    check_pair_limit(parametric, faults)
     return parametric, initial
 
 

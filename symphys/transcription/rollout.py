@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.dynamics.kept import kept, structure
+from symphys.errors import Issue, ProblemError
 from symphys.expression import Formula
 from symphys.model.world import Scheme, World
 from symphys.problem import Problem
@@ -258,7 +259,24 @@ def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None, li
     """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of.
 
     ``like``: a rollout of the problem under another scheme. Where their worlds are equal, steps are built together.
+    ProblemError where steps find their pairs: the world lists none.
     """
+    require_listed_pairs(problem)
+    made = rollout_of(problem, inputs)
+    if like is None or not same_worlds(made, like):
+        return made
+    return replace(made, like=like.like or like)
+
+
+def require_listed_pairs(problem: Problem) -> None:
+    """ProblemError if there are so many bodies that steps find their pairs, from what needs a list of all pairs."""
+    if problem.parametric.finds_pairs:
+        text = "has so many that a step finds the pairs that are near, which can be simulated and solved, but not this"
+        raise ProblemError(problem.file, [Issue("body", text)])
+
+
+def rollout_of(problem: Problem, inputs: tuple[str, ...] | None = None) -> Rollout:
+    """See ``symbolic_rollout``, whether or not the world lists its pairs."""
     parameters = varied_parameters(problem)
     scheduled = tuple((share.name, share.symbol) for share in parameters.phases.shares)
     inputs = (*(input_names(problem) if inputs is None else inputs), *(name for name, _ in scheduled))
@@ -266,10 +284,7 @@ def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None, li
     z = ca.MX.sym("z", sum(v.guess.size for v in problem.variables))
     smoothing = ca.MX.sym("smoothing")
     start, memory = start_of(problem, world, inputs, parameters, z), memory_of(problem, world)
-    made = Rollout(problem, world, inputs, parameters, memory, z, smoothing, memory.start(start.x0), start.u, start.p)
-    if like is None or not same_worlds(made, like):
-        return made
-    return replace(made, like=like.like or like)
+    return Rollout(problem, world, inputs, parameters, memory, z, smoothing, memory.start(start.x0), start.u, start.p)
 
 
 def same_worlds(one: Rollout, other: Rollout) -> bool:

@@ -55,6 +55,17 @@ def transcribe(
 
         require_fixed_duration(problem)
         return transcribe_large(problem, exact, backend, threads)
+    if problem.parametric.finds_pairs:
+        from symphys.transcription.neighbours.transcription import transcribe_crowd
+
+        return transcribe_crowd(problem, threads)
+    return _transcribed(problem, exact, backend, threads, like)
+
+
+def _transcribed(
+    problem: Problem, exact: bool, backend: str, threads: int | None, like: Rollout | None
+) -> Transcription:
+    """Of one rollout that is an expression."""
     began = perf_counter()
     rollout = symbolic_rollout(problem, like=like)
     functions = ExpressionFunctions(rollout)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -39,7 +39,10 @@ class Transcription:
     Attributes:
         backend: what evaluates the shooting problem.
         build_seconds: until there were expressions; ``backend.seconds`` come on top.
+        records_contacts: whether ``record`` has the forces and gaps of contacts.
     """
+
+    records_contacts: ClassVar[bool] = True
 
     problem: Problem
     rollout: Rollout

@@ -41,7 +41,8 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     """The "trust" object of a result, for the exact rollout of ``z`` (n,).
 
     Each module of this room says what its numbers are. "fault" is a clause on the first number or derivative that is
-    not finite, empty if all are. ``tell`` is called with a few words before each part that takes time.
+    not finite, empty if all are. ``tell`` is called with a few words before each part that takes time. Where contacts
+    are not recorded there are "gradient", "refined", "order" and "bounds" alone.
 
     Raises:
         NotFinite: there is no such motion; says where it ends and why.
@@ -51,6 +52,8 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     tell(COMPARING)
     compared = gradient.compare_gradient(transcription, z)
     finer = refinement.refine(transcription, z, tell)
+    if not transcription.records_contacts:
+        return {"gradient": compared, **finer, "bounds": held_bounds(transcription, z)}
     tell(SWEEPING)
     timed = transcription.timed(record)
     grown = sensitivity_growth(timed, record)
@@ -92,6 +95,8 @@ def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
 
     Each module says what its numbers are.
     """
+    if not transcription.records_contacts:
+        return {}
     rollout = transcription.timed(record).rollout
     resolved = contacts(rollout, record)
     again = refinement.resettled(transcription, record.z, resolved["residual"], resolved["impulse"])

@@ -62,7 +62,8 @@ def test_groups_and_compounds_are_called_by_name(refused: Refused) -> None:
 
 
 def test_spheres_are_not_advised_to_be_spheres(refused: Refused) -> None:
-    message = str(refused(text=BASE + crowd(80, shape="{ sphere = { radius = 0.1 } }")))
+    balls = crowd(80, shape="{ sphere = { radius = 0.1 } }")
+    message = str(refused(text=BASE + balls.replace("mass = 1", "mass = 1\nfriction = 0.1", 1)))
     assert "3240 points" in message
     assert "in place of" not in message
 

@@ -259,5 +259,5 @@ def _sources(planned: CrowdPlan, lanes: int) -> list[SourceFile]:
         texts = [write(f"f{i}", *planned.functions[i], dialect, ()) for i in mine]
         for group in spread(texts, [len(planned.functions[i][0].nodes) for i in mine], FILES):
             found.append(SourceFile("\n".join([head, *group]), straight=True))
-    driver = head_of(lanes, single=False) + listed(len(planned.functions)) + resource("neighbours.c")
+    driver = head_of(lanes, single=False, dialect=dialect) + listed(len(planned.functions)) + resource("neighbours.c")
     return [*found, SourceFile(driver)]

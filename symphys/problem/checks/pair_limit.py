@@ -6,19 +6,20 @@ from collections.abc import Sequence
 
 from symphys.model.shapes import SHAPES, SURFACES, SolidShape, Surface, points_of_kinds
 from symphys.problem.parametric.collision_filter import BodyClass, CollisionFilter, PairCount
+from symphys.problem.parametric.meetings import MOST_POINTS, hindrance
 from symphys.problem.parametric.parts import ParametricBody
+from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults
 
-MOST_POINTS = 2000
-"""Points of contact that are computed in every step."""
 LISTED = 3
 
 
-def check_pair_limit(candidates: CollisionFilter, faults: Faults) -> None:
-    """Every point where two surfaces may touch is computed in every step, so there must not be too many."""
+def check_pair_limit(world: ParametricWorld, faults: Faults) -> None:
+    """Every point where two surfaces may touch is computed in every step, unless steps find those that are near."""
+    candidates = CollisionFilter(world.parts, (*world.pairs, *world.jointed))
     counted = candidates.count(MOST_POINTS)
-    if counted.points > MOST_POINTS:
-        faults.stop(("body",), too_many(candidates, counted))
+    if counted.points > MOST_POINTS and (why := hindrance(world)) is not None:
+        faults.stop(("body",), too_many(candidates, counted, why))
     if counted.uncovered:
         listed = ", ".join(f"{a} and {b}" for a, b in counted.uncovered[:LISTED])
         more = f" and {len(counted.uncovered) - LISTED} more" if len(counted.uncovered) > LISTED else ""
@@ -29,7 +30,7 @@ def check_pair_limit(candidates: CollisionFilter, faults: Faults) -> None:
         )
 
 
-def too_many(candidates: CollisionFilter, counted: PairCount) -> str:
+def too_many(candidates: CollisionFilter, counted: PairCount, why: str) -> str:
     """How many points there are, where most come from, and what to do."""
     sets = list(candidates.sets.values())
     largest = counted.shares.most_common(LISTED)
@@ -44,7 +45,10 @@ def too_many(candidates: CollisionFilter, counted: PairCount) -> str:
     others = sorted({solid.plural for solid in solids if most_points(type(solid)) > most_points(simplest)})
     if others:
         remedy += f"; or take {simplest.plural} in place of {' and '.join(others)}"
-    return f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}"
+    alone = f"free spheres and capsules that all touch all under one law, on planes, have no limit; here {why}"
+    return (
+        f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}; {alone}"
+    )
 
 
 def most_points(kind: type[Surface]) -> int:
