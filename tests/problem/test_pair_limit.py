@@ -48,7 +48,7 @@ def crowd(count: int, keys: str = "", shape: str = BOX) -> str:
 
 
 def test_number_contributors_and_remedy_are_named(refused: Refused, names: Names) -> None:
-    error = refused(text=BASE + crowd(40))
+    error = refused(text=BASE + crowd(40).replace("mass = 1", "mass = 1\nfriction = 0.1", 1))
     largest = rf"\(40 boxes against each other: {780 * EACH}, 40 boxes against ground: {40 * DOWN}\)"
     names(error, "body", f"{780 * EACH + 40 * DOWN} points .* 2000 are allowed {largest}; let")
     names(error, "body", "group, .* collides_with .* spheres in place of boxes")

@@ -45,7 +45,7 @@ def too_many(candidates: CollisionFilter, counted: PairCount, why: str) -> str:
     others = sorted({solid.plural for solid in solids if most_points(type(solid)) > most_points(simplest)})
     if others:
         remedy += f"; or take {simplest.plural} in place of {' and '.join(others)}"
-    alone = f"free spheres and capsules that all touch all under one law, on planes, have no limit; here {why}"
+    alone = f"free spheres, capsules and boxes that all touch all under one law, on planes, have no limit; here {why}"
     return (
         f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}; {alone}"
     )

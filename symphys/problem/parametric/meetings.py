@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from itertools import combinations_with_replacement
 from typing import Any, Protocol
 
-from symphys.model.shapes import Capsule, Plane, Sphere
+from symphys.model.shapes import Box, Capsule, Plane, Sphere
 from symphys.model.world import Law
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.joints import ParametricJoint
@@ -82,7 +82,7 @@ def _hindrances(world: MeetingParts) -> Iterator[str]:
     yield from (f"there is a [[pair]], {pair.name}" for pair in world.pairs[:1])
     yield from (f"{part.name} has collides_with" for part in world.parts if part.collides_with is not None)
     yield from (f"{each.name} is no plane" for each in world.statics if not isinstance(each.static, Plane))
-    yield from (f"{body.name} is no sphere and no capsule" for body in world.bodies if not _rolls(body))
+    yield from (f"{body.name} is no sphere, capsule or box" for body in world.bodies if not _simple(body))
     masses = {body.name: body.mass for body in world.bodies}
     least, most = min(masses, key=masses.__getitem__), max(masses, key=masses.__getitem__)
     if masses[most] > UNEQUAL * masses[least]:
@@ -91,6 +91,6 @@ def _hindrances(world: MeetingParts) -> Iterator[str]:
         yield "contacts have different laws"
 
 
-def _rolls(body: ParametricBody) -> bool:
+def _simple(body: ParametricBody) -> bool:
     """Whether it is one of the shapes for which such steps were compared with those of a list."""
-    return bool(body.mass) and len(body.shapes) == 1 and isinstance(body.shapes[0], Sphere | Capsule)
+    return bool(body.mass) and len(body.shapes) == 1 and isinstance(body.shapes[0], Sphere | Capsule | Box)

@@ -139,6 +139,24 @@ def test_near_pairs_are_all_that_matters(kinds: list[str], law: Law) -> None:
             assert slopes[k, :-1] == pytest.approx(right, abs=1e-9 * np.abs(right).max())
 
 
+@pytest.mark.thorough
+def test_boxes_are_those_of_all_pairs() -> None:
+    """To rounding, which their blows magnify."""
+    steps, sides = 20, (0.2, 0.2, 0.2)
+    boxes = [Body.box(f"b{i}", sides, mass=1.0, position=(0.24 * i - 0.15, 0.02 * i, 0.13)) for i in range(3)]
+    world = World(tuple(boxes), PLANES)
+    kernel = compile_crowd(crowd_of(world, LAW, SCHEME, exact=True), lanes=1, threads=1)
+    every, rows = AllPairs(world, LAW, SCHEME), starts(world, 3)
+    weights = np.zeros((len(rows), steps + 1, rows.shape[1]))
+    weights[:, -1, :-1] = np.random.default_rng(1).standard_normal((len(rows), every.shown))
+    states, slopes = kernel.adjoints(rows, given(kernel, len(rows)), weights)
+    for k, row in enumerate(rows):
+        reference = every.rollout(row, steps)
+        np.testing.assert_allclose(states[k, :, :-1], reference[:, : every.shown], atol=1e-7)
+        right = every.slopes(reference, weights[k, -1, :-1])
+        np.testing.assert_allclose(slopes[k, :-1], right, atol=1e-6 * np.abs(right).max())
+
+
 def test_room_for_pairs_grows() -> None:
     """More pairs than there is room for at first are computed none the less, with slopes, and in all lanes."""
     places = [(0.12 * (i % 3), 0.12 * (i // 3), 0.1) for i in range(9)]

@@ -174,8 +174,8 @@ def test_smoothing_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         ('[[joint]]\nname = "j"\nball = {}\nbetween = ["b0", "b1"]\npoint = [0.1, 0, 0.15]', "there is a joint, j"),
         ('[[block]]\nname = "step"\nshape = { box = { size = [1, 1, 1] } }\nposition = [5, 0, 0]', "step is no plane"),
         (
-            SPHERE.format("ox", 90).replace("sphere = { radius = 0.1 }", "box = { size = [1, 1, 1] }"),
-            "box is no sphere",
+            SPHERE.format("tun", 90).replace("sphere = { radius", "cylinder = { length = 0.2, radius"),
+            "btun is no sphere, capsule or box",
         ),
         (
             SPHERE.format("light", 90).replace("mass = 1.0", "mass = 0.01"),
