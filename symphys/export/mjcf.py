@@ -73,7 +73,8 @@ def problem_model(problem: Problem, approximate: bool = False) -> MjcfModel:
     laws = [Departure("left out", (law.name,), "a force law; MuJoCo has no formulas") for law in problem.forces]
     text = "numbers that hold in a phase alone; a model of MuJoCo has one of each"
     laws += [Departure("left out", (phase.name,), text) for phase in problem.phases if phase.sets]
-    return mjcf_model(problem.world(), problem.initial, dt, name, problem.sensors, laws, approximate=approximate)
+    world = problem.parametric.world({}, listed=True)
+    return mjcf_model(world, problem.initial, dt, name, problem.sensors, laws, approximate=approximate)
 
 
 def mjcf_files(problem: Problem, approximate: bool = False) -> dict[str, bytes]:

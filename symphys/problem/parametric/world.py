@@ -97,8 +97,11 @@ class ParametricWorld:
         """Whether steps find the pairs that are near: then the world lists none."""
         return found_anew(self)
 
-    def world(self, overrides: Mapping[str, Any]) -> World:
-        """The world with some parameters replaced; KeyError for a name that is none."""
+    def world(self, overrides: Mapping[str, Any], listed: bool = False) -> World:
+        """The world with some parameters replaced; KeyError for a name that is none.
+
+        ``listed``: with all pairs, even where steps find them.
+        """
         nominal = self.parameters()
         for name in overrides:
             if name not in nominal:
@@ -117,7 +120,7 @@ class ParametricWorld:
         return World(
             bodies,
             statics,
-            () if self.finds_pairs else self._pairs(bodies, statics, value),
+            self._pairs(bodies, statics, value) if listed or not self.finds_pairs else (),
             value("gravity"),
             joints,
             placed_couplings(self.couplings, joints),

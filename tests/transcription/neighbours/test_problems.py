@@ -12,6 +12,7 @@ from toys import require
 import symphys
 from symphys import Body, Law, Plane, Problem, make_world
 from symphys.errors import ProblemError, SymphysError
+from symphys.export.mjcf import problem_model
 from symphys.problem import load_problem
 from symphys.problem.parametric import meetings
 from symphys.transcription import transcribe
@@ -188,6 +189,18 @@ def test_smoothing_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 def test_worlds_of_another_kind_keep_their_limit(more: str, why: str, tmp_path: Path) -> None:
     with pytest.raises(ProblemError, match=f"points of contact in every step are too many, .*; here {why}"):
         load_problem(file_of(tmp_path, more, balls=80))
+
+
+def test_others_programs_get_a_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A model for MuJoCo has all pairs; C has none to give."""
+    problem = found(file_of(tmp_path), monkeypatch)
+    assert (
+        problem_model(problem, approximate=True).text.count("<pair ")
+        == len(load_problem(file_of(tmp_path)).world().pairs)
+        == 20
+    )
+    with pytest.raises(ProblemError, match="body: has so many"):
+        symphys.export(problem, c=tmp_path / "c")
 
 
 def test_a_hundred_balls_from_python() -> None:
