@@ -195,6 +195,15 @@ def judge_of(rollout: Rollout, asked: Terms) -> Judge:
     return judge
 
 
+def gradient_prices(
+    shooting: ShootingProblem, kinds: Iterable[str], clock: Callable[[], float] = perf_counter
+) -> dict[str, float]:
+    """``Transcription.prices`` where gradients are all that there is."""
+    z, evaluator = shooting.start(0)[None], shooting.evaluator
+    one = fastest(lambda: evaluator.value(z, 0.0), clock)
+    return {kind: fastest(lambda: evaluator.gradient(z, 0.0), clock) / one for kind in kinds if kind == "gradient"}
+
+
 def fastest(call: Callable[[], object], clock: Callable[[], float] = perf_counter) -> float:
     """Seconds of the fastest of a few calls, by a clock."""
     times = []

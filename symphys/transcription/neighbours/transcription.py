@@ -23,7 +23,7 @@ from symphys.transcription.judge import Assessment, assessment
 from symphys.transcription.neighbours.context import CrowdContext
 from symphys.transcription.objective import limits
 from symphys.transcription.simulation import Record, simulate
-from symphys.transcription.transcription import Transcription, fastest
+from symphys.transcription.transcription import Transcription, gradient_prices
 
 Array = NDArray[np.float64]
 
@@ -98,9 +98,7 @@ class CrowdTranscription(Transcription):
         self, kinds: Iterable[str] = ("gradient",), clock: Callable[[], float] = perf_counter
     ) -> dict[str, float]:
         """See ``Transcription``."""
-        z, evaluator = self.shooting.start(0)[None], self.shooting.evaluator
-        one = fastest(lambda: evaluator.value(z, 0.0), clock)
-        return {kind: fastest(lambda: evaluator.gradient(z, 0.0), clock) / one for kind in kinds if kind == "gradient"}
+        return gradient_prices(self.shooting, kinds, clock)
 
     @cached_property
     def probe(self) -> Probe:

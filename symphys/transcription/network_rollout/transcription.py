@@ -25,7 +25,7 @@ from symphys.transcription.network_rollout.evaluator import LargeEvaluator, Larg
 from symphys.transcription.network_rollout.forward_backward import ForwardPass, back, objective_arguments
 from symphys.transcription.objective import limits
 from symphys.transcription.simulation import Record, simulate
-from symphys.transcription.transcription import Transcription, fastest
+from symphys.transcription.transcription import Transcription, gradient_prices
 
 Array = NDArray[np.float64]
 PLAIN = ("casadi", "c")
@@ -63,9 +63,7 @@ class LargeTranscription(Transcription):
         self, kinds: Iterable[str] = ("gradient",), clock: Callable[[], float] = perf_counter
     ) -> dict[str, float]:
         """See ``Transcription``."""
-        z, evaluator = self.shooting.start(0)[None], self.shooting.evaluator
-        one = fastest(lambda: evaluator.value(z, 0.0), clock)
-        return {kind: fastest(lambda: evaluator.gradient(z, 0.0), clock) / one for kind in kinds if kind == "gradient"}
+        return gradient_prices(self.shooting, kinds, clock)
 
     @cached_property
     def probe(self) -> Probe:
