@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from repeats import thorough
 from toys import require
 
 import symphys
@@ -83,11 +84,19 @@ def found(path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     return problem
 
 
-@pytest.fixture(scope="module")
-def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[Transcription, Transcription]:
+LAWS = {
+    "rigid": "restitution = 0.6",
+    "soft": "frequency = 30\ndamping = 0.3",
+    "rolling": "restitution = 0.6\ntorsion = 0.01\nrolling = 0.005",
+}
+
+
+@pytest.fixture(scope="module", params=["rigid", thorough("soft"), thorough("rolling")])
+def pair(request: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Transcription, Transcription]:
     """Of pairs that are found, and of a list."""
     require("simd")
-    path = file_of(tmp_path_factory.mktemp("row"))
+    tables = TABLES.replace(LAWS["rigid"], LAWS[request.param])
+    path = file_of(tmp_path_factory.mktemp("row"), tables=tables)
     with pytest.MonkeyPatch.context() as patch:
         near = transcribe(found(path, patch), threads=2)
     return near, transcribe(load_problem(path), exact=True, backend="simd", threads=1)
