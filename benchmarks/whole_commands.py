@@ -27,6 +27,8 @@ LEARNERS = (
     *("ant_walk", "gait_robot_build", "gait_robot_fast", "half_cheetah_run", "hopper_run"),
     *("quadruped_walk", "quadruped_walk_net", "walker2d_walk"),
 )
+IDENTIFIED = ("bounce_recorded",)
+"""Problems of another command."""
 SHORT = ("--set", "solver.stochastic.iterations=3", "--set", "solver.evolution.iterations=3")
 STARTS = ("first", "second")
 
@@ -73,21 +75,20 @@ def rows_of(problem: str, versions: dict[str, Path]) -> list[dict[str, Any]]:
     return [row for turn in zip(*by_version, strict=True) for row in turn]
 
 
-def line(name: str, start: str, rows: list[dict[str, Any]]) -> str:
+def line(name: str, rows: list[dict[str, Any]]) -> str:
     """A line of the table: each number of the versions, divided by a slash."""
-    chosen = [row for row in rows if (row["problem"], row["start"]) == (name, start)]
 
-    def told(key: str, digits: int) -> str:
-        numbers = (f"{row[key]:.{digits}f}" if row["code"] < 2 else "not solved" for row in chosen)
-        return " / ".join(numbers)
+    def told(start: str, key: str, digits: int) -> str:
+        chosen = [row for row in rows if (row["problem"], row["start"]) == (name, start)]
+        return " / ".join(f"{row[key]:.{digits}f}" if row["code"] < 2 else "not solved" for row in chosen)
 
     star = "*" if name in LEARNERS else ""
-    cells = (f"`{name}`{star}", start, told("wall", 1), told("processor", 1), told("memory", 0), told("cache", 1))
-    return "| " + " | ".join(cells) + " |"
+    cells = [told(start, key, 1) for start in STARTS for key in ("wall", "processor")]
+    return "| " + " | ".join([f"`{name}`{star}", *cells, told("first", "memory", 0), told("second", "cache", 1)]) + " |"
 
 
 def main() -> None:
-    """Two lines for each problem, a first and a second start."""
+    """A line for each problem."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", metavar="NAME", nargs="*")
     parser.add_argument("--before", type=Path, metavar="FOLDER")
@@ -95,16 +96,14 @@ def main() -> None:
     options = parser.parse_args()
     own = [str(HERE / "benchmarks" / name) for name in OWN]
     given = [str(Path(name).resolve()) if Path(name).is_file() else name for name in options.names]
-    names = given or [*(path.stem for path in sorted((HERE / "problems").glob("*.toml"))), *own]
+    shipped = (path.stem for path in sorted((HERE / "problems").glob("*.toml")))
+    names = given or [*(name for name in shipped if name not in IDENTIFIED), *own]
     before = {} if options.before is None else {"before": options.before.resolve()}
     done = options.to.read_text().splitlines() if options.to and options.to.exists() else []
     rows = [json.loads(text) for text in done]
-    print(
-        "| problem | start | seconds, "
-        + " / ".join([*before, "now"])
-        + " | of processors | memory [MiB] | cache [MiB] |"
-    )
-    print("|---|---|---|---|---|---|")
+    print(f"Each cell: {' / '.join([*before, 'now'])}")
+    print("| problem | first start [s] | of processors | second [s] | of processors | memory [MiB] | cache [MiB] |")
+    print("|---|---|---|---|---|---|---|")
     for problem in names:
         name = Path(problem).stem
         if name not in {row["problem"] for row in rows}:
@@ -113,8 +112,7 @@ def main() -> None:
             if options.to:
                 with options.to.open("a") as file:
                     file.writelines(json.dumps(row) + "\n" for row in new)
-        for start in STARTS:
-            print(line(name, start, rows), flush=True)
+        print(line(name, rows), flush=True)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from symphys.dynamics.tracing.decorator import tracing
 from symphys.dynamics.tracing.guards import with_guards
 from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector
 from symphys.dynamics.tracing.trace import InlineTracer
+from symphys.maths.verbatim import verbatim
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
 
@@ -88,7 +89,9 @@ class InlineSteps:
         step = ca.Function("step", arguments, [packed], ["x", "u", "p", "smoothing"], ["x_next"])
         if step.n_instructions() > MOST_INSTRUCTIONS:
             return step
-        return ca.Function("step", arguments, [ca.cse(packed)], ["x", "u", "p", "smoothing"], ["x_next"])
+        with verbatim():
+            packed = ca.cse(packed)
+        return ca.Function("step", arguments, [packed], ["x", "u", "p", "smoothing"], ["x_next"])
 
     def report(self, scheme: Scheme | None = None) -> ca.Function:
         """See ``report_function``."""

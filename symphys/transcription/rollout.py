@@ -13,6 +13,7 @@ import numpy as np
 from symphys.dynamics.kept import kept, structure
 from symphys.errors import Issue, ProblemError
 from symphys.expression import Formula
+from symphys.maths.verbatim import verbatim
 from symphys.model.world import Scheme, World
 from symphys.problem import Problem
 from symphys.transcription.decision_variables import start_of
@@ -129,7 +130,8 @@ class Rollout:
         whole: Expr = ca.vertcat(after, self.memory.after(x, u, self.inputs))
         if self.termination is not None:
             whole = self.termination(x, whole, p)
-        return ca.Function(step.name(), [x, u, p, smoothing], [whole, *others]).expand()
+        with verbatim():
+            return ca.Function(step.name(), [x, u, p, smoothing], [whole, *others]).expand()
 
     @cached_property
     def termination(self) -> ca.Function | None:

@@ -33,6 +33,7 @@ from symphys.dynamics.tracing.pytree import (
     slots_of,
 )
 from symphys.dynamics.tracing.structure import Blueprint, Structures
+from symphys.maths.verbatim import verbatim
 
 T = TypeVar("T")
 Expr = Any
@@ -220,7 +221,9 @@ class InlineTracer(Tracer):
         self.take(column)
 
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
-        columns = function.call([self._column(slot) for slot in slots])
+        given = [self._column(slot) for slot in slots]
+        with verbatim():  # its numbers are those of a call of its own
+            columns = function.call(given)
         found = [self._slot(column.numel()) for column in columns]
         for number, column in zip(found, columns, strict=True):
             self._columns[number], self._entries[number] = column, column.nonzeros()
