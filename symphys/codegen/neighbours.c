@@ -129,12 +129,13 @@ static int64_t cell_of(double x, double width) {
   return cell > -1e15 && cell < 1e15 ? (int64_t)cell : 0;
 }
 
-enum { FEW = 32 };
+enum { FEW = 32 }; /* bodies for which cells do not pay */
+/* What a search goes by, and what it has found so far, by kind. */
 typedef struct {
   const crowd *c;
   word bodies;
   double strikes;
-  double (*seen)[4];
+  double (*seen)[4];       /* position and reach */
   int32_t *whose, *number; /* species of a body, and which of it */
   found *list;
   word *counts, *starts;
