@@ -20,13 +20,11 @@ from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpuls
 from symphys.dynamics.motion import PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Iterate, Momentum, PlacedConstraint, Velocities
-from symphys.model.world import World
+from symphys.model.world import UNEQUAL, World
 
 Expr = Any
 """casadi SX"""
 
-UNEQUAL = 20.0
-"""Ratio of masses from which on plain sweeps are too slow."""
 EVERY = 4
 """Sweeps between two longer steps."""
 LONGEST = 1e4

@@ -27,6 +27,8 @@ from symphys.suggest import hint, quote
 Vector = Sequence[Any]
 """three of them"""
 
+UNEQUAL = 20.0
+"""Ratio of masses from which on plain sweeps are too slow, so that a step searches along its impulses."""
 GRAVITY = (0.0, 0.0, -9.81)
 NOTHING: Mapping[Any, Any] = MappingProxyType({})
 

@@ -107,6 +107,7 @@ class Rollout:
     def _steps(self) -> InlineSteps:
         from symphys.dynamics.functions import InlineSteps
 
+        require_listed_pairs(self.problem)
         return InlineSteps(self.world, self.inputs, self.parameters.symbols)
 
     @property
@@ -116,6 +117,7 @@ class Rollout:
 
     def built(self, make: Callable[..., T], *more: Hashable) -> T:
         """What a function makes of the world; problems of a sweep share it, as far as their worlds are equal."""
+        require_listed_pairs(self.problem)
         scheme = self.parameters.scheme(self.problem.simulation)
         arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
         return kept(make, *arguments, *more) if self._shares else make(*arguments, *more)

@@ -7,15 +7,13 @@ from itertools import combinations_with_replacement
 from typing import Any, Protocol
 
 from symphys.model.shapes import Box, Capsule, Plane, Sphere
-from symphys.model.world import Law
+from symphys.model.world import UNEQUAL, Law
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.parts import PairRule, ParametricBody, ParametricStatic, Part
 
 MOST_POINTS = 2000
 """Points of contact of a world that are listed, and all looked at in every step."""
-UNEQUAL = 20.0
-"""Times the lightest body's mass that the heaviest may have; beyond that a step searches along its impulses."""
 
 
 class MeetingParts(Protocol):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -21,12 +20,11 @@ from symphys.problem.parametric.meetings import law_of_all
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.neighbours.program import crowd_of
 from symphys.transcription.objective import Terms, terms
-from symphys.transcription.rollout import Rollout, require_listed_pairs, rollout_of
+from symphys.transcription.rollout import Rollout, rollout_of
 
 Array = NDArray[np.float64]
 Expr = Any
 """casadi MX"""
-T = TypeVar("T")
 BODY = sum(size for _, size in BODY_FIELDS)
 
 
@@ -44,16 +42,6 @@ class CrowdRollout(Rollout):
     def x(self) -> Expr:
         """(nx, N + 1) states."""
         return self.states
-
-    def built(self, make: Callable[..., T], *more: Hashable) -> T:
-        """ProblemError: there is no function of a step."""
-        require_listed_pairs(self.problem)
-        return super().built(make, *more)
-
-    @property
-    def _shares(self) -> bool:
-        """Every function of a step is asked of ``built``."""
-        return True
 
 
 class CrowdContext:

@@ -9,7 +9,6 @@ import casadi as ca
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.codegen.neighbours.program import Crowd, Meeting, MemberCall, Move, Room, SightPlaces
-from symphys.dynamics.line_search import UNEQUAL
 from symphys.dynamics.neighbours.sample import TWINS, Sample, sample_of
 from symphys.dynamics.neighbours.step import RecordedStep, recorded_step
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
@@ -17,7 +16,7 @@ from symphys.errors import SymphysError
 from symphys.model.scalar import is_number
 from symphys.model.shapes import Plane
 from symphys.model.state_layout import Layout
-from symphys.model.world import Law, Scheme, World
+from symphys.model.world import UNEQUAL, Law, Scheme, World
 from symphys.suggest import quote
 from symphys.transcription.neighbours.loops import LoopStep, loops_of
 
