@@ -7,7 +7,9 @@
 
 typedef struct { word work, state, members, base, from; } room; /* words of a member; where members begin */
 typedef struct { word room, first, end, other, section; } loop;  /* of its actions; those in place of them end there */
-typedef struct { word store, of, offset, pitch, at, size, entry, back, guard; } action; /* CALLED: a call, else a copy */
+/* CALLED: a call; CLEARED: its results where it is left out; else a copy. Where the word of a guard is 0 it is left out, and
+   as many more. */
+typedef struct { word store, of, offset, pitch, at, size, entry, back, guard, more, guard_back, more_back; } action;
 typedef struct { word first, second, plane; double normal[3], offset; } kind; /* species; -1: a plane */
 typedef struct {
   word rooms, species, loops, words, state, given;
@@ -29,7 +31,7 @@ typedef struct {
   word *most;                  /* (kinds): pairs at most */
 } scenes;
 
-enum { WORK, BEFORE, AFTER, GIVEN, CALLED };
+enum { WORK, BEFORE, AFTER, GIVEN, CALLED, CLEARED };
 enum { OWN, FIRST, SECOND, ONCE, THEN, OUT = 8 };
 /* before: the number of the same pair in the step before; -1: it was not near; -2: there is no pair in this lane */
 typedef struct { int32_t first[LANES], second[LANES], before[LANES]; } near;
@@ -325,9 +327,10 @@ static int step(const scene *s, word k, word *most) {
       const near *p = r.pairs ? r.pairs + i : 0;
       for (const action *a = first; a < end; a++)
         if (a->guard >= 0 && !any(here + a->guard)) {
-          if (a->store == CALLED) memset(here + a->at, 0, a->size * sizeof(V));
+          if (a->store == CLEARED) memset(here + a->at, 0, a->size * sizeof(V));
+          a += a->more;
         } else if (a->store == CALLED) CALL(c->entries + a->entry, here, 0, 0);
-        else copy(a, p, i, stores, here, 0);
+        else if (a->store != CLEARED) copy(a, p, i, stores, here, 0);
     }
   }
   return 1;
@@ -349,11 +352,12 @@ static void step_back(const scene *s, word k) {
       V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
       const near *p = r.pairs ? r.pairs + i : 0;
       for (const action *a = end - 1; a >= first; a--)
-        if (a->guard >= 0 && !any(here + a->guard)) {
-          if (a->store == CALLED) memset(gains + a->at, 0, a->size * sizeof(V));
+        if (a->guard_back >= 0 && !any(here + a->guard_back)) {
+          if (a->store == CLEARED) memset(gains + a->at, 0, a->size * sizeof(V));
+          a -= a->more_back;
         } else if (a->store == CALLED && a->back >= 0) CALL(c->back + a->back, here, gains, 0);
         else if (a->store == CALLED || a->store == GIVEN) memset(gains + a->at, 0, a->size * sizeof(V));
-        else copy(a, p, i, stores, gains, 1);
+        else if (a->store != CLEARED) copy(a, p, i, stores, gains, 1);
     }
   }
 }

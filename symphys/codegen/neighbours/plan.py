@@ -7,8 +7,9 @@ gives a call the work of its member as the whole memory.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,8 @@ from symphys.codegen.neighbours.program import Crowd, MemberCall, Move
 from symphys.codegen.neighbours.reuse import reused
 
 Words = NDArray[np.int64]
-CALLED = 4
-"""The store of an action that is a call."""
+CALLED, CLEARED = 4, 5
+"""The store of an action that is a call, or that clears results where a guard has left one out."""
 OUT = 8
 """Added to ``Of`` of a move that goes out."""
 
@@ -35,8 +36,9 @@ class Walk:
         crowd: with the places of its words.
         work: words of a member of each room, with tapes.
         loops: (loops, 5) room, first action, end, end of what is done where the section is left out, its word or -1.
-        actions: (actions, 9) store, of, offset, room, at, size, entry, entry of the adjoint, guard; see
-            ``neighbours.c``, where the offset has the place of the room, and a member's words stand for the room.
+        actions: (actions, 12) store, of, offset, room, at, size, entry, entry of the adjoint, guard and how many more
+            it leaves out, the same backwards; see ``neighbours.c``, where the offset has the place of the room, and a
+            member's words stand for the room.
         entries: of calls.
         back: of adjoints.
     """
@@ -85,13 +87,27 @@ class _Planner:
         loops, actions = list[tuple[int, ...]](), list[tuple[int, ...]]()
         for loop in self._crowd.loops:
             first = len(actions)
-            for does in loop.does:
-                actions.append(_moved(does) if isinstance(does, Move) else self._called(does, loop.room))
+            for guard, does in groupby(loop.does, key=lambda each: each.guard):
+                actions += self._guarded(guard, list(does), loop.room)
             end = len(actions)
-            actions += [_moved(move) for move in loop.instead]
+            actions += [(*_moved(move), NONE, 0, NONE, 0) for move in loop.instead]
             loops.append((loop.room, first, end, len(actions), NONE if loop.section is None else loop.section))
         lists = (np.array(each, np.int64) for each in (loops, actions, self._entries, self._back))
         return Walk(self._crowd, tuple(self._work), *lists)
+
+    def _guarded(self, guard: int | None, does: Sequence[Move | MemberCall], room: int) -> Iterator[tuple[int, ...]]:
+        """What follows one another under one guard: it is looked at once, by the first or backwards by the last."""
+        for k, each in enumerate(does):
+            at = _moved(each) if isinstance(each, Move) else self._called(each, room)
+            ends = k == 0, k == len(does) - 1
+            yield (*at, *(x for is_end in ends for x in (guard if is_end and guard is not None else NONE, len(does) - 1)))
+        for each in does:
+            if guard is not None and isinstance(each, MemberCall) and each.read:
+                yield CLEARED, 0, 0, 0, each.outputs[0], self._size(each), 0, NONE, guard, 0, guard, 0
+
+    def _size(self, call: MemberCall) -> int:
+        function = self._part.calls.calls[call.number].function
+        return sum(function.numel_out(k) for k in range(function.n_out()))
 
     def _called(self, call: MemberCall, room: int) -> tuple[int, ...]:
         part, functions = self._part, self._functions
@@ -110,14 +126,11 @@ class _Planner:
             self._back += _entry(functions.number(pulled, form), [*primal, *marked])
         number = functions.number(forward, Form(primal=function.n_in(), adds=False))
         self._entries += _entry(number, [*call.inputs, *call.outputs, *tape])
-        size = sum(function.numel_out(k) for k in range(function.n_out()))
-        guard = NONE if call.guard is None else call.guard
-        return CALLED, 0, 0, 0, call.outputs[0], size, entry, back, guard
+        return CALLED, 0, 0, 0, call.outputs[0], self._size(call), entry, back
 
 
 def _moved(move: Move) -> tuple[int, ...]:
-    guard = NONE if move.guard is None else move.guard
-    return int(move.store), int(move.of) + OUT * move.out, move.offset, move.room, move.at, move.size, 0, NONE, guard
+    return int(move.store), int(move.of) + OUT * move.out, move.offset, move.room, move.at, move.size, 0, NONE
 
 
 def _marked(places: Sequence[int], mask: Sequence[bool]) -> list[int]:

@@ -63,12 +63,14 @@ class MemberCall:
         number: of the call in the sample's body.
         inputs, outputs: where they begin in the work of the member.
         guard: where a word of that is 0 if results are 0 or not read; None: the call is always needed.
+        read: whether results may be read where that word is 0.
     """
 
     number: int
     inputs: tuple[int, ...]
     outputs: tuple[int, ...]
     guard: int | None = None
+    read: bool = True
 
 
 @dataclass(frozen=True)

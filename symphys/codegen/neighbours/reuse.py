@@ -52,7 +52,7 @@ def _moved(loop: MemberLoop, places: _Places) -> MemberLoop:
 
     def call(each: MemberCall) -> MemberCall:
         inputs, outputs = (tuple(places.of(loop.room, at) for at in side) for side in (each.inputs, each.outputs))
-        return MemberCall(each.number, inputs, outputs, places.maybe(loop.room, each.guard))
+        return replace(each, inputs=inputs, outputs=outputs, guard=places.maybe(loop.room, each.guard))
 
     does = tuple(move(each) if isinstance(each, Move) else call(each) for each in loop.does)
     return MemberLoop(loop.room, does, places.maybe(ONLY, loop.section), tuple(map(move, loop.instead)))

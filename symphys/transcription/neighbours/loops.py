@@ -122,6 +122,7 @@ class _Builder:
             for vector in call.outputs:
                 if vector.number in self._root:
                     self._newest[self._root[vector.number]] = vector.number
+        self._mark_read(calls)
         loops = tuple(loop.done(self._word(loop.section)) for loop in self._loops)
         return LoopStep(loops, tuple(self._work), tuple(self._states), self._homes)
 
@@ -225,6 +226,26 @@ class _Builder:
                 offset = self._names.results[vector.number]
                 loop.does.append(Move(Store.AFTER, room, Of.OWN, offset, at, vector.size, out=True))
                 self._states[room] = max(self._states[room], offset + vector.size)
+
+    def _mark_read(self, calls: Sequence[TracedCall]) -> None:
+        """Note of guarded calls whether their results are read where they are left out; what is handed on is not."""
+        readers: dict[int, set[int | None]] = {}
+        for number in (*self._recorder.words, *self._names.results):
+            readers[number] = {None}
+        for loop in reversed(self._loops):
+            for k in range(len(loop.does) - 1, -1, -1):
+                does = loop.does[k]
+                if isinstance(does, Move):
+                    continue
+                call = calls[does.number]
+                read = any(bool(readers.get(vector.number, set()) - {does.guard}) for vector in call.outputs)
+                loop.does[k] = replace(does, read=read)
+                for vector in call.inputs:
+                    if vector.number not in self._root:
+                        readers.setdefault(vector.number, set()).add(does.guard)
+                for part in call.section.otherwise if call.section is not None and read else ():
+                    if part is not None and part.vector is not None and part.vector.number not in self._root:
+                        readers[part.vector.number].add(None)
 
     def _instead(
         self, loop: _Loop, call: TracedCall, guard: Guard, member: Owner, inputs: Sequence[int], outputs: Sequence[int]
