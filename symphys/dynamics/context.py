@@ -18,6 +18,8 @@ Expr = Any
 
 SHORTEST_KICK = 1 / 8
 """Of dt; see ``StepContext.shortest_kick``."""
+NEAR = 0.1
+"""Of the distance a_ref dt^2: surfaces that carried load and are that near to each other go on touching."""
 SLOWEST = 1.0
 """[m/s^2] least reference acceleration: what counts as fast when there is no gravity."""
 

@@ -8,7 +8,6 @@ Of bodies and pairs that are alike only the first is kept.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -48,20 +47,6 @@ def loops_of(sample: Sample, recorded: RecordedStep) -> LoopStep:
     return _Builder(sample, recorded).built(recorded.calls)
 
 
-def _points(sample: Sample, words: Mapping[int, Hashable]) -> dict[int, int]:
-    """For the words of guards that are about one point which that is: they come in order, behind that of the pair."""
-    points = Counter((pair.first, pair.second) for pair in sample.world.pairs)
-    by_sides: dict[Hashable, list[int]] = {}
-    for number, sides in words.items():
-        by_sides.setdefault(sides, []).append(number)
-    found: dict[int, int] = {}
-    for sides, own in by_sides.items():
-        count = points[sides]  # type: ignore[index]
-        if len(own) >= count:
-            found |= zip(own[len(own) - count :], range(count), strict=True)
-    return found
-
-
 @dataclass
 class _Loop:
     """A loop that grows."""
@@ -89,7 +74,7 @@ class _Builder:
         for k, pair in enumerate(sample.world.pairs):
             self._members[pair.name] = "pair", leads.setdefault((pair.first, pair.second), k)
         self._of_word = {number: ("pair", leads[sides]) for number, sides in self._recorder.words.items()}
-        self._points = _points(sample, self._recorder.words)
+        self._points = self._recorder.points
         self._kinds = {own[0]: kind for kind, own in enumerate(sample.pairs)}
         rooms = 1 + len(sample.species) + len(sample.kinds)
         self._work, self._states = [0] * rooms, [0] * rooms

@@ -76,13 +76,15 @@ def _looks(does: Move | MemberCall, recorded: RecordedStep) -> bool:
     """Whether an action is a call that finds out whether a pair is near."""
     if isinstance(does, Move):
         return False
-    return any(vector.number in recorded.recorder.words for vector in recorded.calls[does.number].outputs)
+    early = {vector.number for vector in recorded.recorder.guards}
+    return any(vector.number in early for vector in recorded.calls[does.number].outputs)
 
 
 def _near_words(sample: Sample, recorded: RecordedStep, step: LoopStep, kind: int) -> tuple[int, ...]:
     """Where the words of guards of a kind of pairs lie."""
     first = {(pair.first, pair.second) for pair in (sample.world.pairs[k] for k in sample.pairs[kind])}
-    return tuple(step.homes[number][1] for number, sides in recorded.recorder.words.items() if sides in first)
+    early = [vector.number for vector in recorded.recorder.guards]
+    return tuple(step.homes[number][1] for number in early if recorded.recorder.words[number] in first)
 
 
 def step_program(
