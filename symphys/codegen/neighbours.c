@@ -6,10 +6,12 @@
 #define CALL(t, m, b, k) FUNCTIONS[(t)[0]](m, b, (t) + 2, k)
 
 typedef struct { word work, state, members, base, from; } room; /* words of a member; where members begin */
-typedef struct { word room, first, end, other, section; } loop;  /* of its actions; those in place of them end there */
-/* CALLED: a call; CLEARED: its results where it is left out; else a copy. Where the word of a guard is 0 it is left out, and
-   as many more. */
-typedef struct { word store, of, offset, pitch, at, size, entry, back, guard, more, guard_back, more_back; } action;
+/* Of runs; actions in place of them, where the word of a section is 0; whether no member hands anything on to another; where
+   its runs stand by the words of their sieve, or -1. */
+typedef struct { word room, first, end, others, others_end, section, apart, turns; } loop;
+typedef struct { word first, end, sieve, word, off; } run; /* of actions: done where a word is not 0, or where it is */
+typedef struct { word store, of, offset, pitch, at, size, entry, back, several; } action; /* or -1: see call_several */
+typedef struct { word room, places, size, loop; } sieve;   /* words by which members are told apart before a loop */
 typedef struct { word first, second, plane; double normal[3], offset; } kind; /* species; -1: a plane */
 typedef struct {
   word rooms, species, loops, words, state, given;
@@ -17,8 +19,13 @@ typedef struct {
                                    in the work of what is there once it says how far what strikes comes */
   const room *list;
   const loop *order;
+  const run *runs;
+  const word *turns;
   const action *actions;
-  const word *entries, *back; /* of calls and of their adjoints */
+  const word *entries, *back, *several; /* of calls, of their adjoints, of calls for several members */
+  word sieves;
+  const sieve *sifts;
+  const word *words_of; /* of sieves: where they lie in the work of a member */
   const kind *kinds;
   const word *sight, *nears; /* by species: where a position and a reach lie; by kind where in nears
                                 words begin, of which one is not 0 if a pair is near */
@@ -31,10 +38,13 @@ typedef struct {
   word *most;                  /* (kinds): pairs at most */
 } scenes;
 
-enum { WORK, BEFORE, AFTER, GIVEN, CALLED, CLEARED };
+enum { WORK, BEFORE, AFTER, GIVEN, CALLED, CLEARED }; /* CLEARED: results of a call where it is left out */
 enum { OWN, FIRST, SECOND, ONCE, THEN, OUT = 8 };
 /* before: the number of the same pair in the step before; -1: it was not near; -2: there is no pair in this lane */
 typedef struct { int32_t first[LANES], second[LANES], before[LANES]; } near;
+
+/* What a sieve has let through: pairs of a member and a word, in order; the same by word; words as bits, by member. */
+typedef struct { int32_t *who, *which, *by_word, *counts, *bits, size, count; } sifted;
 
 typedef struct {
   const crowd *c;
@@ -44,6 +54,8 @@ typedef struct {
   int32_t *active, *count;  /* (slots) those that are near in the step, by kind; (kinds) how many */
   word slots;
   const word *before; /* (kinds) the number of the first pair of a kind among all */
+  sifted *let; /* (sieves) */
+  const int32_t *all; /* 0, 1, 2 .. */
   char *scratch;
 } scene;
 
@@ -294,17 +306,143 @@ static void rounds_of(const scene *s, word k, int listed, round *rounds) {
         s->pairs + k * s->slots + s->before[q]};
 }
 
-/* What a loop does: where a section is without effect, something else. */
-static const action *actions_of(const scene *s, const loop *o, const action **end) {
+static void sift(const scene *s, word q, const round *rounds) {
+  const sieve *v = s->c->sifts + q;
+  sifted *f = s->let + q;
+  const round r = rounds[v->room];
+  const room *own = s->c->list + v->room;
+  f->count = 0;
+  memset(f->counts, 0, v->size * sizeof(*f->counts));
+  for (word j = 0; j < r.count; j++) {
+    word i = r.listed ? r.listed[j] : j;
+    const V *here = s->m + own->base + i * own->work;
+    int32_t bits = 0;
+    for (word w = 0; w < v->size; w++)
+      if (any(here + s->c->words_of[v->places + w])) {
+        bits |= (int32_t)1 << w;
+        f->who[f->count] = i, f->which[f->count++] = w;
+        f->by_word[w * f->size + f->counts[w]++] = i;
+      }
+    f->bits[i] = bits;
+  }
+}
+
+static int goes(const scene *s, const run *n, word i) {
+  return n->sieve < 0 || (s->let[n->sieve].bits[i] >> n->word & 1) != n->off;
+}
+
+/* One call for several members, in the lanes of a vector; the last one fills those that are left. */
+#ifdef SEVERAL
+static void call_several(const scene *s, const word *t, const room *own, const int32_t *who, word count) {
+  word n = t[1], places[2 * SEVERAL * n];
+  for (word j = 0; j < count; j += SEVERAL) {
+    for (word l = 0; l < SEVERAL; l++) {
+      word base = own->base + who[j + l < count ? j + l : count - 1] * own->work;
+      for (word a = 0; a < n; a++) places[2 * (a * SEVERAL + l)] = t[2 + a] + base;
+    }
+    FUNCTIONS[t[0]](s->m, 0, places, 0);
+  }
+}
+#define FEWEST 3 /* members for which that pays */
+#endif
+
+static inline void act(const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
+  const room *own = s->c->list + o->room;
+  V *here = s->m + own->base + i * own->work;
+  if (a->store == CALLED) CALL(s->c->entries + a->entry, here, 0, 0);
+  else if (a->store == CLEARED) memset(here + a->at, 0, a->size * sizeof(V));
+  else copy(a, r->pairs ? r->pairs + i : 0, i, stores, here, 0);
+}
+
+static inline void act_back(const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
+  const room *own = s->c->list + o->room;
+  V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
+  if (a->store == CALLED && a->back >= 0) CALL(s->c->back + a->back, here, gains, 0);
+  else if (a->store == CALLED || a->store == GIVEN || a->store == CLEARED) memset(gains + a->at, 0, a->size * sizeof(V));
+  else copy(a, r->pairs ? r->pairs + i : 0, i, stores, gains, 1);
+}
+
+/* The members for which a run is done. */
+static word members_of(const scene *s, const run *n, const round *r, const int32_t **who, int32_t *room_for) {
+  if (n->sieve < 0) {
+    *who = r->listed ? r->listed : s->all;
+    return r->count;
+  }
+  const sifted *f = s->let + n->sieve;
+  *who = f->by_word + n->word * f->size;
+  if (!n->off) return f->counts[n->word];
+  word count = 0;
+  for (word j = 0; j < r->count; j++) {
+    word i = r->listed ? r->listed[j] : j;
+    if (goes(s, n, i)) room_for[count++] = i;
+  }
+  *who = room_for;
+  return count;
+}
+
+static void go_apart(const scene *s, const loop *o, const round *r, V *const *stores) {
   const crowd *c = s->c;
-  int other = o->section >= 0 && !any(s->m + c->list[0].base + o->section);
-  *end = c->actions + (other ? o->other : o->end);
-  return c->actions + (other ? o->end : o->first);
+  int32_t room_for[r->count];
+  for (const run *n = c->runs + o->first; n < c->runs + o->end; n++) {
+    const int32_t *who;
+    word count = members_of(s, n, r, &who, room_for);
+    for (const action *a = c->actions + n->first; a < c->actions + n->end; a++) {
+#ifdef SEVERAL
+      if (a->store == CALLED && a->several >= 0 && count >= FEWEST) {
+        call_several(s, c->several + a->several, c->list + o->room, who, count);
+        continue;
+      }
+#endif
+      for (word j = 0; j < count; j++) act(s, o, a, r, who[j], stores);
+    }
+  }
+}
+
+static void go(const scene *s, const loop *o, const round *r, V *const *stores) {
+  const crowd *c = s->c;
+  if (o->section >= 0 && !any(s->m + c->list[0].base + o->section)) {
+    for (word j = 0; j < r->count; j++)
+      for (const action *a = c->actions + o->others; a < c->actions + o->others_end; a++)
+        act(s, o, a, r, r->listed ? r->listed[j] : j, stores);
+  } else if (o->apart) {
+    go_apart(s, o, r, stores);
+  } else if (o->turns >= 0) {
+    const sifted *f = s->let + c->runs[o->first].sieve;
+    for (word k = 0; k < f->count; k++) {
+      word turn = c->turns[o->turns + f->which[k]];
+      if (turn < 0) continue;
+      const action *end = c->actions + c->runs[turn].end;
+      for (const action *a = c->actions + c->runs[turn].first; a < end; a++) act(s, o, a, r, f->who[k], stores);
+    }
+  } else {
+    for (word j = 0; j < r->count; j++) {
+      word i = r->listed ? r->listed[j] : j;
+      for (const run *n = c->runs + o->first; n < c->runs + o->end; n++)
+        if (goes(s, n, i))
+          for (const action *a = c->actions + n->first; a < c->actions + n->end; a++) act(s, o, a, r, i, stores);
+    }
+  }
+}
+
+static void go_back(const scene *s, const loop *o, const round *r, V *const *stores) {
+  const crowd *c = s->c;
+  int left_out = o->section >= 0 && !any(s->m + c->list[0].base + o->section);
+  for (word j = r->count - 1; j >= 0; j--) {
+    word i = r->listed ? r->listed[j] : j;
+    if (left_out) {
+      for (const action *a = c->actions + o->others_end - 1; a >= c->actions + o->others; a--)
+        act_back(s, o, a, r, i, stores);
+      continue;
+    }
+    for (const run *n = c->runs + o->end - 1; n >= c->runs + o->first; n--)
+      if (goes(s, n, i))
+        for (const action *a = c->actions + n->end - 1; a >= c->actions + n->first; a--) act_back(s, o, a, r, i, stores);
+  }
 }
 
 static int step(const scene *s, word k, word *most) {
   const crowd *c = s->c;
-  word kinds = c->rooms - 1 - c->species;
+  word kinds = c->rooms - 1 - c->species, sieves = 0;
   V *stores[] = {s->m, s->x + k * c->state, s->x + (k + 1) * c->state, s->given};
   round rounds[c->rooms];
   rounds_of(s, k, 0, rounds);
@@ -316,22 +454,9 @@ static int step(const scene *s, word k, word *most) {
       rounds_of(s, k, 0, rounds);
     }
     if (n == c->looked) list_near(s, k), rounds_of(s, k, 1, rounds);
+    for (; sieves < c->sieves && c->sifts[sieves].loop == n; sieves++) sift(s, sieves, rounds);
     const loop *o = c->order + n;
-    const round r = rounds[o->room];
-    if (!r.count) continue;
-    const room *own = c->list + o->room;
-    const action *end, *first = actions_of(s, o, &end);
-    for (word j = 0; j < r.count; j++) {
-      word i = r.listed ? r.listed[j] : j;
-      V *here = s->m + own->base + i * own->work;
-      const near *p = r.pairs ? r.pairs + i : 0;
-      for (const action *a = first; a < end; a++)
-        if (a->guard >= 0 && !any(here + a->guard)) {
-          if (a->store == CLEARED) memset(here + a->at, 0, a->size * sizeof(V));
-          a += a->more;
-        } else if (a->store == CALLED) CALL(c->entries + a->entry, here, 0, 0);
-        else if (a->store != CLEARED) copy(a, p, i, stores, here, 0);
-    }
+    if (rounds[o->room].count) go(s, o, rounds + o->room, stores);
   }
   return 1;
 }
@@ -344,22 +469,25 @@ static void step_back(const scene *s, word k) {
   for (word n = c->loops - 1; n >= 0; n--) {
     if (n == c->looked - 1) rounds_of(s, k, 0, rounds);
     const loop *o = c->order + n;
-    const round r = rounds[o->room];
-    const room *own = c->list + o->room;
-    const action *end, *first = actions_of(s, o, &end);
-    for (word j = r.count - 1; j >= 0; j--) {
-      word i = r.listed ? r.listed[j] : j;
-      V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
-      const near *p = r.pairs ? r.pairs + i : 0;
-      for (const action *a = end - 1; a >= first; a--)
-        if (a->guard_back >= 0 && !any(here + a->guard_back)) {
-          if (a->store == CLEARED) memset(gains + a->at, 0, a->size * sizeof(V));
-          a -= a->more_back;
-        } else if (a->store == CALLED && a->back >= 0) CALL(c->back + a->back, here, gains, 0);
-        else if (a->store == CALLED || a->store == GIVEN) memset(gains + a->at, 0, a->size * sizeof(V));
-        else if (a->store != CLEARED) copy(a, p, i, stores, gains, 1);
-    }
+    if (rounds[o->room].count) go_back(s, o, rounds + o->room, stores);
   }
+}
+
+/* Room for what sieves let through, and the numbers of members. */
+static void make_room(scene *s) {
+  const crowd *c = s->c;
+  int32_t *at = (int32_t *)s->scratch, *all = at;
+  word most = 0;
+  for (word r = 0; r < c->rooms; r++) most = c->list[r].members > most ? c->list[r].members : most;
+  for (word i = 0; i < most; i++) all[i] = i;
+  s->all = all, at += most;
+  for (word q = 0; q < c->sieves; q++) {
+    word words = c->sifts[q].size, size = c->list[c->sifts[q].room].members;
+    int32_t *who = at, *which = who + words * size, *by_word = which + words * size, *counts = by_word + words * size;
+    s->let[q] = (sifted){who, which, by_word, counts, counts + words, size, 0};
+    at = counts + words + size;
+  }
+  s->scratch = (char *)(((uintptr_t)at + 7) / 8 * 8);
 }
 
 /* The rows of scenes, whose values and whose adjoints are walked apart; returns how many fit: the pairs of the next row are more than there is room for. */
@@ -376,6 +504,9 @@ API word roll(const crowd *c, const crowd *taped, const scenes *q, V *memory) {
   s.used = (int32_t *)(s.pairs + steps * slots);
   s.active = s.used + steps * kinds, s.count = s.active + slots;
   s.scratch = (char *)(((uintptr_t)(s.count + kinds) + 7) / 8 * 8);
+  sifted let[c->sieves + 1];
+  s.let = let;
+  make_room(&s);
   for (word row = 0; row < q->rows; row += LANES) {
     word rows = q->rows - row < LANES ? q->rows - row : LANES;
     memset(s.x, 0, (steps + 1) * c->state * sizeof(V));

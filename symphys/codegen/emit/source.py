@@ -47,7 +47,7 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
         work = [len(plan.functions[i][0].nodes) for i in mine]
         dialect = TEAM if calls > 1 else forms_of(lanes)
         texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i], shapes[i]) for i in mine]
-        start = _team(calls, single) if calls > 1 else head_of(lanes, single, dialect)
+        start = team_head(calls, single) if calls > 1 else head_of(lanes, single, dialect)
         for group in spread(texts, work, FILES):
             found.append(SourceFile("\n".join([start, *group]), narrow=narrow, straight=True))
     driver = head_of(lanes, single) + listed(len(plan.functions)) + "".join(map(resource, (*DRIVER, "phases.c")))
@@ -68,7 +68,7 @@ def head_of(lanes: int, single: bool, dialect: Dialect = VECTORS) -> str:
     return head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
 
 
-def _team(calls: int, single: bool) -> str:
+def team_head(calls: int, single: bool) -> str:
     """How a C file of functions for several calls at once begins."""
     each = ", ".join(["x_"] * calls)
     whole = f"#define ALL(x) ({{ const R x_ = (x); (V){{{each}}}; }})\n"

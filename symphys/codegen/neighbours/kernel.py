@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen.emit.dialect import ONE_LANE, VECTORS
-from symphys.codegen.emit.source import FILES, SourceFile, head_of, listed, resource, spread
+from symphys.codegen.emit.dialect import ONE_LANE, TEAM, VECTORS
+from symphys.codegen.emit.shapes import EACH, Access, Shape
+from symphys.codegen.emit.source import FILES, SourceFile, head_of, listed, resource, spread, team_head
 from symphys.codegen.emit.writer import write
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.neighbours.plan import CrowdPlan, Walk, crowd_plan
@@ -50,7 +51,9 @@ class _Crowd(ctypes.Structure):
     _fields_ = (
         *((name, WORD) for name in ("rooms", "species", "loops", "words", "state", "given")),
         *((name, WORD) for name in ("found", "looked", "striking")),
-        *((name, POINTER) for name in ("list", "order", "actions", "entries", "back", "kinds", "sight", "nears")),
+        *((name, POINTER) for name in ("list", "order", "runs", "turns", "actions", "entries", "back", "several")),
+        ("sieves", WORD),
+        *((name, POINTER) for name in ("sifts", "words_of", "kinds", "sight", "nears")),
     )
 
 
@@ -162,6 +165,9 @@ class CrowdKernel:
             words = max(values.words, taped.words) + taped.words if gradient else values.words
             words += (1 + gradient) * (steps + 1) * values.state + values.given
             bytes_ = steps * (12 * lanes * slots + 4 * len(crowd.meetings)) + 24 * slots + 92 * bodies + 512
+            bytes_ += 4 * max(room.members for room in crowd.rooms)
+            for sieve in crowd.sieves:
+                bytes_ += 4 * (len(sieve.places) + (1 + 3 * len(sieve.places)) * crowd.rooms[sieve.room].members)
             total = words + bytes_ // (8 * lanes) + 2
             self._pools = {(steps, gradient): MemoryPool(total, lanes, np.float64, self.prepare)}
         return self._pools[steps, gradient]
@@ -190,12 +196,18 @@ class CrowdKernel:
             rooms[r] = _Room(walk.work[r], room.state, members[r], int(bases[r]), begins[r])
         self._kept.append(rooms)
         ends = 1 + len(crowd.nears) + np.cumsum([0, *map(len, crowd.nears)])
-        lists = walk.loops, self._actions(walk, begins, bases), walk.entries, walk.back
+        lists = walk.loops, walk.runs, walk.turns, self._actions(walk, begins, bases), walk.entries, walk.back
+        places = [sieve.places for sieve in crowd.sieves]
+        starts = np.cumsum([0, *map(len, places)]).tolist()
+        sieves = [(s.room, at, len(s.places), s.loop) for s, at in zip(crowd.sieves, starts, strict=False)]
         return _Crowd(
             *(len(members), len(crowd.sights), len(walk.loops), int(bases[-1]), state, crowd.given),
             *(crowd.found, crowd.looked, crowd.striking),
             ctypes.addressof(rooms),
-            *(self._put(each) for each in lists),
+            *(self._put(each) for each in (*lists, walk.several)),
+            len(sieves),
+            self._put(np.array(sieves, np.int64)),
+            self._put(np.array([at for own in places for at in own], np.int64)),
             kinds,
             self._put(np.array([(sight.position, sight.reach) for sight in crowd.sights], np.int64)),
             self._put(np.array([*ends, *(at for words in crowd.nears for at in words)], np.int64)),
@@ -233,8 +245,9 @@ def compile_crowd(
     """
     started = time.perf_counter()
     lanes = processor().lanes(False) if lanes is None else lanes
-    planned = crowd_plan(crowd)
-    with shared_library(_sources(planned, lanes), cache or default_cache()) as built:
+    several = processor().lanes(False) if lanes == 1 else 1
+    planned = crowd_plan(crowd, wide=several > 1)
+    with shared_library(_sources(planned, lanes, several), cache or default_cache()) as built:
         library = loaded(built.path)
     report = BuildReport(
         compiler=built.compiler.version,
@@ -251,13 +264,24 @@ def compile_crowd(
     return CrowdKernel(crowd, planned, library, report, processors() if threads is None else threads)
 
 
-def _sources(planned: CrowdPlan, lanes: int) -> list[SourceFile]:
+def _sources(planned: CrowdPlan, lanes: int, several: int) -> list[SourceFile]:
+    """The C files; ``several``: calls that functions for several members do at once."""
     dialect = ONE_LANE if lanes == 1 else VECTORS
     head, found = head_of(lanes, single=False, dialect=dialect), list[SourceFile]()
+    numbers = range(len(planned.functions))
     for backward in (False, True):
-        mine = [i for i, (_, form) in enumerate(planned.functions) if form.backward == backward]
-        texts = [write(f"f{i}", *planned.functions[i], dialect, ()) for i in mine]
-        for group in spread(texts, [len(planned.functions[i][0].nodes) for i in mine], FILES):
-            found.append(SourceFile("\n".join([head, *group]), straight=True))
-    driver = head_of(lanes, single=False, dialect=dialect) + listed(len(planned.functions)) + resource("neighbours.c")
+        own = [i for i in numbers if planned.functions[i][1].backward == backward and i not in planned.wide]
+        found += _files(planned, own, head, [write(f"f{i}", *planned.functions[i], dialect, ()) for i in own])
+    wide, texts = sorted(planned.wide), list[str]()
+    for i in wide:
+        graph, form = planned.functions[i]
+        accesses = (Access(EACH, (1,) * several),) * (len(graph.sizes) + len(graph.results))
+        texts.append(write(f"f{i}", graph, form, TEAM, (), Shape(several, accesses)))
+    found += _files(planned, wide, team_head(several, single=False), texts)
+    driver = head + (f"#define SEVERAL {several}\n" if wide else "") + listed(len(numbers)) + resource("neighbours.c")
     return [*found, SourceFile(driver)]
+
+
+def _files(planned: CrowdPlan, numbers: Sequence[int], head: str, texts: Sequence[str]) -> Iterator[SourceFile]:
+    for group in spread(texts, [len(planned.functions[i][0].nodes) for i in numbers], FILES):
+        yield SourceFile("\n".join([head, *group]), straight=True)

@@ -3,6 +3,10 @@
 Values and adjoints are walked apart. Where adjoints follow, the work of a member is laid out by the loops, and the
 tapes of its calls come after it. For values alone words are used again. Entries of calls have no strides: the driver
 gives a call the work of its member as the whole memory.
+
+Actions under one guard follow one another as a run. Where the members of a loop do not depend on one another, a run is
+done for all of them before the next one, and the calls of one scene that are worth it are done for several members at
+once, in the lanes of a vector.
 """
 
 from __future__ import annotations
@@ -18,7 +22,7 @@ from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.pieces import Form
 from symphys.codegen.emit.plan import NONE, PlannedPhase, with_adjoints
 from symphys.codegen.graph.graph import Graph
-from symphys.codegen.neighbours.program import Crowd, MemberCall, Move
+from symphys.codegen.neighbours.program import Crowd, MemberCall, MemberLoop, Move, Of
 from symphys.codegen.neighbours.reuse import reused
 
 Words = NDArray[np.int64]
@@ -26,6 +30,8 @@ CALLED, CLEARED = 4, 5
 """The store of an action that is a call, or that clears results where a guard has left one out."""
 OUT = 8
 """Added to ``Of`` of a move that goes out."""
+WORTH = 2
+"""Operations for each word that is read or written, from which on a call is done for several members at once."""
 
 
 @dataclass(frozen=True)
@@ -35,20 +41,26 @@ class Walk:
     Attributes:
         crowd: with the places of its words.
         work: words of a member of each room, with tapes.
-        loops: (loops, 5) room, first action, end, end of what is done where the section is left out, its word or -1.
-        actions: (actions, 12) store, of, offset, room, at, size, entry, entry of the adjoint, guard and how many more
-            it leaves out, the same backwards; see ``neighbours.c``, where the offset has the place of the room, and a
-            member's words stand for the room.
+        loops: (loops, 8) room, first run, end, first action of what is done where the section is left out, end, the
+            section's word or -1, whether members do not depend on one another, where in turns its runs stand or -1.
+        runs: (runs, 5) first action, end, sieve or -1, word, whether it is done where that is 0.
+        turns: of loops whose runs all belong to words of one sieve, by word the run or -1.
+        actions: (actions, 9) store, of, offset, room, at, size, entry, entry of the adjoint, entry for several; see
+            ``neighbours.c``, where the offset has the place of the room, and a member's words stand for the room.
         entries: of calls.
         back: of adjoints.
+        several: of calls for several members: number, places, then the places.
     """
 
     crowd: Crowd
     work: tuple[int, ...]
     loops: Words
+    runs: Words
+    turns: Words
     actions: Words
     entries: Words
     back: Words
+    several: Words
 
 
 @dataclass(frozen=True)
@@ -57,59 +69,99 @@ class CrowdPlan:
 
     Attributes:
         functions: the C functions, in the order of their numbers.
+        wide: the numbers of those that do several calls at once.
         values: for values alone.
         taped: for values and adjoints.
     """
 
     functions: tuple[tuple[Graph, Form], ...]
+    wide: frozenset[int]
     values: Walk
     taped: Walk
 
 
-def crowd_plan(crowd: Crowd) -> CrowdPlan:
-    """Of a crowd."""
-    functions = DistinctFunctions()
+def crowd_plan(crowd: Crowd, wide: bool = False) -> CrowdPlan:
+    """Of a crowd; ``wide``: some calls of values are done for several members at once."""
+    functions, together = DistinctFunctions(), DistinctFunctions()
     part = with_adjoints(crowd.sample, ["x"], functions, crowd.chains)[0][1]
-    values = _Planner(reused(crowd), part, functions, taped=False).walk()
-    taped = _Planner(crowd, part, functions, taped=True).walk()
-    return CrowdPlan(tuple(functions.listed), values, taped)
+    planner = _Planner(reused(crowd), part, functions, together if wide else None, taped=False)
+    values = planner.walk()
+    taped = _Planner(crowd, part, functions, None, taped=True).walk()
+    first = len(functions.listed)
+    values.several[planner.heads] += first
+    numbers = frozenset(range(first, first + len(together.listed)))
+    return CrowdPlan((*functions.listed, *together.listed), numbers, values, taped)
 
 
 class _Planner:
-    def __init__(self, crowd: Crowd, part: PlannedPhase, functions: DistinctFunctions, taped: bool) -> None:
-        self._crowd, self._part, self._functions, self._taped = crowd, part, functions, taped
+    def __init__(
+        self,
+        crowd: Crowd,
+        part: PlannedPhase,
+        functions: DistinctFunctions,
+        together: DistinctFunctions | None,
+        taped: bool,
+    ) -> None:
+        self._crowd, self._part, self._functions, self._together = crowd, part, functions, together
+        self._taped = taped
         self._work = [room.work for room in crowd.rooms]
+        self._runs: list[tuple[int, ...]] = []
+        self._turns: list[int] = []
+        self._actions: list[tuple[int, ...]] = []
         self._entries: list[int] = []
         self._back: list[int] = []
+        self._several: list[int] = []
+        self.heads: list[int] = []
+        """Where in the entries for several members the numbers of functions stand."""
 
     def walk(self) -> Walk:
         """Loops in order, and entries of their calls."""
-        loops, actions = list[tuple[int, ...]](), list[tuple[int, ...]]()
+        loops = []
         for loop in self._crowd.loops:
-            first = len(actions)
+            first = len(self._runs)
+            apart = _apart(loop)
             for guard, does in groupby(loop.does, key=lambda each: each.guard):
-                actions += self._guarded(guard, list(does), loop.room)
-            end = len(actions)
-            actions += [(*_moved(move), NONE, 0, NONE, 0) for move in loop.instead]
-            loops.append((loop.room, first, end, len(actions), NONE if loop.section is None else loop.section))
-        lists = (np.array(each, np.int64) for each in (loops, actions, self._entries, self._back))
-        return Walk(self._crowd, tuple(self._work), *lists)
+                self._run(list(does), loop.room, apart)
+            end, begin = len(self._runs), len(self._actions)
+            self._actions += [(*_moved(move), NONE) for move in loop.instead]
+            section = NONE if loop.section is None else loop.section
+            turns = NONE if apart else self._turned(first)
+            loops.append((loop.room, first, end, begin, len(self._actions), section, int(apart), turns))
+        lists = loops, self._runs, self._turns, self._actions, self._entries, self._back, self._several
+        return Walk(self._crowd, tuple(self._work), *(np.array(each, np.int64) for each in lists))
 
-    def _guarded(self, guard: int | None, does: Sequence[Move | MemberCall], room: int) -> Iterator[tuple[int, ...]]:
-        """What follows one another under one guard: it is looked at once, by the first or backwards by the last."""
-        for k, each in enumerate(does):
-            at = _moved(each) if isinstance(each, Move) else self._called(each, room)
-            ends = k == 0, k == len(does) - 1
-            yield (*at, *(x for is_end in ends for x in (guard if is_end and guard is not None else NONE, len(does) - 1)))
+    def _run(self, does: Sequence[Move | MemberCall], room: int, apart: bool) -> None:
+        """What follows one another under one guard, then what is cleared where that leaves it out."""
+        guard, first = does[0].guard, len(self._actions)
         for each in does:
-            if guard is not None and isinstance(each, MemberCall) and each.read:
-                yield CLEARED, 0, 0, 0, each.outputs[0], self._size(each), 0, NONE, guard, 0, guard, 0
+            self._actions.append((*_moved(each), NONE) if isinstance(each, Move) else self._called(each, room, apart))
+        word = (NONE, 0) if guard is None else guard
+        self._runs.append((first, len(self._actions), *word, 0))
+        cleared = [each for each in does if isinstance(each, MemberCall) and each.read and guard is not None]
+        if cleared:
+            first = len(self._actions)
+            for call in cleared:
+                self._actions.append((CLEARED, 0, 0, 0, call.outputs[0], self._size(call), 0, NONE, NONE))
+            self._runs.append((first, len(self._actions), *word, 1))
+
+    def _turned(self, first: int) -> int:
+        """Where in ``turns`` the runs from ``first`` on stand; -1 where they do not each belong to a word of a sieve."""
+        runs = self._runs[first:]
+        sieves, words = {run[2] for run in runs}, [run[3] for run in runs]
+        if len(sieves) != 1 or NONE in sieves or words != sorted(set(words)) or any(run[4] for run in runs):
+            return NONE
+        at, (sieve,) = len(self._turns), sieves
+        turns = [NONE] * len(self._crowd.sieves[sieve].places)
+        for k, word in enumerate(words):
+            turns[word] = first + k
+        self._turns += turns
+        return at
 
     def _size(self, call: MemberCall) -> int:
         function = self._part.calls.calls[call.number].function
         return sum(function.numel_out(k) for k in range(function.n_out()))
 
-    def _called(self, call: MemberCall, room: int) -> tuple[int, ...]:
+    def _called(self, call: MemberCall, room: int, apart: bool) -> tuple[int, ...]:
         part, functions = self._part, self._functions
         function, kind = part.calls.calls[call.number].function, int(part.kind[call.number])
         forward = functions.forward(function)
@@ -124,17 +176,29 @@ class _Planner:
             form = Form(primal=len(primal), adds=True, backward=True, clears=True)
             marked = [*_marked(call.outputs, adjoint.outputs), *_marked(call.inputs, adjoint.inputs)]
             self._back += _entry(functions.number(pulled, form), [*primal, *marked])
-        number = functions.number(forward, Form(primal=function.n_in(), adds=False))
+        form, several = Form(primal=function.n_in(), adds=False), NONE
+        number = functions.number(forward, form)
         self._entries += _entry(number, [*call.inputs, *call.outputs, *tape])
-        return CALLED, 0, 0, 0, call.outputs[0], self._size(call), entry, back
+        words = self._size(call) + sum(function.numel_in(k) for k in range(function.n_in()))
+        if apart and self._together is not None and len(forward.nodes) > WORTH * words:
+            several = len(self._several)
+            self.heads.append(several)
+            places = [*call.inputs, *call.outputs]
+            self._several += [self._together.number(forward, form), len(places), *places]
+        return CALLED, 0, 0, 0, call.outputs[0], self._size(call), entry, back, several
+
+
+def _apart(loop: MemberLoop) -> bool:
+    """Whether no member hands anything on to another."""
+    return not any(isinstance(each, Move) and each.out and each.of is not Of.OWN for each in loop.does)
 
 
 def _moved(move: Move) -> tuple[int, ...]:
     return int(move.store), int(move.of) + OUT * move.out, move.offset, move.room, move.at, move.size, 0, NONE
 
 
-def _marked(places: Sequence[int], mask: Sequence[bool]) -> list[int]:
-    return [at for at, on in zip(places, mask, strict=True) if on]
+def _marked(places: Sequence[int], mask: Sequence[bool]) -> Iterator[int]:
+    return (at for at, on in zip(places, mask, strict=True) if on)
 
 
 def _entry(number: int, places: Sequence[int]) -> list[int]:

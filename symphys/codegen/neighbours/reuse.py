@@ -35,6 +35,9 @@ def reused(crowd: Crowd) -> Crowd:
     return replace(
         crowd,
         loops=loops,
+        sieves=tuple(
+            replace(sieve, places=tuple(places.of(sieve.room, at) for at in sieve.places)) for sieve in crowd.sieves
+        ),
         rooms=tuple(replace(room, work=places.size(r)) for r, room in enumerate(crowd.rooms)),
         sights=tuple(
             SightPlaces(places.of(1 + s, each.position), places.of(1 + s, each.reach))
@@ -47,15 +50,16 @@ def reused(crowd: Crowd) -> Crowd:
 
 def _moved(loop: MemberLoop, places: _Places) -> MemberLoop:
     def move(each: Move) -> Move:
-        own = replace(each, at=places.of(loop.room, each.at), guard=places.maybe(loop.room, each.guard))
+        own = replace(each, at=places.of(loop.room, each.at))
         return replace(own, offset=places.of(each.room, each.offset)) if each.store is Store.WORK else own
 
     def call(each: MemberCall) -> MemberCall:
         inputs, outputs = (tuple(places.of(loop.room, at) for at in side) for side in (each.inputs, each.outputs))
-        return replace(each, inputs=inputs, outputs=outputs, guard=places.maybe(loop.room, each.guard))
+        return replace(each, inputs=inputs, outputs=outputs)
 
     does = tuple(move(each) if isinstance(each, Move) else call(each) for each in loop.does)
-    return MemberLoop(loop.room, does, places.maybe(ONLY, loop.section), tuple(map(move, loop.instead)))
+    section = None if loop.section is None else places.of(ONLY, loop.section)
+    return MemberLoop(loop.room, does, section, tuple(map(move, loop.instead)))
 
 
 class _Places:
@@ -78,10 +82,6 @@ class _Places:
         """The new place of a word."""
         start = self._start(room, at)
         return self._to[room][start] + at - start
-
-    def maybe(self, room: int, at: int | None) -> int | None:
-        """The same, if there is one."""
-        return None if at is None else self.of(room, at)
 
     def size(self, room: int) -> int:
         """Words of a member."""
@@ -113,14 +113,15 @@ class _Places:
             if number == crowd.looked:
                 for kind, words in enumerate(crowd.nears):
                     yield from ((time, 1 + len(crowd.sights) + kind, at) for at in words)
+            for sieve in crowd.sieves:
+                if number == sieve.loop:
+                    yield from ((time, sieve.room, at) for at in sieve.places)
             if loop.section is not None:
                 yield time, ONLY, loop.section
             for does in (*loop.does, *loop.instead):
                 time += 1
                 places = (*does.inputs, *does.outputs) if isinstance(does, MemberCall) else (does.at,)
                 yield from ((time, loop.room, at) for at in places)
-                if does.guard is not None:
-                    yield time, loop.room, does.guard
                 if isinstance(does, Move) and does.store is Store.WORK:
                     yield time, does.room, does.offset
             time += 1

@@ -60,6 +60,7 @@ def crowd_of(world: World, law: Law, scheme: Scheme, exact: bool = False) -> Cro
     return Crowd(
         program,
         step.loops,
+        step.sieves,
         tuple(rooms),
         tuple(meetings),
         tuple(sights),
