@@ -10,7 +10,8 @@ typedef struct { word work, state, members, base, from; } room; /* words of a me
    its runs stand by the words of their sieve, or -1. */
 typedef struct { word room, first, end, others, others_end, section, apart, turns; } loop;
 typedef struct { word first, end, sieve, word, off; } run; /* of actions: done where a word is not 0, or where it is */
-typedef struct { word store, of, offset, pitch, at, size, entry, back, several; } action; /* or -1: see call_several */
+typedef struct { word store, of, offset, pitch, at, size, entry, back, several, first, end; } action; /* and its references */
+typedef struct { word store, of, offset, pitch, argument; } reference; /* an argument of a call that lies elsewhere */
 typedef struct { word room, places, size, loop; } sieve;   /* words by which members are told apart before a loop */
 typedef struct { word first, second, plane; double normal[3], offset; } kind; /* species; -1: a plane */
 typedef struct {
@@ -22,6 +23,8 @@ typedef struct {
   const run *runs;
   const word *turns;
   const action *actions;
+  const reference *references;
+  word length; /* of entries, where there are references */
   const word *entries, *back, *several; /* of calls, of their adjoints, of calls for several members */
   word sieves;
   const sieve *sifts;
@@ -54,6 +57,7 @@ typedef struct {
   int32_t *active, *count;  /* (slots) those that are near in the step, by kind; (kinds) how many */
   word slots;
   const word *before; /* (kinds) the number of the first pair of a kind among all */
+  word *entries, *own_entries; /* those of the crowd, with the places of references */
   sifted *let; /* (sieves) */
   const int32_t *all; /* 0, 1, 2 .. */
   char *scratch;
@@ -331,14 +335,25 @@ static int goes(const scene *s, const run *n, word i) {
   return n->sieve < 0 || (s->let[n->sieve].bits[i] >> n->word & 1) != n->off;
 }
 
+/* Where an argument of a member's call lies. */
+static inline V *referred(const reference *r, const near *p, word i, V *const *stores) {
+  word k = r->of == OWN ? i : r->of == ONCE ? 0 : r->of == FIRST ? p[i].first[0] : p[i].second[0];
+  return stores[r->store] + r->offset + k * r->pitch;
+}
+
 /* One call for several members, in the lanes of a vector; the last one fills those that are left. */
 #ifdef SEVERAL
-static void call_several(const scene *s, const word *t, const room *own, const int32_t *who, word count) {
+static void call_several(
+    const scene *s, const action *a, const room *own, const near *p, const int32_t *who, word count, V *const *stores) {
+  const word *t = s->c->several + a->several;
+  const reference *first = s->c->references + a->first, *end = s->c->references + a->end;
   word n = t[1], places[2 * SEVERAL * n];
   for (word j = 0; j < count; j += SEVERAL) {
     for (word l = 0; l < SEVERAL; l++) {
-      word base = own->base + who[j + l < count ? j + l : count - 1] * own->work;
-      for (word a = 0; a < n; a++) places[2 * (a * SEVERAL + l)] = t[2 + a] + base;
+      word i = who[j + l < count ? j + l : count - 1], base = own->base + i * own->work;
+      for (word w = 0; w < n; w++) places[2 * (w * SEVERAL + l)] = t[2 + w] + base;
+      for (const reference *r = first; r < end; r++)
+        places[2 * (r->argument * SEVERAL + l)] = referred(r, p, i, stores) - s->m;
     }
     FUNCTIONS[t[0]](s->m, 0, places, 0);
   }
@@ -349,8 +364,14 @@ static void call_several(const scene *s, const word *t, const room *own, const i
 static inline void act(const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
   const room *own = s->c->list + o->room;
   V *here = s->m + own->base + i * own->work;
-  if (a->store == CALLED) CALL(s->c->entries + a->entry, here, 0, 0);
-  else if (a->store == CLEARED) memset(here + a->at, 0, a->size * sizeof(V));
+  if (a->store == CALLED) {
+    word *t = s->entries + a->entry;
+    for (word q = a->first; q < a->end; q++) {
+      const reference *at = s->c->references + q;
+      t[2 + 2 * at->argument] = referred(at, r->pairs, i, stores) - here;
+    }
+    CALL(t, here, 0, 0);
+  } else if (a->store == CLEARED) memset(here + a->at, 0, a->size * sizeof(V));
   else copy(a, r->pairs ? r->pairs + i : 0, i, stores, here, 0);
 }
 
@@ -389,7 +410,7 @@ static void go_apart(const scene *s, const loop *o, const round *r, V *const *st
     for (const action *a = c->actions + n->first; a < c->actions + n->end; a++) {
 #ifdef SEVERAL
       if (a->store == CALLED && a->several >= 0 && count >= FEWEST) {
-        call_several(s, c->several + a->several, c->list + o->room, who, count);
+        call_several(s, a, c->list + o->room, r->pairs, who, count, stores);
         continue;
       }
 #endif
@@ -476,7 +497,8 @@ static void step_back(const scene *s, word k) {
 /* Room for what sieves let through, and the numbers of members. */
 static void make_room(scene *s) {
   const crowd *c = s->c;
-  int32_t *at = (int32_t *)s->scratch, *all = at;
+  s->own_entries = (word *)s->scratch;
+  int32_t *at = (int32_t *)(s->own_entries + c->length), *all = at;
   word most = 0;
   for (word r = 0; r < c->rooms; r++) most = c->list[r].members > most ? c->list[r].members : most;
   for (word i = 0; i < most; i++) all[i] = i;
@@ -488,6 +510,11 @@ static void make_room(scene *s) {
     at = counts + words + size;
   }
   s->scratch = (char *)(((uintptr_t)at + 7) / 8 * 8);
+}
+
+static void enter(scene *s, const crowd *c) {
+  s->c = c;
+  s->entries = c->length ? memcpy(s->own_entries, c->entries, c->length * sizeof(word)) : (word *)c->entries;
 }
 
 /* The rows of scenes, whose values and whose adjoints are walked apart; returns how many fit: the pairs of the next row are more than there is room for. */
@@ -515,7 +542,7 @@ API word roll(const crowd *c, const crowd *taped, const scenes *q, V *memory) {
       for (word w = 0; w < q->start_size; w++) LANE(s.x[w], l) = (R)q->start[from * q->start_size + w];
       for (word w = 0; w < c->given; w++) LANE(s.given[w], l) = (R)q->given[from * c->given + w];
     }
-    s.c = c;
+    enter(&s, c);
     for (word k = 0; k < steps; k++)
       if (!step(&s, k, q->most)) return row;
     for (word l = 0; l < rows; l++)
@@ -525,7 +552,7 @@ API word roll(const crowd *c, const crowd *taped, const scenes *q, V *memory) {
     if (!q->slopes) continue;
     memset(s.y, 0, (steps + 1) * c->state * sizeof(V));
     memset(s.b, 0, taped->words * sizeof(V));
-    s.c = taped;
+    enter(&s, taped);
     for (word l = 0; l < rows; l++)
       for (word k = 0; k <= steps; k++)
         for (word w = 0; w < q->shown; w++)

@@ -51,7 +51,9 @@ class _Crowd(ctypes.Structure):
     _fields_ = (
         *((name, WORD) for name in ("rooms", "species", "loops", "words", "state", "given")),
         *((name, WORD) for name in ("found", "looked", "striking")),
-        *((name, POINTER) for name in ("list", "order", "runs", "turns", "actions", "entries", "back", "several")),
+        *((name, POINTER) for name in ("list", "order", "runs", "turns", "actions", "references")),
+        ("length", WORD),
+        *((name, POINTER) for name in ("entries", "back", "several")),
         ("sieves", WORD),
         *((name, POINTER) for name in ("sifts", "words_of", "kinds", "sight", "nears")),
     )
@@ -163,7 +165,7 @@ class CrowdKernel:
             bodies = sum(room.members for room in crowd.rooms[1 : 1 + len(crowd.sights)])
             slots = sum(room.members for room in crowd.rooms[1 + len(crowd.sights) :])
             words = max(values.words, taped.words) + taped.words if gradient else values.words
-            words += (1 + gradient) * (steps + 1) * values.state + values.given
+            words += (1 + gradient) * (steps + 1) * values.state + values.given + values.length
             bytes_ = steps * (12 * lanes * slots + 4 * len(crowd.meetings)) + 24 * slots + 92 * bodies + 512
             bytes_ += 4 * max(room.members for room in crowd.rooms)
             for sieve in crowd.sieves:
@@ -196,7 +198,9 @@ class CrowdKernel:
             rooms[r] = _Room(walk.work[r], room.state, members[r], int(bases[r]), begins[r])
         self._kept.append(rooms)
         ends = 1 + len(crowd.nears) + np.cumsum([0, *map(len, crowd.nears)])
-        lists = walk.loops, walk.runs, walk.turns, self._actions(walk, begins, bases), walk.entries, walk.back
+        lists = walk.loops, walk.runs, walk.turns, *(
+            self._placed(walk, each, begins, bases) for each in (walk.actions, walk.references)
+        )  # fmt: skip
         places = [sieve.places for sieve in crowd.sieves]
         starts = np.cumsum([0, *map(len, places)]).tolist()
         sieves = [(s.room, at, len(s.places), s.loop) for s, at in zip(crowd.sieves, starts, strict=False)]
@@ -204,7 +208,9 @@ class CrowdKernel:
             *(len(members), len(crowd.sights), len(walk.loops), int(bases[-1]), state, crowd.given),
             *(crowd.found, crowd.looked, crowd.striking),
             ctypes.addressof(rooms),
-            *(self._put(each) for each in (*lists, walk.several)),
+            *(self._put(each) for each in lists),
+            len(walk.entries) if len(walk.references) else 0,
+            *(self._put(each) for each in (walk.entries, walk.back, walk.several)),
             len(sieves),
             self._put(np.array(sieves, np.int64)),
             self._put(np.array([at for own in places for at in own], np.int64)),
@@ -213,10 +219,14 @@ class CrowdKernel:
             self._put(np.array([*ends, *(at for words in crowd.nears for at in words)], np.int64)),
         )
 
-    def _actions(self, walk: Walk, begins: Sequence[int], bases: NDArray[np.int64]) -> NDArray[np.int64]:
-        """With places in the memory in place of rooms."""
+    def _placed(
+        self, walk: Walk, rows: NDArray[np.int64], begins: Sequence[int], bases: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Actions or references with places in the memory in place of rooms."""
+        if not rows.size:
+            return rows
         states = np.array([room.state for room in walk.crowd.rooms])
-        found = walk.actions.copy()
+        found = rows.copy()
         store, room = found[:, 0], found[:, 3].copy()
         kept = (store == Store.BEFORE) | (store == Store.AFTER)
         found[:, 3] = np.where(store == Store.WORK, np.array(walk.work)[room], np.where(kept, states[room], 0))
@@ -246,7 +256,7 @@ def compile_crowd(
     started = time.perf_counter()
     lanes = processor().lanes(False) if lanes is None else lanes
     several = processor().lanes(False) if lanes == 1 else 1
-    planned = crowd_plan(crowd, wide=several > 1)
+    planned = crowd_plan(crowd, alone=lanes == 1, wide=several > 1)
     with shared_library(_sources(planned, lanes, several), cache or default_cache()) as built:
         library = loaded(built.path)
     report = BuildReport(

@@ -22,7 +22,8 @@ from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.pieces import Form
 from symphys.codegen.emit.plan import NONE, PlannedPhase, with_adjoints
 from symphys.codegen.graph.graph import Graph
-from symphys.codegen.neighbours.program import Crowd, MemberCall, MemberLoop, Move, Of
+from symphys.codegen.neighbours.program import Crowd, MemberCall, MemberLoop, Move, Of, Reference
+from symphys.codegen.neighbours.references import with_references
 from symphys.codegen.neighbours.reuse import reused
 
 Words = NDArray[np.int64]
@@ -45,8 +46,10 @@ class Walk:
             section's word or -1, whether members do not depend on one another, where in turns its runs stand or -1.
         runs: (runs, 5) first action, end, sieve or -1, word, whether it is done where that is 0.
         turns: of loops whose runs all belong to words of one sieve, by word the run or -1.
-        actions: (actions, 9) store, of, offset, room, at, size, entry, entry of the adjoint, entry for several; see
-            ``neighbours.c``, where the offset has the place of the room, and a member's words stand for the room.
+        actions: (actions, 11) store, of, offset, room, at, size, entry, entry of the adjoint, entry for several, first
+            reference, end; see ``neighbours.c``, where the offset has the place of the room, and a member's words stand
+            for the room.
+        references: (references, 5) store, of, offset, room, the number of the argument.
         entries: of calls.
         back: of adjoints.
         several: of calls for several members: number, places, then the places.
@@ -58,6 +61,7 @@ class Walk:
     runs: Words
     turns: Words
     actions: Words
+    references: Words
     entries: Words
     back: Words
     several: Words
@@ -80,11 +84,17 @@ class CrowdPlan:
     taped: Walk
 
 
-def crowd_plan(crowd: Crowd, wide: bool = False) -> CrowdPlan:
-    """Of a crowd; ``wide``: some calls of values are done for several members at once."""
+def crowd_plan(crowd: Crowd, alone: bool = False, wide: bool = False) -> CrowdPlan:
+    """Of a crowd.
+
+    Args:
+        crowd: what to compute.
+        alone: for one scene at a time: calls of values read what lies elsewhere where it lies.
+        wide: some calls of values are done for several members at once; of one scene alone.
+    """
     functions, together = DistinctFunctions(), DistinctFunctions()
     part = with_adjoints(crowd.sample, ["x"], functions, crowd.chains)[0][1]
-    planner = _Planner(reused(crowd), part, functions, together if wide else None, taped=False)
+    planner = _Planner(reused(with_references(crowd) if alone else crowd), part, functions, together if wide else None, taped=False)
     values = planner.walk()
     taped = _Planner(crowd, part, functions, None, taped=True).walk()
     first = len(functions.listed)
@@ -108,6 +118,7 @@ class _Planner:
         self._runs: list[tuple[int, ...]] = []
         self._turns: list[int] = []
         self._actions: list[tuple[int, ...]] = []
+        self._references: list[tuple[int, ...]] = []
         self._entries: list[int] = []
         self._back: list[int] = []
         self._several: list[int] = []
@@ -123,25 +134,25 @@ class _Planner:
             for guard, does in groupby(loop.does, key=lambda each: each.guard):
                 self._run(list(does), loop.room, apart)
             end, begin = len(self._runs), len(self._actions)
-            self._actions += [(*_moved(move), NONE) for move in loop.instead]
+            self._actions += [_moved(move) for move in loop.instead]
             section = NONE if loop.section is None else loop.section
             turns = NONE if apart else self._turned(first)
             loops.append((loop.room, first, end, begin, len(self._actions), section, int(apart), turns))
-        lists = loops, self._runs, self._turns, self._actions, self._entries, self._back, self._several
+        lists = loops, self._runs, self._turns, self._actions, self._references, self._entries, self._back, self._several
         return Walk(self._crowd, tuple(self._work), *(np.array(each, np.int64) for each in lists))
 
     def _run(self, does: Sequence[Move | MemberCall], room: int, apart: bool) -> None:
         """What follows one another under one guard, then what is cleared where that leaves it out."""
         guard, first = does[0].guard, len(self._actions)
         for each in does:
-            self._actions.append((*_moved(each), NONE) if isinstance(each, Move) else self._called(each, room, apart))
+            self._actions.append(_moved(each) if isinstance(each, Move) else self._called(each, room, apart))
         word = (NONE, 0) if guard is None else guard
         self._runs.append((first, len(self._actions), *word, 0))
         cleared = [each for each in does if isinstance(each, MemberCall) and each.read and guard is not None]
         if cleared:
             first = len(self._actions)
             for call in cleared:
-                self._actions.append((CLEARED, 0, 0, 0, call.outputs[0], self._size(call), 0, NONE, NONE))
+                self._actions.append((CLEARED, 0, 0, 0, call.outputs[0], self._size(call), 0, NONE, NONE, 0, 0))
             self._runs.append((first, len(self._actions), *word, 1))
 
     def _turned(self, first: int) -> int:
@@ -165,27 +176,32 @@ class _Planner:
         part, functions = self._part, self._functions
         function, kind = part.calls.calls[call.number].function, int(part.kind[call.number])
         forward = functions.forward(function)
-        entry, back, tape = len(self._entries), NONE, list[int]()
+        entry, back, tape, first = len(self._entries), NONE, list[int](), len(self._references)
+        inputs = [0 if isinstance(at, Reference) else at for at in call.inputs]
+        for k, at in enumerate(call.inputs):
+            if isinstance(at, Reference):
+                self._references.append((int(at.store), int(at.of), at.offset, at.room, k))
         if self._taped and kind != NONE:
             adjoint, back = part.kinds[kind], len(self._back)
             pulled = adjoint.graph
             if (pair := functions.taped(forward, adjoint.graph)) is not None:
                 tape, forward, pulled = [self._work[room]], pair.forward, pair.adjoint
                 self._work[room] += pair.size
-            primal = [*call.inputs, *tape]
+            primal = [*inputs, *tape]
             form = Form(primal=len(primal), adds=True, backward=True, clears=True)
-            marked = [*_marked(call.outputs, adjoint.outputs), *_marked(call.inputs, adjoint.inputs)]
+            marked = [*_marked(call.outputs, adjoint.outputs), *_marked(inputs, adjoint.inputs)]
             self._back += _entry(functions.number(pulled, form), [*primal, *marked])
         form, several = Form(primal=function.n_in(), adds=False), NONE
         number = functions.number(forward, form)
-        self._entries += _entry(number, [*call.inputs, *call.outputs, *tape])
+        self._entries += _entry(number, [*inputs, *call.outputs, *tape])
         words = self._size(call) + sum(function.numel_in(k) for k in range(function.n_in()))
         if apart and self._together is not None and len(forward.nodes) > WORTH * words:
             several = len(self._several)
             self.heads.append(several)
-            places = [*call.inputs, *call.outputs]
+            places = [*inputs, *call.outputs]
             self._several += [self._together.number(forward, form), len(places), *places]
-        return CALLED, 0, 0, 0, call.outputs[0], self._size(call), entry, back, several
+        size = self._size(call)
+        return CALLED, 0, 0, 0, call.outputs[0], size, entry, back, several, first, len(self._references)
 
 
 def _apart(loop: MemberLoop) -> bool:
@@ -194,7 +210,8 @@ def _apart(loop: MemberLoop) -> bool:
 
 
 def _moved(move: Move) -> tuple[int, ...]:
-    return int(move.store), int(move.of) + OUT * move.out, move.offset, move.room, move.at, move.size, 0, NONE
+    of = int(move.of) + OUT * move.out
+    return int(move.store), of, move.offset, move.room, move.at, move.size, 0, NONE, NONE, 0, 0
 
 
 def _marked(places: Sequence[int], mask: Sequence[bool]) -> Iterator[int]:

@@ -78,19 +78,28 @@ class Move:
     guard: Word | None = None
 
 
+class Reference(NamedTuple):
+    """Words that are read where they lie; see ``Move``."""
+
+    store: Store
+    room: int
+    of: Of
+    offset: int
+
+
 @dataclass(frozen=True)
 class MemberCall:
     """A call for a member.
 
     Attributes:
         number: of the call in the sample's body.
-        inputs, outputs: where they begin in the work of the member.
+        inputs, outputs: where they begin in the work of the member, or elsewhere.
         guard: a word that is 0 if results are 0 or not read; None: the call is always needed.
         read: whether results may be read where that word is 0.
     """
 
     number: int
-    inputs: tuple[int, ...]
+    inputs: tuple[int | Reference, ...]
     outputs: tuple[int, ...]
     guard: Word | None = None
     read: bool = True

@@ -9,7 +9,7 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from symphys.codegen.neighbours.program import ONLY, Crowd, MemberCall, MemberLoop, Move, SightPlaces, Store
+from symphys.codegen.neighbours.program import ONLY, Crowd, MemberCall, MemberLoop, Move, Reference, SightPlaces, Store
 
 
 @dataclass
@@ -54,8 +54,10 @@ def _moved(loop: MemberLoop, places: _Places) -> MemberLoop:
         return replace(own, offset=places.of(each.room, each.offset)) if each.store is Store.WORK else own
 
     def call(each: MemberCall) -> MemberCall:
-        inputs, outputs = (tuple(places.of(loop.room, at) for at in side) for side in (each.inputs, each.outputs))
-        return replace(each, inputs=inputs, outputs=outputs)
+        inputs = tuple(
+            places.referred(at) if isinstance(at, Reference) else places.of(loop.room, at) for at in each.inputs
+        )
+        return replace(each, inputs=inputs, outputs=tuple(places.of(loop.room, at) for at in each.outputs))
 
     does = tuple(move(each) if isinstance(each, Move) else call(each) for each in loop.does)
     section = None if loop.section is None else places.of(ONLY, loop.section)
@@ -82,6 +84,10 @@ class _Places:
         """The new place of a word."""
         start = self._start(room, at)
         return self._to[room][start] + at - start
+
+    def referred(self, to: Reference) -> Reference:
+        """The same words elsewhere."""
+        return to._replace(offset=self.of(to.room, to.offset)) if to.store is Store.WORK else to
 
     def size(self, room: int) -> int:
         """Words of a member."""
@@ -121,9 +127,10 @@ class _Places:
             for does in (*loop.does, *loop.instead):
                 time += 1
                 places = (*does.inputs, *does.outputs) if isinstance(does, MemberCall) else (does.at,)
-                yield from ((time, loop.room, at) for at in places)
-                if isinstance(does, Move) and does.store is Store.WORK:
-                    yield time, does.room, does.offset
+                yield from ((time, loop.room, at) for at in places if not isinstance(at, Reference))
+                for each in (does,) if isinstance(does, Move) else places:
+                    if isinstance(each, Move | Reference) and each.store is Store.WORK:
+                        yield time, each.room, each.offset
             time += 1
 
     def _touch(self, time: int, room: int, at: int) -> None:
