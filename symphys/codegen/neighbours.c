@@ -3,16 +3,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define CALL(t, m, b, k) FUNCTIONS[(t)[0]](m, b, (t) + 2, k)
+#define CALL(t, m, b) FUNCTIONS[(t)[0]](m, b, (t) + 1, 0)
 
+typedef int32_t place; /* of words in a memory, and of rows in a table: what a step goes through fits a cache */
 typedef struct { word work, state, members, base, from; } room; /* words of a member; where members begin */
 /* Of runs; actions in place of them, where the word of a section is 0; whether no member hands anything on to another; where
    its runs stand by the words of their sieve, or -1. */
-typedef struct { word room, first, end, others, others_end, section, apart, turns; } loop;
-typedef struct { word first, end, sieve, word, off; } run; /* of actions: done where a word is not 0, or where it is */
-typedef struct { word store, of, offset, pitch, at, size, entry, back, several, first, end; } action; /* and its references */
-typedef struct { word store, of, offset, pitch, argument; } reference; /* an argument of a call that lies elsewhere */
-typedef struct { word room, places, size, loop; } sieve;   /* words by which members are told apart before a loop */
+typedef struct { place room, first, end, others, others_end, section, apart, turns; } loop;
+typedef struct { place first, end, sieve, word, off; } run; /* of actions: done where a word is not 0, or where it is */
+typedef struct { place store, of, offset, pitch, at, size, entry, back, several, first, end; } action; /* and its references */
+typedef struct { place store, of, offset, pitch, argument; } reference; /* an argument of a call that lies elsewhere */
+typedef struct { place room, places, size, loop; } sieve;   /* words by which members are told apart before a loop */
 typedef struct { word first, second, plane; double normal[3], offset; } kind; /* species; -1: a plane */
 typedef struct {
   word rooms, species, loops, words, state, given;
@@ -21,14 +22,14 @@ typedef struct {
   const room *list;
   const loop *order;
   const run *runs;
-  const word *turns;
+  const place *turns;
   const action *actions;
   const reference *references;
   word length; /* of entries, where there are references */
-  const word *entries, *back, *several; /* of calls, of their adjoints, of calls for several members */
+  const place *entries, *back, *several; /* of calls, of their adjoints, of calls for several members */
   word sieves;
   const sieve *sifts;
-  const word *words_of; /* of sieves: where they lie in the work of a member */
+  const place *words_of; /* of sieves: where they lie in the work of a member */
   const kind *kinds;
   const word *sight, *nears; /* by species: where a position and a reach lie; by kind where in nears
                                 words begin, of which one is not 0 if a pair is near */
@@ -57,7 +58,7 @@ typedef struct {
   int32_t *active, *count;  /* (slots) those that are near in the step, by kind; (kinds) how many */
   word slots;
   const word *before; /* (kinds) the number of the first pair of a kind among all */
-  word *entries, *own_entries; /* those of the crowd, with the places of references */
+  place *entries, *own_entries; /* those of the crowd, with the places of references */
   sifted *let; /* (sieves) */
   const int32_t *all; /* 0, 1, 2 .. */
   char *scratch;
@@ -345,15 +346,16 @@ static inline V *referred(const reference *r, const near *p, word i, V *const *s
 #ifdef SEVERAL
 static void call_several(
     const scene *s, const action *a, const room *own, const near *p, const int32_t *who, word count, V *const *stores) {
-  const word *t = s->c->several + a->several;
+  const place *t = s->c->several + a->several;
   const reference *first = s->c->references + a->first, *end = s->c->references + a->end;
-  word n = t[1], places[2 * SEVERAL * n];
+  word n = t[1];
+  place places[SEVERAL * n];
   for (word j = 0; j < count; j += SEVERAL) {
     for (word l = 0; l < SEVERAL; l++) {
       word i = who[j + l < count ? j + l : count - 1], base = own->base + i * own->work;
-      for (word w = 0; w < n; w++) places[2 * (w * SEVERAL + l)] = t[2 + w] + base;
+      for (word w = 0; w < n; w++) places[w * SEVERAL + l] = (place)(t[2 + w] + base);
       for (const reference *r = first; r < end; r++)
-        places[2 * (r->argument * SEVERAL + l)] = referred(r, p, i, stores) - s->m;
+        places[r->argument * SEVERAL + l] = (place)(referred(r, p, i, stores) - s->m);
     }
     FUNCTIONS[t[0]](s->m, 0, places, 0);
   }
@@ -365,12 +367,12 @@ static inline void act(const scene *s, const loop *o, const action *a, const rou
   const room *own = s->c->list + o->room;
   V *here = s->m + own->base + i * own->work;
   if (a->store == CALLED) {
-    word *t = s->entries + a->entry;
+    place *t = s->entries + a->entry;
     for (word q = a->first; q < a->end; q++) {
       const reference *at = s->c->references + q;
-      t[2 + 2 * at->argument] = referred(at, r->pairs, i, stores) - here;
+      t[1 + at->argument] = (place)(referred(at, r->pairs, i, stores) - here);
     }
-    CALL(t, here, 0, 0);
+    CALL(t, here, 0);
   } else if (a->store == CLEARED) memset(here + a->at, 0, a->size * sizeof(V));
   else copy(a, r->pairs ? r->pairs + i : 0, i, stores, here, 0);
 }
@@ -378,7 +380,7 @@ static inline void act(const scene *s, const loop *o, const action *a, const rou
 static inline void act_back(const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
   const room *own = s->c->list + o->room;
   V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
-  if (a->store == CALLED && a->back >= 0) CALL(s->c->back + a->back, here, gains, 0);
+  if (a->store == CALLED && a->back >= 0) CALL(s->c->back + a->back, here, gains);
   else if (a->store == CALLED || a->store == GIVEN || a->store == CLEARED) memset(gains + a->at, 0, a->size * sizeof(V));
   else copy(a, r->pairs ? r->pairs + i : 0, i, stores, gains, 1);
 }
@@ -497,7 +499,7 @@ static void step_back(const scene *s, word k) {
 /* Room for what sieves let through, and the numbers of members. */
 static void make_room(scene *s) {
   const crowd *c = s->c;
-  s->own_entries = (word *)s->scratch;
+  s->own_entries = (place *)s->scratch;
   int32_t *at = (int32_t *)(s->own_entries + c->length), *all = at;
   word most = 0;
   for (word r = 0; r < c->rooms; r++) most = c->list[r].members > most ? c->list[r].members : most;
@@ -514,7 +516,7 @@ static void make_room(scene *s) {
 
 static void enter(scene *s, const crowd *c) {
   s->c = c;
-  s->entries = c->length ? memcpy(s->own_entries, c->entries, c->length * sizeof(word)) : (word *)c->entries;
+  s->entries = c->length ? memcpy(s->own_entries, c->entries, c->length * sizeof(place)) : (place *)c->entries;
 }
 
 /* The rows of scenes, whose values and whose adjoints are walked apart; returns how many fit: the pairs of the next row are more than there is room for. */

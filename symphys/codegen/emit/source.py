@@ -54,12 +54,12 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
     return [*found, SourceFile(driver)]
 
 
-def listed(count: int) -> str:
+def listed(count: int, dialect: Dialect = VECTORS) -> str:
     """The functions f0, f1 .. in C, by number, as a driver calls them."""
     names = [f"f{number}" for number in range(count)]
-    declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
+    declared = "".join(f"void {name}(V *m, V *b, {dialect.table}t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
-    return f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
+    return f"{declared}static void (*const FUNCTIONS[])(V *, V *, {dialect.table}, word) = {{{table}}};\n"
 
 
 def head_of(lanes: int, single: bool, dialect: Dialect = VECTORS) -> str:

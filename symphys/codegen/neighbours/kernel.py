@@ -31,6 +31,8 @@ from symphys.codegen.toolchain.report import BuildReport
 Array = NDArray[np.float64]
 WORD = ctypes.c_int64
 POINTER = ctypes.c_void_p
+MOST = 2**31 - 1
+"""Words of a memory: places are numbers of 32 bits."""
 SPARE = 1.25
 """Times as many pairs as are near, for which there is room from then on."""
 
@@ -165,12 +167,14 @@ class CrowdKernel:
             bodies = sum(room.members for room in crowd.rooms[1 : 1 + len(crowd.sights)])
             slots = sum(room.members for room in crowd.rooms[1 + len(crowd.sights) :])
             words = max(values.words, taped.words) + taped.words if gradient else values.words
-            words += (1 + gradient) * (steps + 1) * values.state + values.given + values.length
+            words += (1 + gradient) * (steps + 1) * values.state + values.given + values.length // 2 + 1
             bytes_ = steps * (12 * lanes * slots + 4 * len(crowd.meetings)) + 24 * slots + 92 * bodies + 512
             bytes_ += 4 * max(room.members for room in crowd.rooms)
             for sieve in crowd.sieves:
                 bytes_ += 4 * (len(sieve.places) + (1 + 3 * len(sieve.places)) * crowd.rooms[sieve.room].members)
             total = words + bytes_ // (8 * lanes) + 2
+            if total > MOST:
+                raise ProgramError(f"neighbours: {steps} steps need {total} words of memory; there may be {MOST}")
             self._pools = {(steps, gradient): MemoryPool(total, lanes, np.float64, self.prepare)}
         return self._pools[steps, gradient]
 
@@ -208,15 +212,15 @@ class CrowdKernel:
             *(len(members), len(crowd.sights), len(walk.loops), int(bases[-1]), state, crowd.given),
             *(crowd.found, crowd.looked, crowd.striking),
             ctypes.addressof(rooms),
-            *(self._put(each) for each in lists),
+            *(self._put(each, np.int32) for each in lists),
             len(walk.entries) if len(walk.references) else 0,
-            *(self._put(each) for each in (walk.entries, walk.back, walk.several)),
+            *(self._put(each, np.int32) for each in (walk.entries, walk.back, walk.several)),
             len(sieves),
-            self._put(np.array(sieves, np.int64)),
-            self._put(np.array([at for own in places for at in own], np.int64)),
+            self._put(np.array(sieves), np.int32),
+            self._put(np.array([at for own in places for at in own]), np.int32),
             kinds,
-            self._put(np.array([(sight.position, sight.reach) for sight in crowd.sights], np.int64)),
-            self._put(np.array([*ends, *(at for words in crowd.nears for at in words)], np.int64)),
+            self._put(np.array([(sight.position, sight.reach) for sight in crowd.sights]), np.int64),
+            self._put(np.array([*ends, *(at for words in crowd.nears for at in words)]), np.int64),
         )
 
     def _placed(
@@ -233,8 +237,8 @@ class CrowdKernel:
         found[:, 2] += np.where(store == Store.WORK, bases[room], np.where(kept, np.array(begins)[room], 0))
         return found
 
-    def _put(self, values: NDArray[Any]) -> int:
-        values = np.ascontiguousarray(values) if values.size else np.zeros(1, np.int64)
+    def _put(self, values: NDArray[Any], kind: type[np.signedinteger[Any]]) -> int:
+        values = np.ascontiguousarray(values, kind) if values.size else np.zeros(1, kind)
         self._kept.append(values)
         return int(values.ctypes.data)
 
@@ -278,6 +282,7 @@ def _sources(planned: CrowdPlan, lanes: int, several: int) -> list[SourceFile]:
     """The C files; ``several``: calls that functions for several members do at once."""
     dialect = ONE_LANE if lanes == 1 else VECTORS
     head, found = head_of(lanes, single=False, dialect=dialect), list[SourceFile]()
+    dialect, team = (replace(each, dense=True) for each in (dialect, TEAM))
     numbers = range(len(planned.functions))
     for backward in (False, True):
         own = [i for i in numbers if planned.functions[i][1].backward == backward and i not in planned.wide]
@@ -286,9 +291,9 @@ def _sources(planned: CrowdPlan, lanes: int, several: int) -> list[SourceFile]:
     for i in wide:
         graph, form = planned.functions[i]
         accesses = (Access(EACH, (1,) * several),) * (len(graph.sizes) + len(graph.results))
-        texts.append(write(f"f{i}", graph, form, TEAM, (), Shape(several, accesses)))
+        texts.append(write(f"f{i}", graph, form, team, (), Shape(several, accesses)))
     found += _files(planned, wide, team_head(several, single=False), texts)
-    driver = head + (f"#define SEVERAL {several}\n" if wide else "") + listed(len(numbers)) + resource("neighbours.c")
+    driver = head + (f"#define SEVERAL {several}\n" if wide else "") + listed(len(numbers), dialect) + resource("neighbours.c")
     return [*found, SourceFile(driver)]
 
 

@@ -1,8 +1,8 @@
 """From a crowd to what is compiled, and to what the driver walks.
 
 Values and adjoints are walked apart. Where adjoints follow, the work of a member is laid out by the loops, and the
-tapes of its calls come after it. For values alone words are used again. Entries of calls have no strides: the driver
-gives a call the work of its member as the whole memory.
+tapes of its calls come after it. For values alone words are used again. An entry of a call is the number of its
+function, then places: the driver gives a call the work of its member as the whole memory.
 
 Actions under one guard follow one another as a run. Where the members of a loop do not depend on one another, a run is
 done for all of them before the next one, and the calls of one scene that are worth it are done for several members at
@@ -148,11 +148,10 @@ class _Planner:
             self._actions.append(_moved(each) if isinstance(each, Move) else self._called(each, room, apart))
         word = (NONE, 0) if guard is None else guard
         self._runs.append((first, len(self._actions), *word, 0))
-        cleared = [each for each in does if isinstance(each, MemberCall) and each.read and guard is not None]
-        if cleared:
-            first = len(self._actions)
-            for call in cleared:
-                self._actions.append((CLEARED, 0, 0, 0, call.outputs[0], self._size(call), 0, NONE, NONE, 0, 0))
+        first = len(self._actions)
+        for at, size in [span for each in does if isinstance(each, MemberCall) for span in each.cleared]:
+            self._actions.append((CLEARED, 0, 0, 0, at, size, 0, NONE, NONE, 0, 0))
+        if len(self._actions) > first:
             self._runs.append((first, len(self._actions), *word, 1))
 
     def _turned(self, first: int) -> int:
@@ -190,10 +189,10 @@ class _Planner:
             primal = [*inputs, *tape]
             form = Form(primal=len(primal), adds=True, backward=True, clears=True)
             marked = [*_marked(call.outputs, adjoint.outputs), *_marked(inputs, adjoint.inputs)]
-            self._back += _entry(functions.number(pulled, form), [*primal, *marked])
+            self._back += [functions.number(pulled, form), *primal, *marked]
         form, several = Form(primal=function.n_in(), adds=False), NONE
         number = functions.number(forward, form)
-        self._entries += _entry(number, [*inputs, *call.outputs, *tape])
+        self._entries += [number, *inputs, *call.outputs, *tape]
         words = self._size(call) + sum(function.numel_in(k) for k in range(function.n_in()))
         if apart and self._together is not None and len(forward.nodes) > WORTH * words:
             several = len(self._several)
@@ -218,5 +217,3 @@ def _marked(places: Sequence[int], mask: Sequence[bool]) -> Iterator[int]:
     return (at for at, on in zip(places, mask, strict=True) if on)
 
 
-def _entry(number: int, places: Sequence[int]) -> list[int]:
-    return [number, 2 + 2 * len(places), *(x for at in places for x in (at, 0))]

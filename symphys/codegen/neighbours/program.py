@@ -95,14 +95,14 @@ class MemberCall:
         number: of the call in the sample's body.
         inputs, outputs: where they begin in the work of the member, or elsewhere.
         guard: a word that is 0 if results are 0 or not read; None: the call is always needed.
-        read: whether results may be read where that word is 0.
+        cleared: (start, words) of results that are read where that word is 0.
     """
 
     number: int
     inputs: tuple[int | Reference, ...]
     outputs: tuple[int, ...]
     guard: Word | None = None
-    read: bool = True
+    cleared: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)

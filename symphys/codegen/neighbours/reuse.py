@@ -57,7 +57,9 @@ def _moved(loop: MemberLoop, places: _Places) -> MemberLoop:
         inputs = tuple(
             places.referred(at) if isinstance(at, Reference) else places.of(loop.room, at) for at in each.inputs
         )
-        return replace(each, inputs=inputs, outputs=tuple(places.of(loop.room, at) for at in each.outputs))
+        outputs = tuple(places.of(loop.room, at) for at in each.outputs)
+        cleared = tuple((places.of(loop.room, at), size) for at, size in each.cleared)
+        return replace(each, inputs=inputs, outputs=outputs, cleared=cleared)
 
     does = tuple(move(each) if isinstance(each, Move) else call(each) for each in loop.does)
     section = None if loop.section is None else places.of(ONLY, loop.section)

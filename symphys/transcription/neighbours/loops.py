@@ -17,6 +17,7 @@ from symphys.dynamics.neighbours.step import RecordedStep
 from symphys.dynamics.tracing.guards import Guard, Part
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.errors import SymphysError
+from symphys.transcription.neighbours.clearing import with_clearing
 
 NONE = -1
 
@@ -112,10 +113,9 @@ class _Builder:
             for vector in call.outputs:
                 if vector.number in self._root:
                     self._newest[self._root[vector.number]] = vector.number
-        self._mark_read(calls)
-        sieves = self._sieves()
-        loops = tuple(loop.done(self._word(loop.section)) for loop in self._loops)
-        return LoopStep(loops, sieves, tuple(self._work), tuple(self._states), self._homes)
+        sieves, kept = self._sieves(), {*self._recorder.words, *self._names.results}
+        loops = [loop.done(self._word(loop.section)) for loop in self._loops]
+        return LoopStep(with_clearing(loops, calls, kept, self._root), sieves, tuple(self._work), tuple(self._states), self._homes)
 
     def _sift(self) -> None:
         """Put the words together that tell the points of a pair apart at one instant."""
@@ -232,26 +232,6 @@ class _Builder:
                 offset = self._names.results[vector.number]
                 loop.does.append(Move(Store.AFTER, room, Of.OWN, offset, at, vector.size, out=True))
                 self._states[room] = max(self._states[room], offset + vector.size)
-
-    def _mark_read(self, calls: Sequence[TracedCall]) -> None:
-        """Note of guarded calls whether their results are read where they are left out; what is handed on is not."""
-        readers: dict[int, set[Word | None]] = {}
-        for number in (*self._recorder.words, *self._names.results):
-            readers[number] = {None}
-        for loop in reversed(self._loops):
-            for k in range(len(loop.does) - 1, -1, -1):
-                does = loop.does[k]
-                if isinstance(does, Move):
-                    continue
-                call = calls[does.number]
-                read = any(bool(readers.get(vector.number, set()) - {does.guard}) for vector in call.outputs)
-                loop.does[k] = replace(does, read=read)
-                for vector in call.inputs:
-                    if vector.number not in self._root:
-                        readers.setdefault(vector.number, set()).add(does.guard)
-                for part in call.section.otherwise if call.section is not None and read else ():
-                    if part is not None and part.vector is not None and part.vector.number not in self._root:
-                        readers[part.vector.number].add(None)
 
     def _instead(
         self, loop: _Loop, call: TracedCall, guard: Guard, member: Owner, inputs: Sequence[int], outputs: Sequence[int]

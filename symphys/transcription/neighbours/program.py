@@ -82,10 +82,11 @@ def _looks(does: Move | MemberCall, recorded: RecordedStep) -> bool:
 
 
 def _near_words(sample: Sample, recorded: RecordedStep, step: LoopStep, kind: int) -> tuple[int, ...]:
-    """Where the words of guards of a kind of pairs lie."""
+    """Where the words of guards of a kind of pairs lie: those of its points, where these are looked at."""
     first = {(pair.first, pair.second) for pair in (sample.world.pairs[k] for k in sample.pairs[kind])}
-    early = [vector.number for vector in recorded.recorder.guards]
-    return tuple(step.homes[number][1] for number in early if recorded.recorder.words[number] in first)
+    recorder = recorded.recorder
+    words = [vector.number for vector in recorder.guards if recorder.words[vector.number] in first]
+    return tuple(step.homes[number][1] for number in [n for n in words if n in recorder.points] or words)
 
 
 def step_program(
