@@ -363,18 +363,19 @@ static void call_several(
 #define FEWEST 3 /* members for which that pays */
 #endif
 
-static inline void act(const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
-  const room *own = s->c->list + o->room;
+/* Actions for one member. */
+static void act(
+    const scene *s, const room *own, const action *a, const action *end, const near *pairs, word i, V *const *stores) {
   V *here = s->m + own->base + i * own->work;
-  if (a->store == CALLED) {
-    place *t = s->entries + a->entry;
-    for (word q = a->first; q < a->end; q++) {
-      const reference *at = s->c->references + q;
-      t[1 + at->argument] = (place)(referred(at, r->pairs, i, stores) - here);
-    }
-    CALL(t, here, 0);
-  } else if (a->store == CLEARED) memset(here + a->at, 0, a->size * sizeof(V));
-  else copy(a, r->pairs ? r->pairs + i : 0, i, stores, here, 0);
+  const reference *references = s->c->references;
+  for (; a < end; a++)
+    if (a->store == CALLED) {
+      place *t = s->entries + a->entry;
+      for (const reference *r = references + a->first; r < references + a->end; r++)
+        t[1 + r->argument] = (place)(referred(r, pairs, i, stores) - here);
+      CALL(t, here, 0);
+    } else if (a->store == CLEARED) memset(here + a->at, 0, a->size * sizeof(V));
+    else copy(a, pairs ? pairs + i : 0, i, stores, here, 0);
 }
 
 static inline void act_back(const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
@@ -405,28 +406,34 @@ static word members_of(const scene *s, const run *n, const round *r, const int32
 
 static void go_apart(const scene *s, const loop *o, const round *r, V *const *stores) {
   const crowd *c = s->c;
+  const room *own = c->list + o->room;
   int32_t room_for[r->count];
   for (const run *n = c->runs + o->first; n < c->runs + o->end; n++) {
     const int32_t *who;
     word count = members_of(s, n, r, &who, room_for);
-    for (const action *a = c->actions + n->first; a < c->actions + n->end; a++) {
+    for (const action *a = c->actions + n->first, *end; a < c->actions + n->end; a = end) {
+      end = a;
 #ifdef SEVERAL
-      if (a->store == CALLED && a->several >= 0 && count >= FEWEST) {
-        call_several(s, a, c->list + o->room, r->pairs, who, count, stores);
+      if (a->several >= 0 && count >= FEWEST) {
+        call_several(s, a, own, r->pairs, who, count, stores);
+        end++;
         continue;
       }
+      while (end < c->actions + n->end && (end->several < 0 || count < FEWEST)) end++;
+#else
+      end = c->actions + n->end;
 #endif
-      for (word j = 0; j < count; j++) act(s, o, a, r, who[j], stores);
+      for (word j = 0; j < count; j++) act(s, own, a, end, r->pairs, who[j], stores);
     }
   }
 }
 
 static void go(const scene *s, const loop *o, const round *r, V *const *stores) {
   const crowd *c = s->c;
+  const room *own = c->list + o->room;
   if (o->section >= 0 && !any(s->m + c->list[0].base + o->section)) {
-    for (word j = 0; j < r->count; j++)
-      for (const action *a = c->actions + o->others; a < c->actions + o->others_end; a++)
-        act(s, o, a, r, r->listed ? r->listed[j] : j, stores);
+    const action *first = c->actions + o->others, *end = c->actions + o->others_end;
+    for (word j = 0; j < r->count; j++) act(s, own, first, end, r->pairs, r->listed ? r->listed[j] : j, stores);
   } else if (o->apart) {
     go_apart(s, o, r, stores);
   } else if (o->turns >= 0) {
@@ -434,15 +441,14 @@ static void go(const scene *s, const loop *o, const round *r, V *const *stores) 
     for (word k = 0; k < f->count; k++) {
       word turn = c->turns[o->turns + f->which[k]];
       if (turn < 0) continue;
-      const action *end = c->actions + c->runs[turn].end;
-      for (const action *a = c->actions + c->runs[turn].first; a < end; a++) act(s, o, a, r, f->who[k], stores);
+      const run *n = c->runs + turn;
+      act(s, own, c->actions + n->first, c->actions + n->end, r->pairs, f->who[k], stores);
     }
   } else {
     for (word j = 0; j < r->count; j++) {
       word i = r->listed ? r->listed[j] : j;
       for (const run *n = c->runs + o->first; n < c->runs + o->end; n++)
-        if (goes(s, n, i))
-          for (const action *a = c->actions + n->first; a < c->actions + n->end; a++) act(s, o, a, r, i, stores);
+        if (goes(s, n, i)) act(s, own, c->actions + n->first, c->actions + n->end, r->pairs, i, stores);
     }
   }
 }
