@@ -7,9 +7,9 @@
 
 typedef int32_t place; /* of words in a memory, and of rows in a table: what a step goes through fits a cache */
 typedef struct { word work, state, members, base, from; } room; /* words of a member; where members begin */
-/* Of runs; actions in place of them, where the word of a section is 0; whether no member hands anything on to another; where
-   its runs stand by the words of their sieve, or -1. */
-typedef struct { place room, first, end, others, others_end, section, apart, turns; } loop;
+/* Of runs; actions in place of them, where the word of a section is 0; how runs are gone through, and where they stand by the
+   words of their sieve. */
+typedef struct { place room, first, end, others, others_end, section, way, turns; } loop;
 typedef struct { place first, end, sieve, word, off; } run; /* of actions: done where a word is not 0, or where it is */
 typedef struct { place store, of, offset, pitch, at, size, entry, back, several, first, end; } action; /* and its references */
 typedef struct { place store, of, offset, pitch, argument; } reference; /* an argument of a call that lies elsewhere */
@@ -43,6 +43,7 @@ typedef struct {
 } scenes;
 
 enum { WORK, BEFORE, AFTER, GIVEN, CALLED, CLEARED }; /* CLEARED: results of a call where it is left out */
+enum { ONE_RUN, APART, IN_TURN, MIXED }; /* one run for all members; run by run; as a sieve lets them through; by member */
 enum { OWN, FIRST, SECOND, ONCE, THEN, OUT = 8 };
 /* before: the number of the same pair in the step before; -1: it was not near; -2: there is no pair in this lane */
 typedef struct { int32_t first[LANES], second[LANES], before[LANES]; } near;
@@ -364,7 +365,7 @@ static void call_several(
 #endif
 
 /* Actions for one member. */
-static void act(
+static inline __attribute__((always_inline)) void act(
     const scene *s, const room *own, const action *a, const action *end, const near *pairs, word i, V *const *stores) {
   V *here = s->m + own->base + i * own->work;
   const reference *references = s->c->references;
@@ -378,7 +379,7 @@ static void act(
     else copy(a, pairs ? pairs + i : 0, i, stores, here, 0);
 }
 
-static inline void act_back(const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
+static inline __attribute__((always_inline)) void act_back(const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
   const room *own = s->c->list + o->room;
   V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
   if (a->store == CALLED && a->back >= 0) CALL(s->c->back + a->back, here, gains);
@@ -404,7 +405,8 @@ static word members_of(const scene *s, const run *n, const round *r, const int32
   return count;
 }
 
-static void go_apart(const scene *s, const loop *o, const round *r, V *const *stores) {
+/* Run by run, each for all of its members. */
+static NOINLINE void go_apart(const scene *s, const loop *o, const round *r, V *const *stores) {
   const crowd *c = s->c;
   const room *own = c->list + o->room;
   int32_t room_for[r->count];
@@ -412,11 +414,10 @@ static void go_apart(const scene *s, const loop *o, const round *r, V *const *st
     const int32_t *who;
     word count = members_of(s, n, r, &who, room_for);
     for (const action *a = c->actions + n->first, *end; a < c->actions + n->end; a = end) {
-      end = a;
+      end = a + 1;
 #ifdef SEVERAL
       if (a->several >= 0 && count >= FEWEST) {
         call_several(s, a, own, r->pairs, who, count, stores);
-        end++;
         continue;
       }
       while (end < c->actions + n->end && (end->several < 0 || count < FEWEST)) end++;
@@ -428,28 +429,39 @@ static void go_apart(const scene *s, const loop *o, const round *r, V *const *st
   }
 }
 
-static void go(const scene *s, const loop *o, const round *r, V *const *stores) {
+/* What a sieve has let through, one after the other. */
+static NOINLINE void go_in_turn(const scene *s, const loop *o, const round *r, V *const *stores) {
   const crowd *c = s->c;
-  const room *own = c->list + o->room;
-  if (o->section >= 0 && !any(s->m + c->list[0].base + o->section)) {
-    const action *first = c->actions + o->others, *end = c->actions + o->others_end;
-    for (word j = 0; j < r->count; j++) act(s, own, first, end, r->pairs, r->listed ? r->listed[j] : j, stores);
-  } else if (o->apart) {
-    go_apart(s, o, r, stores);
-  } else if (o->turns >= 0) {
-    const sifted *f = s->let + c->runs[o->first].sieve;
-    for (word k = 0; k < f->count; k++) {
-      word turn = c->turns[o->turns + f->which[k]];
-      if (turn < 0) continue;
-      const run *n = c->runs + turn;
-      act(s, own, c->actions + n->first, c->actions + n->end, r->pairs, f->who[k], stores);
-    }
-  } else {
-    for (word j = 0; j < r->count; j++) {
-      word i = r->listed ? r->listed[j] : j;
-      for (const run *n = c->runs + o->first; n < c->runs + o->end; n++)
-        if (goes(s, n, i)) act(s, own, c->actions + n->first, c->actions + n->end, r->pairs, i, stores);
-    }
+  const sifted *f = s->let + c->runs[o->first].sieve;
+  for (word k = 0; k < f->count; k++) {
+    word turn = c->turns[o->turns + f->which[k]];
+    if (turn < 0) continue;
+    const run *n = c->runs + turn;
+    act(s, c->list + o->room, c->actions + n->first, c->actions + n->end, r->pairs, f->who[k], stores);
+  }
+}
+
+static NOINLINE void go_mixed(const scene *s, const loop *o, const round *r, V *const *stores) {
+  const crowd *c = s->c;
+  for (word j = 0; j < r->count; j++) {
+    word i = r->listed ? r->listed[j] : j;
+    for (const run *n = c->runs + o->first; n < c->runs + o->end; n++)
+      if (goes(s, n, i))
+        act(s, c->list + o->room, c->actions + n->first, c->actions + n->end, r->pairs, i, stores);
+  }
+}
+
+static inline void go(const scene *s, const loop *o, const round *r, V *const *stores) {
+  const crowd *c = s->c;
+  int left_out = o->section >= 0 && !any(s->m + c->list[0].base + o->section);
+  if (!left_out && o->way == APART) go_apart(s, o, r, stores);
+  else if (!left_out && o->way == IN_TURN) go_in_turn(s, o, r, stores);
+  else if (!left_out && o->way == MIXED) go_mixed(s, o, r, stores);
+  else {
+    const action *first = c->actions + (left_out ? o->others : c->runs[o->first].first);
+    const action *end = c->actions + (left_out ? o->others_end : c->runs[o->first].end);
+    for (word j = 0; j < r->count; j++)
+      act(s, c->list + o->room, first, end, r->pairs, r->listed ? r->listed[j] : j, stores);
   }
 }
 

@@ -286,19 +286,17 @@ def _sources(planned: CrowdPlan, lanes: int, several: int) -> list[SourceFile]:
     numbers = range(len(planned.functions))
     for backward in (False, True):
         own = [i for i in numbers if planned.functions[i][1].backward == backward and i not in planned.wide]
-        found += _files(planned, own, head, [write(f"f{i}", *planned.functions[i], dialect, ()) for i in own], lanes == 1)
+        found += _files(planned, own, head, [write(f"f{i}", *planned.functions[i], dialect, ()) for i in own])
     wide, texts = sorted(planned.wide), list[str]()
     for i in wide:
         graph, form = planned.functions[i]
         accesses = (Access(EACH, (1,) * several),) * (len(graph.sizes) + len(graph.results))
         texts.append(write(f"f{i}", graph, form, team, (), Shape(several, accesses)))
-    found += _files(planned, wide, team_head(several, single=False), texts, False)
+    found += _files(planned, wide, team_head(several, single=False), texts)
     driver = head + (f"#define SEVERAL {several}\n" if wide else "") + listed(len(numbers), dialect) + resource("neighbours.c")
     return [*found, SourceFile(driver)]
 
 
-def _files(
-    planned: CrowdPlan, numbers: Sequence[int], head: str, texts: Sequence[str], narrow: bool
-) -> Iterator[SourceFile]:
+def _files(planned: CrowdPlan, numbers: Sequence[int], head: str, texts: Sequence[str]) -> Iterator[SourceFile]:
     for group in spread(texts, [len(planned.functions[i][0].nodes) for i in numbers], FILES):
-        yield SourceFile("\n".join([head, *group]), narrow=narrow, straight=True)
+        yield SourceFile("\n".join([head, *group]), straight=True)

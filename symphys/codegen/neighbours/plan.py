@@ -23,12 +23,13 @@ from symphys.codegen.emit.pieces import Form
 from symphys.codegen.emit.plan import NONE, PlannedPhase, with_adjoints
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.neighbours.program import Crowd, MemberCall, MemberLoop, Move, Of, Reference
-from symphys.codegen.neighbours.references import with_references
 from symphys.codegen.neighbours.reuse import reused
 
 Words = NDArray[np.int64]
 CALLED, CLEARED = 4, 5
 """The store of an action that is a call, or that clears results where a guard has left one out."""
+ONE_RUN, APART, IN_TURN, MIXED = range(4)
+"""How a loop goes through its runs."""
 OUT = 8
 """Added to ``Of`` of a move that goes out."""
 WORTH = 2
@@ -43,7 +44,7 @@ class Walk:
         crowd: with the places of its words.
         work: words of a member of each room, with tapes.
         loops: (loops, 8) room, first run, end, first action of what is done where the section is left out, end, the
-            section's word or -1, whether members do not depend on one another, where in turns its runs stand or -1.
+            section's word or -1, how runs are gone through (``neighbours.c``), where in turns they stand.
         runs: (runs, 5) first action, end, sieve or -1, word, whether it is done where that is 0.
         turns: of loops whose runs all belong to words of one sieve, by word the run or -1.
         actions: (actions, 11) store, of, offset, room, at, size, entry, entry of the adjoint, entry for several, first
@@ -94,7 +95,7 @@ def crowd_plan(crowd: Crowd, alone: bool = False, wide: bool = False) -> CrowdPl
     """
     functions, together = DistinctFunctions(), DistinctFunctions()
     part = with_adjoints(crowd.sample, ["x"], functions, crowd.chains)[0][1]
-    planner = _Planner(reused(with_references(crowd) if alone else crowd), part, functions, together if wide else None, taped=False)
+    planner = _Planner(reused(crowd, alone), part, functions, together if wide else None, taped=False)
     values = planner.walk()
     taped = _Planner(crowd, part, functions, None, taped=True).walk()
     first = len(functions.listed)
@@ -136,8 +137,8 @@ class _Planner:
             end, begin = len(self._runs), len(self._actions)
             self._actions += [_moved(move) for move in loop.instead]
             section = NONE if loop.section is None else loop.section
-            turns = NONE if apart else self._turned(first)
-            loops.append((loop.room, first, end, begin, len(self._actions), section, int(apart), turns))
+            way, turns = self._way(first, apart)
+            loops.append((loop.room, first, end, begin, len(self._actions), section, way, turns))
         lists = loops, self._runs, self._turns, self._actions, self._references, self._entries, self._back, self._several
         return Walk(self._crowd, tuple(self._work), *(np.array(each, np.int64) for each in lists))
 
@@ -154,18 +155,25 @@ class _Planner:
         if len(self._actions) > first:
             self._runs.append((first, len(self._actions), *word, 1))
 
-    def _turned(self, first: int) -> int:
-        """Where in ``turns`` the runs from ``first`` on stand; -1 where they do not each belong to a word of a sieve."""
+    def _way(self, first: int, apart: bool) -> tuple[int, int]:
+        """(how the runs from ``first`` on are gone through, where in ``turns`` they stand)."""
         runs = self._runs[first:]
         sieves, words = {run[2] for run in runs}, [run[3] for run in runs]
+        if len(runs) == 1 and NONE in sieves and not self._several_in(runs):
+            return ONE_RUN, NONE
+        if apart and self._together is not None:
+            return APART, NONE
         if len(sieves) != 1 or NONE in sieves or words != sorted(set(words)) or any(run[4] for run in runs):
-            return NONE
+            return MIXED, NONE
         at, (sieve,) = len(self._turns), sieves
         turns = [NONE] * len(self._crowd.sieves[sieve].places)
         for k, word in enumerate(words):
             turns[word] = first + k
         self._turns += turns
-        return at
+        return IN_TURN, at
+
+    def _several_in(self, runs: Sequence[tuple[int, ...]]) -> bool:
+        return any(action[8] != NONE for run in runs for action in self._actions[run[0] : run[1]])
 
     def _size(self, call: MemberCall) -> int:
         function = self._part.calls.calls[call.number].function

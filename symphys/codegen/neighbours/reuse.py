@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from symphys.codegen.neighbours.program import ONLY, Crowd, MemberCall, MemberLoop, Move, Reference, SightPlaces, Store
+from symphys.codegen.neighbours.references import with_references
 
 
 @dataclass
@@ -27,9 +28,11 @@ class _Region:
     last: int
 
 
-def reused(crowd: Crowd) -> Crowd:
-    """The same crowd with less work; it has no adjoint."""
-    places = _Places(crowd)
+def reused(crowd: Crowd, alone: bool = False) -> Crowd:
+    """The same crowd with less work; it has no adjoint. ``alone``: for one scene, ``with_references``."""
+    begin = _begin(crowd)
+    crowd = with_references(crowd) if alone else crowd
+    places = _Places(crowd, begin)
     loops = tuple(_moved(loop, places) for loop in crowd.loops)
     species = len(crowd.sights)
     return replace(
@@ -66,12 +69,24 @@ def _moved(loop: MemberLoop, places: _Places) -> MemberLoop:
     return MemberLoop(loop.room, does, section, tuple(map(move, loop.instead)))
 
 
+def _begin(crowd: Crowd) -> list[set[int]]:
+    """By room, where regions begin: results of a call, and what is copied in."""
+    found: list[set[int]] = [set() for _ in crowd.rooms]
+    for loop in crowd.loops:
+        for does in loop.does:
+            if isinstance(does, MemberCall):
+                found[loop.room].update(does.outputs[:1])
+            elif not does.out:
+                found[loop.room].add(does.at)
+    return found
+
+
 class _Places:
     """Where words of the work go."""
 
-    def __init__(self, crowd: Crowd) -> None:
+    def __init__(self, crowd: Crowd, begin: list[set[int]]) -> None:
         self._crowd = crowd
-        self._starts = [sorted(starts) for starts in self._begin()]
+        self._starts = [sorted(starts) for starts in begin]
         self._regions: list[dict[int, _Region]] = [{} for _ in crowd.rooms]
         for time, room, at in self._touched():
             self._touch(time, room, at)
@@ -97,17 +112,6 @@ class _Places:
 
     def _start(self, room: int, at: int) -> int:
         return self._starts[room][bisect_right(self._starts[room], at) - 1]
-
-    def _begin(self) -> list[set[int]]:
-        """By room, where regions begin: results of a call, and what is copied in."""
-        found: list[set[int]] = [set() for _ in self._crowd.rooms]
-        for loop in self._crowd.loops:
-            for does in loop.does:
-                if isinstance(does, MemberCall):
-                    found[loop.room].update(does.outputs[:1])
-                elif not does.out:
-                    found[loop.room].add(does.at)
-        return found
 
     def _touched(self) -> Iterator[tuple[int, int, int]]:
         """(time, room, word) of all that is written or read, in order."""
