@@ -31,6 +31,7 @@ from symphys.codegen.toolchain.report import BuildReport
 Array = NDArray[np.float64]
 WORD = ctypes.c_int64
 POINTER = ctypes.c_void_p
+DRIVER = "crowd.h", "meetings.c", "neighbours.c"
 MOST = 2**31 - 1
 """Words of a memory: places are numbers of 32 bits."""
 SPARE = 1.25
@@ -259,8 +260,8 @@ def compile_crowd(
     """
     started = time.perf_counter()
     lanes = processor().lanes(False) if lanes is None else lanes
-    several = processor().lanes(False) if lanes == 1 else 1
-    planned = crowd_plan(crowd, alone=lanes == 1, wide=several > 1)
+    several = processor().lanes(False) if lanes == 1 else 0
+    planned = crowd_plan(crowd, several)
     with shared_library(_sources(planned, lanes, several), cache or default_cache()) as built:
         library = loaded(built.path)
     report = BuildReport(
@@ -293,7 +294,12 @@ def _sources(planned: CrowdPlan, lanes: int, several: int) -> list[SourceFile]:
         accesses = (Access(EACH, (1,) * several),) * (len(graph.sizes) + len(graph.results))
         texts.append(write(f"f{i}", graph, form, team, (), Shape(several, accesses)))
     found += _files(planned, wide, team_head(several, single=False), texts)
-    driver = head + (f"#define SEVERAL {several}\n" if wide else "") + listed(len(numbers), dialect) + resource("neighbours.c")
+    driver = (
+        head
+        + (f"#define SEVERAL {several}\n" if wide else "")
+        + listed(len(numbers), dialect)
+        + "".join(map(resource, DRIVER))
+    )
     return [*found, SourceFile(driver)]
 
 

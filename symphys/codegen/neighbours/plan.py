@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,42 @@ WORTH = 2
 """Operations for each word that is read or written, from which on a call is done for several members at once."""
 
 
+class Run(NamedTuple):
+    """Actions from ``first`` to ``end`` under one guard: done where its word is not 0, or where it is, if ``off``."""
+
+    first: int
+    end: int
+    sieve: int
+    word: int
+    off: bool = False
+
+
+class Action(NamedTuple):
+    """A copy or a call; in the driver the offset has the place of the room, and a member's words stand for the room.
+
+    Attributes:
+        store: the other one of a copy, or CALLED, or CLEARED.
+        of, offset, room: what is copied, as in ``Move``.
+        at, size: where in the member's work, and how much.
+        entry: of a call.
+        back: entry of its adjoint.
+        several: entry of the call for several members.
+        first, end: its references.
+    """
+
+    store: int
+    of: int = 0
+    offset: int = 0
+    room: int = 0
+    at: int = 0
+    size: int = 0
+    entry: int = 0
+    back: int = NONE
+    several: int = NONE
+    first: int = 0
+    end: int = 0
+
+
 @dataclass(frozen=True)
 class Walk:
     """What the driver walks.
@@ -44,16 +81,14 @@ class Walk:
         crowd: with the places of its words.
         work: words of a member of each room, with tapes.
         loops: (loops, 8) room, first run, end, first action of what is done where the section is left out, end, the
-            section's word or -1, how runs are gone through (``neighbours.c``), where in turns they stand.
-        runs: (runs, 5) first action, end, sieve or -1, word, whether it is done where that is 0.
+            section's word or -1, how runs are gone through, where in turns they stand.
+        runs: (runs, 5); see ``Run``.
         turns: of loops whose runs all belong to words of one sieve, by word the run or -1.
-        actions: (actions, 11) store, of, offset, room, at, size, entry, entry of the adjoint, entry for several, first
-            reference, end; see ``neighbours.c``, where the offset has the place of the room, and a member's words stand
-            for the room.
+        actions: (actions, 11); see ``Action``.
         references: (references, 5) store, of, offset, room, the number of the argument.
-        entries: of calls.
+        entries: of calls: number of the function, then places.
         back: of adjoints.
-        several: of calls for several members: number, places, then the places.
+        several: of calls for several members: number, how many places, then these.
     """
 
     crowd: Crowd
@@ -85,17 +120,16 @@ class CrowdPlan:
     taped: Walk
 
 
-def crowd_plan(crowd: Crowd, alone: bool = False, wide: bool = False) -> CrowdPlan:
+def crowd_plan(crowd: Crowd, several: int = 0) -> CrowdPlan:
     """Of a crowd.
 
     Args:
         crowd: what to compute.
-        alone: for one scene at a time: calls of values read what lies elsewhere where it lies.
-        wide: some calls of values are done for several members at once; of one scene alone.
+        several: of one scene alone, how many members a call of values may be done for at once; 0: scenes in lanes.
     """
     functions, together = DistinctFunctions(), DistinctFunctions()
     part = with_adjoints(crowd.sample, ["x"], functions, crowd.chains)[0][1]
-    planner = _Planner(reused(crowd, alone), part, functions, together if wide else None, taped=False)
+    planner = _Planner(reused(crowd, several > 0), part, functions, together if several > 1 else None, taped=False)
     values = planner.walk()
     taped = _Planner(crowd, part, functions, None, taped=True).walk()
     first = len(functions.listed)
@@ -105,6 +139,8 @@ def crowd_plan(crowd: Crowd, alone: bool = False, wide: bool = False) -> CrowdPl
 
 
 class _Planner:
+    """Goes through the loops of a crowd; ``heads``: where in ``several`` the numbers of functions stand."""
+
     def __init__(
         self,
         crowd: Crowd,
@@ -116,54 +152,53 @@ class _Planner:
         self._crowd, self._part, self._functions, self._together = crowd, part, functions, together
         self._taped = taped
         self._work = [room.work for room in crowd.rooms]
-        self._runs: list[tuple[int, ...]] = []
+        self._runs: list[Run] = []
         self._turns: list[int] = []
-        self._actions: list[tuple[int, ...]] = []
+        self._actions: list[Action] = []
         self._references: list[tuple[int, ...]] = []
         self._entries: list[int] = []
         self._back: list[int] = []
         self._several: list[int] = []
         self.heads: list[int] = []
-        """Where in the entries for several members the numbers of functions stand."""
 
     def walk(self) -> Walk:
         """Loops in order, and entries of their calls."""
         loops = []
         for loop in self._crowd.loops:
             first = len(self._runs)
-            apart = _apart(loop)
-            for guard, does in groupby(loop.does, key=lambda each: each.guard):
+            apart = self._together is not None and _apart(loop)
+            for _, does in groupby(loop.does, key=lambda each: each.guard):
                 self._run(list(does), loop.room, apart)
             end, begin = len(self._runs), len(self._actions)
             self._actions += [_moved(move) for move in loop.instead]
             section = NONE if loop.section is None else loop.section
-            way, turns = self._way(first, apart)
+            way, turns = self._way(self._runs[first:], first, apart)
             loops.append((loop.room, first, end, begin, len(self._actions), section, way, turns))
-        lists = loops, self._runs, self._turns, self._actions, self._references, self._entries, self._back, self._several
-        return Walk(self._crowd, tuple(self._work), *(np.array(each, np.int64) for each in lists))
+        tables = loops, self._runs, self._turns, self._actions, self._references
+        calls = self._entries, self._back, self._several
+        return Walk(self._crowd, tuple(self._work), *(np.array(each, np.int64) for each in (*tables, *calls)))
 
     def _run(self, does: Sequence[Move | MemberCall], room: int, apart: bool) -> None:
         """What follows one another under one guard, then what is cleared where that leaves it out."""
-        guard, first = does[0].guard, len(self._actions)
+        word, first = does[0].guard or (NONE, 0), len(self._actions)
         for each in does:
             self._actions.append(_moved(each) if isinstance(each, Move) else self._called(each, room, apart))
-        word = (NONE, 0) if guard is None else guard
-        self._runs.append((first, len(self._actions), *word, 0))
-        first = len(self._actions)
-        for at, size in [span for each in does if isinstance(each, MemberCall) for span in each.cleared]:
-            self._actions.append((CLEARED, 0, 0, 0, at, size, 0, NONE, NONE, 0, 0))
-        if len(self._actions) > first:
-            self._runs.append((first, len(self._actions), *word, 1))
+        self._runs.append(Run(first, len(self._actions), *word))
+        spans = [span for each in does if isinstance(each, MemberCall) for span in each.cleared]
+        if spans:
+            first = len(self._actions)
+            self._actions += [Action(CLEARED, at=at, size=size) for at, size in spans]
+            self._runs.append(Run(first, len(self._actions), *word, off=True))
 
-    def _way(self, first: int, apart: bool) -> tuple[int, int]:
-        """(how the runs from ``first`` on are gone through, where in ``turns`` they stand)."""
-        runs = self._runs[first:]
-        sieves, words = {run[2] for run in runs}, [run[3] for run in runs]
-        if len(runs) == 1 and NONE in sieves and not self._several_in(runs):
-            return ONE_RUN, NONE
-        if apart and self._together is not None:
+    def _way(self, runs: Sequence[Run], first: int, apart: bool) -> tuple[int, int]:
+        """(how runs from number ``first`` on are gone through, where in ``turns`` they stand)."""
+        sieves, words = {run.sieve for run in runs}, [run.word for run in runs]
+        if len(runs) == 1 and NONE in sieves:
+            several = any(each.several != NONE for each in self._actions[runs[0].first : runs[0].end])
+            return (APART if several else ONE_RUN), NONE
+        if apart:
             return APART, NONE
-        if len(sieves) != 1 or NONE in sieves or words != sorted(set(words)) or any(run[4] for run in runs):
+        if len(sieves) != 1 or NONE in sieves or words != sorted(set(words)) or any(run.off for run in runs):
             return MIXED, NONE
         at, (sieve,) = len(self._turns), sieves
         turns = [NONE] * len(self._crowd.sieves[sieve].places)
@@ -172,43 +207,43 @@ class _Planner:
         self._turns += turns
         return IN_TURN, at
 
-    def _several_in(self, runs: Sequence[tuple[int, ...]]) -> bool:
-        return any(action[8] != NONE for run in runs for action in self._actions[run[0] : run[1]])
-
-    def _size(self, call: MemberCall) -> int:
+    def _called(self, call: MemberCall, room: int, apart: bool) -> Action:
         function = self._part.calls.calls[call.number].function
-        return sum(function.numel_out(k) for k in range(function.n_out()))
-
-    def _called(self, call: MemberCall, room: int, apart: bool) -> tuple[int, ...]:
-        part, functions = self._part, self._functions
-        function, kind = part.calls.calls[call.number].function, int(part.kind[call.number])
-        forward = functions.forward(function)
-        entry, back, tape, first = len(self._entries), NONE, list[int](), len(self._references)
+        size = sum(function.numel_out(k) for k in range(function.n_out()))
+        forward, first = self._functions.forward(function), len(self._references)
         inputs = [0 if isinstance(at, Reference) else at for at in call.inputs]
         for k, at in enumerate(call.inputs):
             if isinstance(at, Reference):
                 self._references.append((int(at.store), int(at.of), at.offset, at.room, k))
-        if self._taped and kind != NONE:
-            adjoint, back = part.kinds[kind], len(self._back)
-            pulled = adjoint.graph
-            if (pair := functions.taped(forward, adjoint.graph)) is not None:
-                tape, forward, pulled = [self._work[room]], pair.forward, pair.adjoint
-                self._work[room] += pair.size
-            primal = [*inputs, *tape]
-            form = Form(primal=len(primal), adds=True, backward=True, clears=True)
-            marked = [*_marked(call.outputs, adjoint.outputs), *_marked(inputs, adjoint.inputs)]
-            self._back += [functions.number(pulled, form), *primal, *marked]
-        form, several = Form(primal=function.n_in(), adds=False), NONE
-        number = functions.number(forward, form)
-        self._entries += [number, *inputs, *call.outputs, *tape]
-        words = self._size(call) + sum(function.numel_in(k) for k in range(function.n_in()))
+        form, places, several = Form(primal=function.n_in(), adds=False), [*inputs, *call.outputs], NONE
+        words = size + sum(function.numel_in(k) for k in range(function.n_in()))
         if apart and self._together is not None and len(forward.nodes) > WORTH * words:
             several = len(self._several)
             self.heads.append(several)
-            places = [*inputs, *call.outputs]
             self._several += [self._together.number(forward, form), len(places), *places]
-        size = self._size(call)
-        return CALLED, 0, 0, 0, call.outputs[0], size, entry, back, several, first, len(self._references)
+        forward, tape, back = self._pulled(call, forward, inputs, room)
+        entry = len(self._entries)
+        self._entries += [self._functions.number(forward, form), *places, *tape]
+        ends = first, len(self._references)
+        return Action(CALLED, 0, 0, 0, call.outputs[0], size, entry, back, several, *ends)
+
+    def _pulled(
+        self, call: MemberCall, forward: Graph, inputs: Sequence[int], room: int
+    ) -> tuple[Graph, list[int], int]:
+        """(the function with what its adjoint reads, where that lies, the entry of the adjoint)."""
+        kind, tape = int(self._part.kind[call.number]), list[int]()
+        if not self._taped or kind == NONE:
+            return forward, tape, NONE
+        adjoint, back = self._part.kinds[kind], len(self._back)
+        pulled = adjoint.graph
+        if (pair := self._functions.taped(forward, adjoint.graph)) is not None:
+            tape, forward, pulled = [self._work[room]], pair.forward, pair.adjoint
+            self._work[room] += pair.size
+        primal = [*inputs, *tape]
+        form = Form(primal=len(primal), adds=True, backward=True, clears=True)
+        marked = [*_marked(call.outputs, adjoint.outputs), *_marked(inputs, adjoint.inputs)]
+        self._back += [self._functions.number(pulled, form), *primal, *marked]
+        return forward, tape, back
 
 
 def _apart(loop: MemberLoop) -> bool:
@@ -216,12 +251,9 @@ def _apart(loop: MemberLoop) -> bool:
     return not any(isinstance(each, Move) and each.out and each.of is not Of.OWN for each in loop.does)
 
 
-def _moved(move: Move) -> tuple[int, ...]:
-    of = int(move.of) + OUT * move.out
-    return int(move.store), of, move.offset, move.room, move.at, move.size, 0, NONE, NONE, 0, 0
+def _moved(move: Move) -> Action:
+    return Action(int(move.store), int(move.of) + OUT * move.out, move.offset, move.room, move.at, move.size)
 
 
 def _marked(places: Sequence[int], mask: Sequence[bool]) -> Iterator[int]:
     return (at for at, on in zip(places, mask, strict=True) if on)
-
-

@@ -198,9 +198,7 @@ def _within(settings: StepSettings, approach: Approach, near: Expr, duration: Ex
 
 
 @traced
-def _apart(
-    bodies: tuple[Sight, Sight | None], surface: Surface, radii: float, reach: Travel
-) -> tuple[Expr, Expr]:
+def _apart(bodies: tuple[Sight, Sight | None], surface: Surface, radii: float, reach: Travel) -> tuple[Expr, Expr]:
     """(how far the spheres around two surfaces are apart, how far their centres come within ``reach``) [m]."""
     a, b = bodies
     ahead = reach.of_centres(a, b)

@@ -75,9 +75,7 @@ def recorded_step(
         for owner in dict.fromkeys(owners.values()):
             own = [name for name in layout.names() if owners[name] == owner]
             results[recorder.give("next", [after[name] for name in own]).number] = offsets[own[0]]
-    calls = with_guards(
-        without_dead_code(recorder.calls), recorder.guards, recorder.sections, recorder.late_guards
-    )
+    calls = with_guards(without_dead_code(recorder.calls), recorder.guards, recorder.sections, recorder.late_guards)
     calls = _seen_first(calls, recorder.sights)
     sizes = {"u": u.numel(), "p": p.numel(), "smoothing": 1}
     return RecordedStep(calls, recorder, StateNames(owners, offsets, results), sizes)

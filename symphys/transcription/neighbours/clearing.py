@@ -8,7 +8,7 @@ from itertools import groupby
 
 import casadi as ca
 
-from symphys.codegen.neighbours.program import MemberCall, MemberLoop, Move, Word
+from symphys.codegen.neighbours.program import MemberLoop, Move, Word
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 
 Entries = set[int]

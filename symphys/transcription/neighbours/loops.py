@@ -20,6 +20,8 @@ from symphys.errors import SymphysError
 from symphys.transcription.neighbours.clearing import with_clearing
 
 NONE = -1
+MOST_WORDS = 31
+"""Of a sieve, which are bits of an integer; points of a pair beyond these are always computed."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,9 @@ class _Builder:
                     self._newest[self._root[vector.number]] = vector.number
         sieves, kept = self._sieves(), {*self._recorder.words, *self._names.results}
         loops = [loop.done(self._word(loop.section)) for loop in self._loops]
-        return LoopStep(with_clearing(loops, calls, kept, self._root), sieves, tuple(self._work), tuple(self._states), self._homes)
+        return LoopStep(
+            with_clearing(loops, calls, kept, self._root), sieves, tuple(self._work), tuple(self._states), self._homes
+        )
 
     def _sift(self) -> None:
         """Put the words together that tell the points of a pair apart at one instant."""
@@ -129,8 +133,9 @@ class _Builder:
                 sieve = len(self._sifted)
                 self._sifted.append([])
             latest[pair] = sieve, point
-            self._words[number] = Word(sieve, len(self._sifted[sieve]))
-            self._sifted[sieve].append(number)
+            if len(self._sifted[sieve]) < MOST_WORDS:
+                self._words[number] = Word(sieve, len(self._sifted[sieve]))
+                self._sifted[sieve].append(number)
 
     def _member(self, call: TracedCall) -> Owner:
         """Who makes a call."""
