@@ -37,7 +37,7 @@ WORTH = 2
 """Operations for each word that is read or written, from which on a call is done for several members at once."""
 
 
-class Run(NamedTuple):
+class ActionRun(NamedTuple):
     """Actions from ``first`` to ``end`` under one guard: done where its word is not 0, or where it is, if ``off``."""
 
     first: int
@@ -82,7 +82,7 @@ class Walk:
         work: words of a member of each room, with tapes.
         loops: (loops, 8) room, first run, end, first action of what is done where the section is left out, end, the
             section's word or -1, how runs are gone through, where in turns they stand.
-        runs: (runs, 5); see ``Run``.
+        runs: (runs, 5); see ``ActionRun``.
         turns: of loops whose runs all belong to words of one sieve, by word the run or -1.
         actions: (actions, 11); see ``Action``.
         references: (references, 5) store, of, offset, room, the number of the argument.
@@ -152,7 +152,7 @@ class _Planner:
         self._crowd, self._part, self._functions, self._together = crowd, part, functions, together
         self._taped = taped
         self._work = [room.work for room in crowd.rooms]
-        self._runs: list[Run] = []
+        self._runs: list[ActionRun] = []
         self._turns: list[int] = []
         self._actions: list[Action] = []
         self._references: list[tuple[int, ...]] = []
@@ -183,14 +183,14 @@ class _Planner:
         word, first = does[0].guard or (NONE, 0), len(self._actions)
         for each in does:
             self._actions.append(_moved(each) if isinstance(each, Move) else self._called(each, room, apart))
-        self._runs.append(Run(first, len(self._actions), *word))
+        self._runs.append(ActionRun(first, len(self._actions), *word))
         spans = [span for each in does if isinstance(each, MemberCall) for span in each.cleared]
         if spans:
             first = len(self._actions)
             self._actions += [Action(CLEARED, at=at, size=size) for at, size in spans]
-            self._runs.append(Run(first, len(self._actions), *word, off=True))
+            self._runs.append(ActionRun(first, len(self._actions), *word, off=True))
 
-    def _way(self, runs: Sequence[Run], first: int, apart: bool) -> tuple[int, int]:
+    def _way(self, runs: Sequence[ActionRun], first: int, apart: bool) -> tuple[int, int]:
         """(how runs from number ``first`` on are gone through, where in ``turns`` they stand)."""
         sieves, words = {run.sieve for run in runs}, [run.word for run in runs]
         if len(runs) == 1 and NONE in sieves:

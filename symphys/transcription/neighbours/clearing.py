@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
+from typing import Any
 
 import casadi as ca
 
@@ -40,7 +41,7 @@ class _Readers:
         key = function.__hash__()
         if key not in self._used:
             arguments = [ca.SX.sym("a", function.numel_in(i)) for i in range(function.n_in())]
-            homes = {e.element_hash(): (i, j) for i, a in enumerate(arguments) for j, e in enumerate(a.nonzeros())}
+            homes = {e.element_hash(): (i, j) for i, a in enumerate(arguments) for j, e in enumerate(_symbols(a))}
             self._used[key] = [set() for _ in arguments]
             results = function.call([*arguments])
             for symbol in ca.symvar(ca.vertcat(ca.SX(0, 1), *map(ca.vec, results))):
@@ -93,3 +94,8 @@ def _spans(at: int, entries: Entries) -> Iterator[tuple[int, int]]:
     for _, row in groupby(enumerate(sorted(entries)), key=lambda each: each[1] - each[0]):
         own = [entry for _, entry in row]
         yield at + own[0], len(own)
+
+
+def _symbols(column: ca.SX) -> list[Any]:
+    symbols: list[Any] = column.nonzeros()
+    return symbols
