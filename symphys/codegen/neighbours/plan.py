@@ -23,7 +23,7 @@ from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.pieces import Form
 from symphys.codegen.emit.plan import NONE, PlannedPhase, with_adjoints
 from symphys.codegen.graph.graph import Graph
-from symphys.codegen.neighbours.program import Crowd, MemberCall, MemberLoop, Move, Of, Reference
+from symphys.codegen.neighbours.program import Crowd, MemberCall, MemberLoop, MemberReference, Move, Of
 from symphys.codegen.neighbours.reuse import reused
 
 Words = NDArray[np.int64]
@@ -47,7 +47,7 @@ class ActionRun(NamedTuple):
     off: bool = False
 
 
-class Action(NamedTuple):
+class CrowdAction(NamedTuple):
     """A copy or a call; in the driver the offset has the place of the room, and a member's words stand for the room.
 
     Attributes:
@@ -84,7 +84,7 @@ class Walk:
             section's word or -1, how runs are gone through, where in turns they stand.
         runs: (runs, 5); see ``ActionRun``.
         turns: of loops whose runs all belong to words of one sieve, by word the run or -1.
-        actions: (actions, 11); see ``Action``.
+        actions: (actions, 11); see ``CrowdAction``.
         references: (references, 5) store, of, offset, room, the number of the argument.
         entries: of calls: number of the function, then places.
         back: of adjoints.
@@ -154,7 +154,7 @@ class _Planner:
         self._work = [room.work for room in crowd.rooms]
         self._runs: list[ActionRun] = []
         self._turns: list[int] = []
-        self._actions: list[Action] = []
+        self._actions: list[CrowdAction] = []
         self._references: list[tuple[int, ...]] = []
         self._entries: list[int] = []
         self._back: list[int] = []
@@ -187,7 +187,7 @@ class _Planner:
         spans = [span for each in does if isinstance(each, MemberCall) for span in each.cleared]
         if spans:
             first = len(self._actions)
-            self._actions += [Action(CLEARED, at=at, size=size) for at, size in spans]
+            self._actions += [CrowdAction(CLEARED, at=at, size=size) for at, size in spans]
             self._runs.append(ActionRun(first, len(self._actions), *word, off=True))
 
     def _way(self, runs: Sequence[ActionRun], first: int, apart: bool) -> tuple[int, int]:
@@ -207,13 +207,13 @@ class _Planner:
         self._turns += turns
         return IN_TURN, at
 
-    def _called(self, call: MemberCall, room: int, apart: bool) -> Action:
+    def _called(self, call: MemberCall, room: int, apart: bool) -> CrowdAction:
         function = self._part.calls.calls[call.number].function
         size = sum(function.numel_out(k) for k in range(function.n_out()))
         forward, first = self._functions.forward(function), len(self._references)
-        inputs = [0 if isinstance(at, Reference) else at for at in call.inputs]
+        inputs = [0 if isinstance(at, MemberReference) else at for at in call.inputs]
         for k, at in enumerate(call.inputs):
-            if isinstance(at, Reference):
+            if isinstance(at, MemberReference):
                 self._references.append((int(at.store), int(at.of), at.offset, at.room, k))
         form, places, several = Form(primal=function.n_in(), adds=False), [*inputs, *call.outputs], NONE
         words = size + sum(function.numel_in(k) for k in range(function.n_in()))
@@ -225,7 +225,7 @@ class _Planner:
         entry = len(self._entries)
         self._entries += [self._functions.number(forward, form), *places, *tape]
         ends = first, len(self._references)
-        return Action(CALLED, 0, 0, 0, call.outputs[0], size, entry, back, several, *ends)
+        return CrowdAction(CALLED, 0, 0, 0, call.outputs[0], size, entry, back, several, *ends)
 
     def _pulled(
         self, call: MemberCall, forward: Graph, inputs: Sequence[int], room: int
@@ -251,8 +251,8 @@ def _apart(loop: MemberLoop) -> bool:
     return not any(isinstance(each, Move) and each.out and each.of is not Of.OWN for each in loop.does)
 
 
-def _moved(move: Move) -> Action:
-    return Action(int(move.store), int(move.of) + OUT * move.out, move.offset, move.room, move.at, move.size)
+def _moved(move: Move) -> CrowdAction:
+    return CrowdAction(int(move.store), int(move.of) + OUT * move.out, move.offset, move.room, move.at, move.size)
 
 
 def _marked(places: Sequence[int], mask: Sequence[bool]) -> Iterator[int]:

@@ -78,7 +78,7 @@ class Move:
     guard: Word | None = None
 
 
-class Reference(NamedTuple):
+class MemberReference(NamedTuple):
     """Words that are read where they lie; see ``Move``."""
 
     store: Store
@@ -99,7 +99,7 @@ class MemberCall:
     """
 
     number: int
-    inputs: tuple[int | Reference, ...]
+    inputs: tuple[int | MemberReference, ...]
     outputs: tuple[int, ...]
     guard: Word | None = None
     cleared: tuple[tuple[int, int], ...] = ()

@@ -9,7 +9,16 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from symphys.codegen.neighbours.program import ONLY, Crowd, MemberCall, MemberLoop, Move, Reference, SightPlaces, Store
+from symphys.codegen.neighbours.program import (
+    ONLY,
+    Crowd,
+    MemberCall,
+    MemberLoop,
+    MemberReference,
+    Move,
+    SightPlaces,
+    Store,
+)
 from symphys.codegen.neighbours.references import with_references
 
 
@@ -58,7 +67,7 @@ def _moved(loop: MemberLoop, places: _Places) -> MemberLoop:
 
     def call(each: MemberCall) -> MemberCall:
         inputs = tuple(
-            places.referred(at) if isinstance(at, Reference) else places.of(loop.room, at) for at in each.inputs
+            places.referred(at) if isinstance(at, MemberReference) else places.of(loop.room, at) for at in each.inputs
         )
         outputs = tuple(places.of(loop.room, at) for at in each.outputs)
         cleared = tuple((places.of(loop.room, at), size) for at, size in each.cleared)
@@ -102,7 +111,7 @@ class _Places:
         start = self._start(room, at)
         return self._to[room][start] + at - start
 
-    def referred(self, to: Reference) -> Reference:
+    def referred(self, to: MemberReference) -> MemberReference:
         """The same words elsewhere."""
         return to._replace(offset=self.of(to.room, to.offset)) if to.store is Store.WORK else to
 
@@ -133,9 +142,9 @@ class _Places:
             for does in (*loop.does, *loop.instead):
                 time += 1
                 places = (*does.inputs, *does.outputs) if isinstance(does, MemberCall) else (does.at,)
-                yield from ((time, loop.room, at) for at in places if not isinstance(at, Reference))
+                yield from ((time, loop.room, at) for at in places if not isinstance(at, MemberReference))
                 for each in (does,) if isinstance(does, Move) else places:
-                    if isinstance(each, Move | Reference) and each.store is Store.WORK:
+                    if isinstance(each, Move | MemberReference) and each.store is Store.WORK:
                         yield time, each.room, each.offset
             time += 1
 
