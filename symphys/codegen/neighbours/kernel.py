@@ -293,14 +293,10 @@ def _sources(planned: CrowdPlan, lanes: int, several: int) -> list[SourceFile]:
         graph, form = planned.functions[i]
         accesses = (Access(EACH, (1,) * several),) * (len(graph.sizes) + len(graph.results))
         texts.append(write(f"f{i}", graph, form, team, (), Shape(several, accesses)))
-    found += _files(planned, wide, team_head(several, single=False), texts)
-    driver = (
-        head
-        + (f"#define SEVERAL {several}\n" if wide else "")
-        + listed(len(numbers), dialect)
-        + "".join(map(resource, DRIVER))
-    )
-    return [*found, SourceFile(driver)]
+    gathering = _files(planned, wide, team_head(several, single=False), texts)
+    found += (replace(file, gathers=True) for file in gathering)
+    driver = [head, f"#define SEVERAL {several}\n" if wide else "", listed(len(numbers), dialect)]
+    return [*found, SourceFile("".join([*driver, *map(resource, DRIVER)]))]
 
 
 def _files(planned: CrowdPlan, numbers: Sequence[int], head: str, texts: Sequence[str]) -> Iterator[SourceFile]:
