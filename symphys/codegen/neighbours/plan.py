@@ -33,7 +33,7 @@ ONE_RUN, APART, IN_TURN, MIXED = range(4)
 """How a loop goes through its runs."""
 OUT = 8
 """Added to ``Of`` of a move that goes out."""
-WORTH = 2
+WORTH = 6
 """Operations for each word that is read or written, from which on a call is done for several members at once."""
 
 
