@@ -168,7 +168,8 @@ static inline __attribute__((always_inline)) void act(
     else copy(a, pairs ? pairs + i : 0, i, stores, here, 0);
 }
 
-static inline __attribute__((always_inline)) void act_back(const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
+static inline __attribute__((always_inline)) void act_back(
+    const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
   const room *own = s->c->list + o->room;
   V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
   if (a->store == CALLED && a->back >= 0) CALL(s->c->back + a->back, here, gains);

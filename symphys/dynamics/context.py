@@ -61,6 +61,7 @@ class StepContext:
         u: what the inputs stack, constant over the step.
         near: per pair: 1 if it may act in the step, 0 if it is too far apart; empty: all may.
         sample: whether the world's bodies stand for many more: pairs that are far are looked for however few there are.
+        again: whether what is near is looked at again in each substep.
     """
 
     world: World
@@ -69,6 +70,7 @@ class StepContext:
     u: Expr
     near: tuple[Expr, ...] = ()
     sample: bool = False
+    again: bool = False
 
     def pairs_and_near(self) -> Iterator[tuple[Pair, Expr]]:
         """The pairs, and whether they may act."""

@@ -67,7 +67,7 @@ def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
 
 def _approaches(context: StepContext, x: State) -> Sequence[Approach]:
     """Of all pairs where they are looked at again in each substep, else nothing."""
-    return approaches_at(context, x) if context.sample else ()
+    return approaches_at(context, x) if context.again else ()
 
 
 def _narrowed(context: StepContext, approaches: Sequence[Approach], duration: Expr) -> StepContext:

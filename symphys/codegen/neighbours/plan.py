@@ -128,10 +128,11 @@ def crowd_plan(crowd: Crowd, several: int = 0) -> CrowdPlan:
         several: of one scene alone, how many members a call of values may be done for at once; 0: scenes in lanes.
     """
     functions, together = DistinctFunctions(), DistinctFunctions()
-    part = with_adjoints(crowd.sample, ["x"], functions, crowd.chains)[0][1]
-    planner = _Planner(reused(crowd, several > 0), part, functions, together if several > 1 else None, taped=False)
+    differs = crowd.taped or crowd
+    part = with_adjoints(differs.sample, ["x"], functions, differs.chains)[0][1]
+    planner = _Planner(reused(crowd, several > 0), None, functions, together if several > 1 else None)
     values = planner.walk()
-    taped = _Planner(crowd, part, functions, None, taped=True).walk()
+    taped = _Planner(differs, part, functions, None).walk()
     first = len(functions.listed)
     values.several[planner.heads] += first
     numbers = frozenset(range(first, first + len(together.listed)))
@@ -139,18 +140,19 @@ def crowd_plan(crowd: Crowd, several: int = 0) -> CrowdPlan:
 
 
 class _Planner:
-    """Goes through the loops of a crowd; ``heads``: where in ``several`` the numbers of functions stand."""
+    """Goes through the loops of a crowd; ``heads``: where in ``several`` the numbers of functions stand.
+
+    ``part`` has the adjoints; None: of values alone.
+    """
 
     def __init__(
         self,
         crowd: Crowd,
-        part: PlannedPhase,
+        part: PlannedPhase | None,
         functions: DistinctFunctions,
         together: DistinctFunctions | None,
-        taped: bool,
     ) -> None:
         self._crowd, self._part, self._functions, self._together = crowd, part, functions, together
-        self._taped = taped
         self._work = [room.work for room in crowd.rooms]
         self._runs: list[ActionRun] = []
         self._turns: list[int] = []
@@ -208,7 +210,7 @@ class _Planner:
         return IN_TURN, at
 
     def _called(self, call: MemberCall, room: int, apart: bool) -> CrowdAction:
-        function = self._part.calls.calls[call.number].function
+        function = self._crowd.sample.body[call.number].function
         size = sum(function.numel_out(k) for k in range(function.n_out()))
         forward, first = self._functions.forward(function), len(self._references)
         inputs = [0 if isinstance(at, MemberReference) else at for at in call.inputs]
@@ -231,8 +233,8 @@ class _Planner:
         self, call: MemberCall, forward: Graph, inputs: Sequence[int], room: int
     ) -> tuple[Graph, list[int], int]:
         """(the function with what its adjoint reads, where that lies, the entry of the adjoint)."""
-        kind, tape = int(self._part.kind[call.number]), list[int]()
-        if not self._taped or kind == NONE:
+        tape = list[int]()
+        if self._part is None or (kind := int(self._part.kind[call.number])) == NONE:
             return forward, tape, NONE
         adjoint, back = self._part.kinds[kind], len(self._back)
         pulled = adjoint.graph

@@ -177,6 +177,7 @@ class Crowd:
         nears: by meeting, where in the work of a pair words lie of which one is not 0 if it is near.
         given: words that are given for all steps.
         chains: where in the sample lies what members hand on as it begins.
+        taped: the same for adjoints, where they are faster with other calls.
     """
 
     sample: Program
@@ -191,6 +192,7 @@ class Crowd:
     nears: tuple[tuple[int, ...], ...]
     given: int
     chains: tuple[Place, ...]
+    taped: Crowd | None = None
 
     @property
     def state(self) -> int:
