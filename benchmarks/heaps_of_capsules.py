@@ -3,8 +3,8 @@
     python benchmarks/heaps_of_capsules.py COUNT [build | near]
 
 Each capsule has six points in a pair with another, so that pairs are many: 27 have 1,917 points. ``build`` stops
-before the compiler. ``near`` lists no pairs: each step finds those that are near. Seconds are those of processors, of
-compilers too; a step is timed by the clock, on one thread.
+before the compiler. ``near`` lists no pairs: each step finds those that are near; also at shorter steps, with errors.
+Seconds are those of processors, of compilers too; a step is timed by the clock, on one thread.
 """
 
 from __future__ import annotations
@@ -37,7 +37,12 @@ from symphys.transcription.rollout import symbolic_rollout
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from heaps import heap
 
-STEPS, BATCH = 20, 64
+STEPS, BATCH, DT = 20, 64, 0.01
+PARTS, FINEST = (1, 2, 4, 8), 64
+"""Of DT: the steps that are timed, and the finest, by which errors are told."""
+BODY = 19
+"""Numbers of a body in a state."""
+Array = NDArray[np.float64]
 CONTACT = 'friction="0.4 0 0" solref="-20000 -45" priority="0"'
 
 
@@ -63,11 +68,11 @@ def places(count: int) -> list[list[float]]:
     return [[0.24 * (i % 2) - 0.12, 0.24 * (i // 2 % 2), 0.2 + 0.4 * (i // 4)] for i in range(count)]
 
 
-def run(model: mujoco.MjModel, data: mujoco.MjData, velocities: NDArray[np.float64]) -> None:
+def run(model: mujoco.MjModel, data: mujoco.MjData, velocities: Array, steps: int = STEPS) -> None:
     """From the start to the end."""
     mujoco.mj_resetData(model, data)
     data.qvel.reshape(-1, 6)[:, :3] = velocities
-    for _ in range(STEPS):
+    for _ in range(steps):
         mujoco.mj_step(model, data)
 
 
@@ -85,35 +90,87 @@ def built(problem: Problem) -> Program:
     return program
 
 
+class Thrown:
+    """The heap here, of which each step of ``dt`` [s] finds the pairs that are near."""
+
+    def __init__(self, count: int, dt: float, cache: Cache) -> None:
+        """Build and compile it."""
+        bodies = [
+            Body.capsule(f"b{i}", radius=0.06, length=0.2, mass=1.0, position=tuple(place))
+            for i, place in enumerate(places(count))
+        ]
+        planes = Plane.ground(), Plane("left", (1, 0, 0), -0.3), Plane("right", (-1, 0, 0), -0.3)
+        law, scheme = Law(friction=0.4, restitution=0.5), Scheme(dt=dt, sweeps=6)
+        began = process_time()
+        crowd = crowd_of(World(tuple(bodies), planes), law, scheme, exact=True)
+        middle = process_time()
+        crowd_plan(crowd)
+        self.built, self.planned, before = middle - began, process_time() - middle, children()
+        self.kernel = compile_crowd(crowd, lanes=1, threads=1, cache=cache)
+        self.compiled, self.steps = children() - before, round(STEPS * DT / dt)
+
+    def starts(self, velocities: Array) -> Array:
+        """(B, numbers of a state) of velocities (B, bodies, 3)."""
+        found = np.zeros((*velocities.shape[:2], BODY))
+        found[:, :, :3], found[:, :, 3], found[:, :, 7:10] = places(velocities.shape[1]), 1, velocities
+        return np.append(found.reshape(len(found), -1), np.zeros((len(found), 1)), axis=1)
+
+    def rollouts(self, velocities: Array) -> Array:
+        """All states."""
+        return self.kernel.rollouts(self.starts(velocities), self.given(velocities), self.steps)
+
+    def gradients(self, velocities: Array) -> Array:
+        """Of the sum of all states."""
+        starts = self.starts(velocities)
+        return self.kernel.adjoints(
+            starts, self.given(velocities), np.ones((len(starts), self.steps + 1, starts.shape[1]))
+        )[1]
+
+    def given(self, velocities: Array) -> Array:
+        """(B, given)."""
+        return np.zeros((len(velocities), self.kernel.crowd.given))
+
+    def ends(self, velocities: Array) -> Array:
+        """(bodies, 3) [m]."""
+        return self.rollouts(velocities[None])[0, -1, :-1].reshape(-1, BODY)[:, :3]
+
+
 def found_anew(count: int) -> None:
-    """The same heap, of which each step finds the pairs that are near."""
-    bodies = [
-        Body.capsule(f"b{i}", radius=0.06, length=0.2, mass=1.0, position=tuple(place))
-        for i, place in enumerate(places(count))
-    ]
-    planes = Plane.ground(), Plane("left", (1, 0, 0), -0.3), Plane("right", (-1, 0, 0), -0.3)
-    began = process_time()
-    law, scheme = Law(friction=0.4, restitution=0.5), Scheme(dt=0.01, sweeps=6)
-    crowd = crowd_of(World(tuple(bodies), planes), law, scheme, exact=True)
-    middle = process_time()
-    crowd_plan(crowd)
-    print(f"{count} capsules\n  built in {middle - began:.1f} s, planned in {process_time() - middle:.1f} s", end="")
-    with tempfile.TemporaryDirectory() as folder:
-        before = children()
-        kernel = compile_crowd(crowd, lanes=1, threads=1, cache=Cache(Path(folder)))
-        print(f", compiled in {children() - before:.1f} s of processors by {kernel.report.compiler}", flush=True)
-    random, start = np.random.default_rng(count), np.zeros((count, 19))
-    start[:, :3], start[:, 3] = places(count), 1
-    start[:, 7:10] = velocities = np.array([random.uniform(-1.5, 1.5, 3).round(3) for _ in range(count)])
-    state, given = np.append(start, 0.0)[None], np.zeros((1, crowd.given))
-    ours = fastest(partial(kernel.rollouts, state, given, STEPS)) / STEPS
-    weights = np.ones((1, STEPS + 1, state.shape[1]))
-    gradient = fastest(partial(kernel.adjoints, state, given, weights)) / STEPS
+    """Steps that find their pairs beside MuJoCo's, at several lengths, with errors against the finest of each."""
+    random = np.random.default_rng(count)
+    velocities = random.uniform(-1.5, 1.5, (count, 3)).round(3)
+    many = velocities + 0.3 * np.random.default_rng(1).standard_normal((BATCH, count, 3))
     model = there(count)
-    theirs = fastest(partial(run, model, mujoco.MjData(model), velocities)) / STEPS
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    print(f"  a step alone: {1e6 * ours:.0f} us, MuJoCo {1e6 * theirs:.0f} us, ratio {ours / theirs:.1f}", end="")
-    print(f"; with gradient {1e6 * gradient:.0f} us; peak {peak:.2f} GiB", flush=True)
+    data = mujoco.MjData(model)
+
+    def ends(dt: float) -> Array:
+        model.opt.timestep = dt
+        run(model, data, velocities, round(STEPS * DT / dt))
+        return data.xpos[1:].copy()
+
+    with tempfile.TemporaryDirectory() as folder:
+        finest = Thrown(count, DT / FINEST, Cache(Path(folder))).ends(velocities), ends(DT / FINEST)
+        for part in PARTS:
+            dt = DT / part
+            thrown = Thrown(count, dt, Cache(Path(folder)))
+            took = f"built in {thrown.built:.1f} s, planned in {thrown.planned:.1f} s, "
+            print(f"{count} capsules, dt {dt:g} s\n  {took}compiled in {thrown.compiled:.1f} s of processors")
+            errors = [rms(one - finest[k]) for k, one in enumerate((thrown.ends(velocities), ends(dt)))]
+            alone = fastest(partial(thrown.rollouts, velocities[None])), fastest(partial(ends, dt))
+            batch = fastest(partial(thrown.rollouts, many)) / BATCH
+            batch_there = fastest(lambda: [run(model, data, row, thrown.steps) for row in many]) / BATCH  # noqa: B023
+            gradient = fastest(partial(thrown.gradients, velocities[None])) / thrown.steps
+            for what, (us, them) in {"alone": alone, f"one of {BATCH}": (batch, batch_there)}.items():
+                us, them = 1e6 * us / thrown.steps, 1e6 * them / thrown.steps
+                print(f"  a step {what}: {us:.0f} us, MuJoCo {them:.0f} us, ratio {us / them:.1f}")
+            print(f"  errors {errors[0]:.1e} m, MuJoCo {errors[1]:.1e} m; {STEPS * DT:g} s alone take ", end="")
+            print(f"{1e3 * alone[0]:.2f} ms, MuJoCo {1e3 * alone[1]:.2f} ms; with gradient {1e6 * gradient:.0f} us")
+            print(f"  peak {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GiB", flush=True)
+
+
+def rms(apart: Array) -> float:
+    """Of distances (bodies, 3) [m]."""
+    return float(np.sqrt((apart**2).sum(axis=1).mean()))
 
 
 def main() -> None:

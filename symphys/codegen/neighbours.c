@@ -1,50 +1,5 @@
-/* Steps of many bodies: loops over bodies and over the pairs that are near, which each step finds anew. What the data
-   mean is told in neighbours/plan.py. The lanes of a block are scenes, each with pairs of its own. */
-#include <stdlib.h>
-#include <string.h>
-
-#define CALL(t, m, b, k) FUNCTIONS[(t)[0]](m, b, (t) + 2, k)
-
-typedef struct { word work, state, members, base, from; } room; /* words of a member; where members begin */
-typedef struct { word room, first, end, other, section; } loop;  /* of its actions; those in place of them end there */
-typedef struct { word store, of, offset, pitch, at, size, entry, back, guard; } action; /* CALLED: a call, else a copy */
-typedef struct { word first, second, plane; double normal[3], offset; } kind; /* species; -1: a plane */
-typedef struct {
-  word rooms, species, loops, words, state, given;
-  word found, looked, striking; /* loops: before the first pairs are found, from the other on near ones are left; and where
-                                   in the work of what is there once it says how far what strikes comes */
-  const room *list;
-  const loop *order;
-  const action *actions;
-  const word *entries, *back; /* of calls and of their adjoints */
-  const kind *kinds;
-  const word *sight, *nears; /* by species: where a position and a reach lie; by kind where in nears
-                                words begin, of which one is not 0 if a pair is near */
-} crowd;
-typedef struct {
-  word rows, steps;
-  const double *start, *given; /* (rows, start), (rows, given) */
-  double *states, *slopes;     /* (rows, steps + 1, shown); slopes: what they are weighed with, then that of the start */
-  word shown, start_size;
-  word *most;                  /* (kinds): pairs at most */
-} scenes;
-
-enum { WORK, BEFORE, AFTER, GIVEN, CALLED };
-enum { OWN, FIRST, SECOND, ONCE, THEN, OUT = 8 };
-/* before: the number of the same pair in the step before; -1: it was not near; -2: there is no pair in this lane */
-typedef struct { int32_t first[LANES], second[LANES], before[LANES]; } near;
-
-typedef struct {
-  const crowd *c;
-  V *m, *b, *x, *y, *given; /* work, its adjoints, states and their adjoints of all steps */
-  near *pairs;              /* (steps, slots) */
-  int32_t *used;            /* (steps, kinds) */
-  int32_t *active, *count;  /* (slots) those that are near in the step, by kind; (kinds) how many */
-  word slots;
-  const word *before; /* (kinds) the number of the first pair of a kind among all */
-  char *scratch;
-} scene;
-
+/* Steps of many bodies: loops over bodies and over the pairs that are near, which each step finds anew. The lanes of a block
+   are scenes, each with pairs of its own. */
 /* A vector of a word of each lane, put together before it is stored: a processor waits long for a wide load of what was
    stored in parts just before. And the other way, where compilers' scatters are slow. */
 static inline V gathered(R *const *other, word w) {
@@ -108,152 +63,6 @@ static inline __attribute__((always_inline)) void copy(
     else there[w] += own[w], own[w] = S(0.0);
 }
 
-/* Which pairs may act: reaches and what strikes are at least what the calls go by. */
-typedef struct { uint64_t key; int32_t first, second; } found;
-
-static int by_key(const void *a, const void *b) {
-  uint64_t x = ((const found *)a)->key, y = ((const found *)b)->key;
-  return (x > y) - (x < y);
-}
-
-static double at(const scene *s, word body, word species, word which, word l) {
-  const room *r = s->c->list + 1 + species;
-  const word *sight = s->c->sight + 2 * species;
-  word w = which < 3 ? sight[0] + which : sight[1];
-  return LANE(s->m[r->base + body * r->work + w], l);
-}
-
-/* Places that are no numbers, or far beyond all others, share a cell. */
-static int64_t cell_of(double x, double width) {
-  double cell = __builtin_floor(x / width);
-  return cell > -1e15 && cell < 1e15 ? (int64_t)cell : 0;
-}
-
-enum { FEW = 32 }; /* bodies for which cells do not pay */
-/* What a search goes by, and what it has found so far, by kind. */
-typedef struct {
-  const crowd *c;
-  word bodies;
-  double strikes;
-  double (*seen)[4];       /* position and reach */
-  int32_t *whose, *number; /* species of a body, and which of it */
-  found *list;
-  word *counts, *starts;
-} hunt;
-
-static inline void put(const hunt *h, word q, word first, word second, uint64_t key) {
-  if (h->counts[q] < h->c->list[1 + h->c->species + q].members)
-    h->list[h->starts[q] + h->counts[q]] = (found){key, h->number[first], h->number[second]};
-  h->counts[q]++;
-}
-
-static void meet_planes(const hunt *h, word n) {
-  word kinds = h->c->rooms - 1 - h->c->species;
-  for (word q = 0; q < kinds; q++) {
-    const kind *e = h->c->kinds + q;
-    if (e->plane < 0 || e->first != h->whose[n]) continue;
-    double height = -e->offset;
-    for (word w = 0; w < 3; w++) height += e->normal[w] * h->seen[n][w];
-    if (!(height > h->seen[n][3] + h->strikes)) put(h, q, n, n, n);
-  }
-}
-
-static inline void meet(const hunt *h, word n, word o) {
-  double square = 0, reach = h->seen[n][3] + h->seen[o][3] + h->strikes;
-  for (word w = 0; w < 3; w++) square += (h->seen[n][w] - h->seen[o][w]) * (h->seen[n][w] - h->seen[o][w]);
-  if (square > reach * reach * (1 + 1e-9)) return;
-  word kinds = h->c->rooms - 1 - h->c->species;
-  for (word q = 0; q < kinds; q++) {
-    const kind *e = h->c->kinds + q;
-    if (e->plane >= 0) continue;
-    word i = -1, j = -1;
-    if (e->first == h->whose[o] && e->second == h->whose[n]) i = o, j = n;
-    else if (e->first == h->whose[n] && e->second == h->whose[o]) i = n, j = o;
-    if (i < 0) continue;
-    put(h, q, i, j, (uint64_t)((i + j) % h->bodies) * h->bodies + i);
-    return;
-  }
-}
-
-static uint64_t bucket_of(int64_t x, int64_t y, int64_t z, word buckets) {
-  return ((uint64_t)x * 73856093u ^ (uint64_t)y * 19349663u ^ (uint64_t)z * 83492791u) & (buckets - 1);
-}
-
-/* Bodies meet those before them in the cells around their own, which are as wide as the farthest that two can act. */
-static void meet_neighbours(const hunt *h, double width, int64_t (*cells)[3], int32_t *next, int32_t *heads, word buckets) {
-  memset(heads, -1, buckets * sizeof(*heads));
-  for (word n = 0; n < h->bodies; n++) {
-    for (word w = 0; w < 3; w++) cells[n][w] = cell_of(h->seen[n][w], width);
-    for (int beside = 0; beside < 27; beside++) {
-      int64_t x = cells[n][0] + beside % 3 - 1, y = cells[n][1] + beside / 3 % 3 - 1, z = cells[n][2] + beside / 9 - 1;
-      for (int32_t o = heads[bucket_of(x, y, z, buckets)]; o >= 0; o = next[o])
-        if (cells[o][0] == x && cells[o][1] == y && cells[o][2] == z) meet(h, n, o);
-    }
-    int32_t *head = heads + bucket_of(cells[n][0], cells[n][1], cells[n][2], buckets);
-    next[n] = *head, *head = n;
-  }
-}
-
-static int search(const scene *s, word k, word l, word *most) {
-  const crowd *c = s->c;
-  word kinds = c->rooms - 1 - c->species, bodies = 0;
-  for (word q = 0; q < c->species; q++) bodies += c->list[1 + q].members;
-  double (*seen)[4] = (double (*)[4])s->scratch;
-  int64_t (*cells)[3] = (int64_t (*)[3])(seen + bodies);
-  int32_t *whose = (int32_t *)(cells + bodies), *number = whose + bodies, *next = number + bodies, *heads = next + bodies;
-  word buckets = 1, counts[kinds + 1], starts[kinds + 1];
-  while (buckets < 2 * bodies) buckets *= 2;
-  found *list = (found *)(((uintptr_t)(heads + buckets) + 7) / 8 * 8);
-  double strikes = LANE(s->m[c->list[0].base + c->striking], l), width = 0;
-  for (word q = 0, n = 0; q < c->species; q++)
-    for (word i = 0; i < c->list[1 + q].members; i++, n++) {
-      for (word w = 0; w < 4; w++) seen[n][w] = at(s, i, q, w, l);
-      whose[n] = q, number[n] = i;
-      if (seen[n][3] > width) width = seen[n][3];
-    }
-  for (word q = 0; q < kinds; q++) counts[q] = 0, starts[q] = s->before[q];
-  hunt h = {c, bodies, strikes, seen, whose, number, list, counts, starts};
-  for (word n = 0; n < bodies; n++) {
-    meet_planes(&h, n);
-    for (word o = 0; bodies <= FEW && o < n; o++) meet(&h, n, o);
-  }
-  if (bodies > FEW) meet_neighbours(&h, 2 * width + strikes, cells, next, heads, buckets);
-  int fits = 1;
-  for (word q = 0; q < kinds; q++) {
-    word room_for = c->list[1 + c->species + q].members;
-    if (counts[q] > most[q]) most[q] = counts[q];
-    if (counts[q] > room_for) { fits = 0; continue; }
-    qsort(list + starts[q], counts[q], sizeof(found), by_key);
-    near *now = s->pairs + k * s->slots + starts[q], *then = now - s->slots;
-    word j = 0, last = k ? s->used[(k - 1) * kinds + q] : 0;
-    for (word i = 0; i < room_for; i++) {
-      if (i >= counts[q]) {
-        now[i].first[l] = 0, now[i].second[l] = c->kinds[q].plane < 0 && c->kinds[q].first == c->kinds[q].second;
-        now[i].before[l] = -2;
-        continue;
-      }
-      found f = list[starts[q] + i];
-      now[i].first[l] = f.first, now[i].second[l] = f.second, now[i].before[l] = -1;
-      for (; j < last; j++) {
-        if (then[j].before[l] == -2) { j = last; break; }
-        word a = then[j].first[l], z = then[j].second[l];
-        uint64_t key = f.key;
-        for (word w = 0; w < c->kinds[q].first; w++) a += c->list[1 + w].members;
-        if (c->kinds[q].plane >= 0) key = (uint64_t)a;
-        else {
-          for (word w = 0; w < c->kinds[q].second; w++) z += c->list[1 + w].members;
-          key = (uint64_t)((a + z) % bodies) * bodies + a;
-        }
-        if (key < f.key) continue;
-        if (key == f.key) now[i].before[l] = j;
-        break;
-      }
-    }
-    if (counts[q] > s->used[k * kinds + q]) s->used[k * kinds + q] = counts[q];
-  }
-  return fits;
-}
-
 static int any(const V *word_of) {
   for (word l = 0; l < LANES; l++)
     if (LANE(*word_of, l) != 0) return 1;
@@ -292,17 +101,179 @@ static void rounds_of(const scene *s, word k, int listed, round *rounds) {
         s->pairs + k * s->slots + s->before[q]};
 }
 
-/* What a loop does: where a section is without effect, something else. */
-static const action *actions_of(const scene *s, const loop *o, const action **end) {
+static void sift(const scene *s, word q, const round *rounds) {
+  const sieve *v = s->c->sifts + q;
+  sifted *f = s->let + q;
+  const round r = rounds[v->room];
+  const room *own = s->c->list + v->room;
+  f->count = 0;
+  memset(f->counts, 0, v->size * sizeof(*f->counts));
+  for (word j = 0; j < r.count; j++) {
+    word i = r.listed ? r.listed[j] : j;
+    const V *here = s->m + own->base + i * own->work;
+    int32_t bits = 0;
+    for (word w = 0; w < v->size; w++)
+      if (any(here + s->c->words_of[v->places + w])) {
+        bits |= (int32_t)1 << w;
+        f->who[f->count] = i, f->which[f->count++] = w;
+        f->by_word[w * f->size + f->counts[w]++] = i;
+      }
+    f->bits[i] = bits;
+  }
+}
+
+static int goes(const scene *s, const run *n, word i) {
+  return n->sieve < 0 || (s->let[n->sieve].bits[i] >> n->word & 1) != n->off;
+}
+
+/* Where an argument of a member's call lies. */
+static inline V *referred(const reference *r, const near *p, word i, V *const *stores) {
+  word k = r->of == OWN ? i : r->of == ONCE ? 0 : r->of == FIRST ? p[i].first[0] : p[i].second[0];
+  return stores[r->store] + r->offset + k * r->pitch;
+}
+
+/* One call for several members, in the lanes of a vector; the last one fills those that are left. */
+#ifdef SEVERAL
+static void call_several(
+    const scene *s, const action *a, const room *own, const near *p, const int32_t *who, word count, V *const *stores) {
+  const place *t = s->c->several + a->several;
+  const reference *first = s->c->references + a->first, *end = s->c->references + a->end;
+  word n = t[1];
+  place places[SEVERAL * n];
+  for (word j = 0; j < count; j += SEVERAL) {
+    for (word l = 0; l < SEVERAL; l++) {
+      word i = who[j + l < count ? j + l : count - 1], base = own->base + i * own->work;
+      for (word w = 0; w < n; w++) places[w * SEVERAL + l] = (place)(t[2 + w] + base);
+      for (const reference *r = first; r < end; r++)
+        places[r->argument * SEVERAL + l] = (place)(referred(r, p, i, stores) - s->m);
+    }
+    FUNCTIONS[t[0]](s->m, 0, places, 0);
+  }
+}
+#define FEWEST 3 /* members for which that pays */
+#endif
+
+/* Actions for one member. */
+static inline __attribute__((always_inline)) void act(
+    const scene *s, const room *own, const action *a, const action *end, const near *pairs, word i, V *const *stores) {
+  V *here = s->m + own->base + i * own->work;
+  const reference *references = s->c->references;
+  for (; a < end; a++)
+    if (a->store == CALLED) {
+      place *t = s->entries + a->entry;
+      for (const reference *r = references + a->first; r < references + a->end; r++)
+        t[1 + r->argument] = (place)(referred(r, pairs, i, stores) - here);
+      CALL(t, here, 0);
+    } else if (a->store == CLEARED) memset(here + a->at, 0, a->size * sizeof(V));
+    else copy(a, pairs ? pairs + i : 0, i, stores, here, 0);
+}
+
+static inline __attribute__((always_inline)) void act_back(
+    const scene *s, const loop *o, const action *a, const round *r, word i, V *const *stores) {
+  const room *own = s->c->list + o->room;
+  V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
+  if (a->store == CALLED && a->back >= 0) CALL(s->c->back + a->back, here, gains);
+  else if (a->store == CALLED || a->store == GIVEN || a->store == CLEARED) memset(gains + a->at, 0, a->size * sizeof(V));
+  else copy(a, r->pairs ? r->pairs + i : 0, i, stores, gains, 1);
+}
+
+/* The members for which a run is done. */
+static word members_of(const scene *s, const run *n, const round *r, const int32_t **who, int32_t *room_for) {
+  if (n->sieve < 0) {
+    *who = r->listed ? r->listed : s->all;
+    return r->count;
+  }
+  const sifted *f = s->let + n->sieve;
+  *who = f->by_word + n->word * f->size;
+  if (!n->off) return f->counts[n->word];
+  word count = 0;
+  for (word j = 0; j < r->count; j++) {
+    word i = r->listed ? r->listed[j] : j;
+    if (goes(s, n, i)) room_for[count++] = i;
+  }
+  *who = room_for;
+  return count;
+}
+
+/* Run by run, each for all of its members. */
+static NOINLINE void go_apart(const scene *s, const loop *o, const round *r, V *const *stores) {
   const crowd *c = s->c;
-  int other = o->section >= 0 && !any(s->m + c->list[0].base + o->section);
-  *end = c->actions + (other ? o->other : o->end);
-  return c->actions + (other ? o->end : o->first);
+  const room *own = c->list + o->room;
+  int32_t room_for[r->count];
+  for (const run *n = c->runs + o->first; n < c->runs + o->end; n++) {
+    const int32_t *who;
+    word count = members_of(s, n, r, &who, room_for);
+    for (const action *a = c->actions + n->first, *end; a < c->actions + n->end; a = end) {
+      end = a + 1;
+#ifdef SEVERAL
+      if (a->several >= 0 && count >= FEWEST) {
+        call_several(s, a, own, r->pairs, who, count, stores);
+        continue;
+      }
+      while (end < c->actions + n->end && (end->several < 0 || count < FEWEST)) end++;
+#else
+      end = c->actions + n->end;
+#endif
+      for (word j = 0; j < count; j++) act(s, own, a, end, r->pairs, who[j], stores);
+    }
+  }
+}
+
+/* What a sieve has let through, one after the other. */
+static NOINLINE void go_in_turn(const scene *s, const loop *o, const round *r, V *const *stores) {
+  const crowd *c = s->c;
+  const sifted *f = s->let + c->runs[o->first].sieve;
+  for (word k = 0; k < f->count; k++) {
+    word turn = c->turns[o->turns + f->which[k]];
+    if (turn < 0) continue;
+    const run *n = c->runs + turn;
+    act(s, c->list + o->room, c->actions + n->first, c->actions + n->end, r->pairs, f->who[k], stores);
+  }
+}
+
+static NOINLINE void go_mixed(const scene *s, const loop *o, const round *r, V *const *stores) {
+  const crowd *c = s->c;
+  for (word j = 0; j < r->count; j++) {
+    word i = r->listed ? r->listed[j] : j;
+    for (const run *n = c->runs + o->first; n < c->runs + o->end; n++)
+      if (goes(s, n, i))
+        act(s, c->list + o->room, c->actions + n->first, c->actions + n->end, r->pairs, i, stores);
+  }
+}
+
+static inline void go(const scene *s, const loop *o, const round *r, V *const *stores) {
+  const crowd *c = s->c;
+  int left_out = o->section >= 0 && !any(s->m + c->list[0].base + o->section);
+  if (!left_out && o->way == APART) go_apart(s, o, r, stores);
+  else if (!left_out && o->way == IN_TURN) go_in_turn(s, o, r, stores);
+  else if (!left_out && o->way == MIXED) go_mixed(s, o, r, stores);
+  else {
+    const action *first = c->actions + (left_out ? o->others : c->runs[o->first].first);
+    const action *end = c->actions + (left_out ? o->others_end : c->runs[o->first].end);
+    for (word j = 0; j < r->count; j++)
+      act(s, c->list + o->room, first, end, r->pairs, r->listed ? r->listed[j] : j, stores);
+  }
+}
+
+static void go_back(const scene *s, const loop *o, const round *r, V *const *stores) {
+  const crowd *c = s->c;
+  int left_out = o->section >= 0 && !any(s->m + c->list[0].base + o->section);
+  for (word j = r->count - 1; j >= 0; j--) {
+    word i = r->listed ? r->listed[j] : j;
+    if (left_out) {
+      for (const action *a = c->actions + o->others_end - 1; a >= c->actions + o->others; a--)
+        act_back(s, o, a, r, i, stores);
+      continue;
+    }
+    for (const run *n = c->runs + o->end - 1; n >= c->runs + o->first; n--)
+      if (goes(s, n, i))
+        for (const action *a = c->actions + n->end - 1; a >= c->actions + n->first; a--) act_back(s, o, a, r, i, stores);
+  }
 }
 
 static int step(const scene *s, word k, word *most) {
   const crowd *c = s->c;
-  word kinds = c->rooms - 1 - c->species;
+  word kinds = c->rooms - 1 - c->species, sieves = 0;
   V *stores[] = {s->m, s->x + k * c->state, s->x + (k + 1) * c->state, s->given};
   round rounds[c->rooms];
   rounds_of(s, k, 0, rounds);
@@ -314,21 +285,9 @@ static int step(const scene *s, word k, word *most) {
       rounds_of(s, k, 0, rounds);
     }
     if (n == c->looked) list_near(s, k), rounds_of(s, k, 1, rounds);
+    for (; sieves < c->sieves && c->sifts[sieves].loop == n; sieves++) sift(s, sieves, rounds);
     const loop *o = c->order + n;
-    const round r = rounds[o->room];
-    if (!r.count) continue;
-    const room *own = c->list + o->room;
-    const action *end, *first = actions_of(s, o, &end);
-    for (word j = 0; j < r.count; j++) {
-      word i = r.listed ? r.listed[j] : j;
-      V *here = s->m + own->base + i * own->work;
-      const near *p = r.pairs ? r.pairs + i : 0;
-      for (const action *a = first; a < end; a++)
-        if (a->guard >= 0 && !any(here + a->guard)) {
-          if (a->store == CALLED) memset(here + a->at, 0, a->size * sizeof(V));
-        } else if (a->store == CALLED) CALL(c->entries + a->entry, here, 0, 0);
-        else copy(a, p, i, stores, here, 0);
-    }
+    if (rounds[o->room].count) go(s, o, rounds + o->room, stores);
   }
   return 1;
 }
@@ -341,21 +300,31 @@ static void step_back(const scene *s, word k) {
   for (word n = c->loops - 1; n >= 0; n--) {
     if (n == c->looked - 1) rounds_of(s, k, 0, rounds);
     const loop *o = c->order + n;
-    const round r = rounds[o->room];
-    const room *own = c->list + o->room;
-    const action *end, *first = actions_of(s, o, &end);
-    for (word j = r.count - 1; j >= 0; j--) {
-      word i = r.listed ? r.listed[j] : j;
-      V *here = s->m + own->base + i * own->work, *gains = s->b + own->base + i * own->work;
-      const near *p = r.pairs ? r.pairs + i : 0;
-      for (const action *a = end - 1; a >= first; a--)
-        if (a->guard >= 0 && !any(here + a->guard)) {
-          if (a->store == CALLED) memset(gains + a->at, 0, a->size * sizeof(V));
-        } else if (a->store == CALLED && a->back >= 0) CALL(c->back + a->back, here, gains, 0);
-        else if (a->store == CALLED || a->store == GIVEN) memset(gains + a->at, 0, a->size * sizeof(V));
-        else copy(a, p, i, stores, gains, 1);
-    }
+    if (rounds[o->room].count) go_back(s, o, rounds + o->room, stores);
   }
+}
+
+/* Room for what sieves let through, and the numbers of members. */
+static void make_room(scene *s) {
+  const crowd *c = s->c;
+  s->own_entries = (place *)s->scratch;
+  int32_t *at = (int32_t *)(s->own_entries + c->length), *all = at;
+  word most = 0;
+  for (word r = 0; r < c->rooms; r++) most = c->list[r].members > most ? c->list[r].members : most;
+  for (word i = 0; i < most; i++) all[i] = i;
+  s->all = all, at += most;
+  for (word q = 0; q < c->sieves; q++) {
+    word words = c->sifts[q].size, size = c->list[c->sifts[q].room].members;
+    int32_t *who = at, *which = who + words * size, *by_word = which + words * size, *counts = by_word + words * size;
+    s->let[q] = (sifted){who, which, by_word, counts, counts + words, size, 0};
+    at = counts + words + size;
+  }
+  s->scratch = (char *)(((uintptr_t)at + 7) / 8 * 8);
+}
+
+static void enter(scene *s, const crowd *c) {
+  s->c = c;
+  s->entries = c->length ? memcpy(s->own_entries, c->entries, c->length * sizeof(place)) : (place *)c->entries;
 }
 
 /* The rows of scenes, whose values and whose adjoints are walked apart; returns how many fit: the pairs of the next row are more than there is room for. */
@@ -372,6 +341,9 @@ API word roll(const crowd *c, const crowd *taped, const scenes *q, V *memory) {
   s.used = (int32_t *)(s.pairs + steps * slots);
   s.active = s.used + steps * kinds, s.count = s.active + slots;
   s.scratch = (char *)(((uintptr_t)(s.count + kinds) + 7) / 8 * 8);
+  sifted let[c->sieves + 1];
+  s.let = let;
+  make_room(&s);
   for (word row = 0; row < q->rows; row += LANES) {
     word rows = q->rows - row < LANES ? q->rows - row : LANES;
     memset(s.x, 0, (steps + 1) * c->state * sizeof(V));
@@ -380,7 +352,7 @@ API word roll(const crowd *c, const crowd *taped, const scenes *q, V *memory) {
       for (word w = 0; w < q->start_size; w++) LANE(s.x[w], l) = (R)q->start[from * q->start_size + w];
       for (word w = 0; w < c->given; w++) LANE(s.given[w], l) = (R)q->given[from * c->given + w];
     }
-    s.c = c;
+    enter(&s, c);
     for (word k = 0; k < steps; k++)
       if (!step(&s, k, q->most)) return row;
     for (word l = 0; l < rows; l++)
@@ -390,7 +362,7 @@ API word roll(const crowd *c, const crowd *taped, const scenes *q, V *memory) {
     if (!q->slopes) continue;
     memset(s.y, 0, (steps + 1) * c->state * sizeof(V));
     memset(s.b, 0, taped->words * sizeof(V));
-    s.c = taped;
+    enter(&s, taped);
     for (word l = 0; l < rows; l++)
       for (word k = 0; k <= steps; k++)
         for (word w = 0; w < q->shown; w++)

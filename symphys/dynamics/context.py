@@ -18,6 +18,8 @@ Expr = Any
 
 SHORTEST_KICK = 1 / 8
 """Of dt; see ``StepContext.shortest_kick``."""
+NEAR = 0.1
+"""Of the distance a_ref dt^2: surfaces that carried load and are that near to each other go on touching."""
 SLOWEST = 1.0
 """[m/s^2] least reference acceleration: what counts as fast when there is no gravity."""
 
@@ -59,6 +61,7 @@ class StepContext:
         u: what the inputs stack, constant over the step.
         near: per pair: 1 if it may act in the step, 0 if it is too far apart; empty: all may.
         sample: whether the world's bodies stand for many more: pairs that are far are looked for however few there are.
+        again: whether what is near is looked at again in each substep.
     """
 
     world: World
@@ -67,6 +70,7 @@ class StepContext:
     u: Expr
     near: tuple[Expr, ...] = ()
     sample: bool = False
+    again: bool = False
 
     def pairs_and_near(self) -> Iterator[tuple[Pair, Expr]]:
         """The pairs, and whether they may act."""

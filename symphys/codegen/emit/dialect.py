@@ -23,6 +23,7 @@ class Dialect:
         memory: type of the memories.
         fuses: whether adjoints have fused products, written out: all compilers give the same bits, at any level.
         ahead: loads that come together, ahead of what uses them; 0: each where it is used.
+        dense: whether places are numbers of 32 bits without strides, not pairs of words.
     """
 
     forms: Mapping[str, str]
@@ -36,6 +37,12 @@ class Dialect:
     memory: str = "V *"
     fuses: bool = True
     ahead: int = 0
+    dense: bool = False
+
+    @property
+    def table(self) -> str:
+        """Type of the table of places."""
+        return "const int32_t *" if self.dense else "const word *"
 
 
 VECTORS = Dialect(FORMS)

@@ -26,11 +26,13 @@ class SourceFile:
         text: C.
         narrow: whether it is for fewer lanes than a vector register has.
         straight: whether functions are straight lines of values, each computed once.
+        gathers: whether vectors are put together from many places.
     """
 
     text: str
     narrow: bool = False
     straight: bool = False
+    gathers: bool = False
 
 
 def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[SourceFile]:
@@ -47,19 +49,19 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
         work = [len(plan.functions[i][0].nodes) for i in mine]
         dialect = TEAM if calls > 1 else forms_of(lanes)
         texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i], shapes[i]) for i in mine]
-        start = _team(calls, single) if calls > 1 else head_of(lanes, single, dialect)
+        start = team_head(calls, single) if calls > 1 else head_of(lanes, single, dialect)
         for group in spread(texts, work, FILES):
             found.append(SourceFile("\n".join([start, *group]), narrow=narrow, straight=True))
     driver = head_of(lanes, single) + listed(len(plan.functions)) + "".join(map(resource, (*DRIVER, "phases.c")))
     return [*found, SourceFile(driver)]
 
 
-def listed(count: int) -> str:
+def listed(count: int, dialect: Dialect = VECTORS) -> str:
     """The functions f0, f1 .. in C, by number, as a driver calls them."""
     names = [f"f{number}" for number in range(count)]
-    declared = "".join(f"void {name}(V *m, V *b, const word *t, word k);\n" for name in names)
+    declared = "".join(f"void {name}(V *m, V *b, {dialect.table}t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
-    return f"{declared}static void (*const FUNCTIONS[])(V *, V *, const word *, word) = {{{table}}};\n"
+    return f"{declared}static void (*const FUNCTIONS[])(V *, V *, {dialect.table}, word) = {{{table}}};\n"
 
 
 def head_of(lanes: int, single: bool, dialect: Dialect = VECTORS) -> str:
@@ -68,7 +70,7 @@ def head_of(lanes: int, single: bool, dialect: Dialect = VECTORS) -> str:
     return head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
 
 
-def _team(calls: int, single: bool) -> str:
+def team_head(calls: int, single: bool) -> str:
     """How a C file of functions for several calls at once begins."""
     each = ", ".join(["x_"] * calls)
     whole = f"#define ALL(x) ({{ const R x_ = (x); (V){{{each}}}; }})\n"

@@ -124,11 +124,14 @@ def _entry(
     moving: Collection[int] | None,
 ) -> str:
     """The function itself; pieces of one that is cut are called apart, and each finds the places that it needs."""
-    steps = [f" + k * t[{2 * i + 1}]" if moving is None or i in moving else "" for i in range(len(pointers))]
-    places = [f"{memory} + t[{2 * i}]{steps[i]}" for i, (_, _, memory) in enumerate(pointers)]
+    each, moves = (1, False) if dialect.dense else (2, True)
+    steps = [
+        f" + k * t[{each * i + 1}]" if moves and (moving is None or i in moving) else "" for i in range(len(pointers))
+    ]
+    places = [f"{memory} + t[{each * i}]{steps[i]}" for i, (_, _, memory) in enumerate(pointers)]
     slots = len(pieces[0].piece.slots)
     arguments = ", ".join([*places, "w" if slots else "0"])
-    given = f"{dialect.memory}m, {dialect.memory}b, const word *t, word k"
+    given = f"{dialect.memory}m, {dialect.memory}b, {dialect.table}t, word k"
     lines, apart = [f"V w[{slots}];"] if slots else [], []
     if len(pieces) == 1:
         lines.append(f"{name}_0({arguments});")

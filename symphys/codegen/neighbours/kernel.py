@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen.emit.dialect import ONE_LANE, VECTORS
-from symphys.codegen.emit.source import FILES, SourceFile, head_of, listed, resource, spread
+from symphys.codegen.emit.dialect import ONE_LANE, TEAM, VECTORS
+from symphys.codegen.emit.shapes import EACH, Access, Shape
+from symphys.codegen.emit.source import FILES, SourceFile, head_of, listed, resource, spread, team_head
 from symphys.codegen.emit.writer import write
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.neighbours.plan import CrowdPlan, Walk, crowd_plan
@@ -30,6 +31,9 @@ from symphys.codegen.toolchain.report import BuildReport
 Array = NDArray[np.float64]
 WORD = ctypes.c_int64
 POINTER = ctypes.c_void_p
+DRIVER = "crowd.h", "meetings.c", "neighbours.c"
+MOST = 2**31 - 1
+"""Words of a memory: places are numbers of 32 bits."""
 SPARE = 1.25
 """Times as many pairs as are near, for which there is room from then on."""
 
@@ -50,7 +54,11 @@ class _Crowd(ctypes.Structure):
     _fields_ = (
         *((name, WORD) for name in ("rooms", "species", "loops", "words", "state", "given")),
         *((name, WORD) for name in ("found", "looked", "striking")),
-        *((name, POINTER) for name in ("list", "order", "actions", "entries", "back", "kinds", "sight", "nears")),
+        *((name, POINTER) for name in ("list", "order", "runs", "turns", "actions", "references")),
+        ("length", WORD),
+        *((name, POINTER) for name in ("entries", "back", "several")),
+        ("sieves", WORD),
+        *((name, POINTER) for name in ("sifts", "words_of", "kinds", "sight", "nears")),
     )
 
 
@@ -160,9 +168,14 @@ class CrowdKernel:
             bodies = sum(room.members for room in crowd.rooms[1 : 1 + len(crowd.sights)])
             slots = sum(room.members for room in crowd.rooms[1 + len(crowd.sights) :])
             words = max(values.words, taped.words) + taped.words if gradient else values.words
-            words += (1 + gradient) * (steps + 1) * values.state + values.given
+            words += (1 + gradient) * (steps + 1) * values.state + values.given + values.length // 2 + 1
             bytes_ = steps * (12 * lanes * slots + 4 * len(crowd.meetings)) + 24 * slots + 92 * bodies + 512
+            bytes_ += 4 * max(room.members for room in crowd.rooms)
+            for sieve in crowd.sieves:
+                bytes_ += 4 * (len(sieve.places) + (1 + 3 * len(sieve.places)) * crowd.rooms[sieve.room].members)
             total = words + bytes_ // (8 * lanes) + 2
+            if total > MOST:
+                raise ProgramError(f"neighbours: {steps} steps need {total} words of memory; there may be {MOST}")
             self._pools = {(steps, gradient): MemoryPool(total, lanes, np.float64, self.prepare)}
         return self._pools[steps, gradient]
 
@@ -190,29 +203,43 @@ class CrowdKernel:
             rooms[r] = _Room(walk.work[r], room.state, members[r], int(bases[r]), begins[r])
         self._kept.append(rooms)
         ends = 1 + len(crowd.nears) + np.cumsum([0, *map(len, crowd.nears)])
-        lists = walk.loops, self._actions(walk, begins, bases), walk.entries, walk.back
+        lists = walk.loops, walk.runs, walk.turns, *(
+            self._placed(walk, each, begins, bases) for each in (walk.actions, walk.references)
+        )  # fmt: skip
+        places = [sieve.places for sieve in crowd.sieves]
+        starts = np.cumsum([0, *map(len, places)]).tolist()
+        sieves = [(s.room, at, len(s.places), s.loop) for s, at in zip(crowd.sieves, starts, strict=False)]
         return _Crowd(
             *(len(members), len(crowd.sights), len(walk.loops), int(bases[-1]), state, crowd.given),
             *(crowd.found, crowd.looked, crowd.striking),
             ctypes.addressof(rooms),
-            *(self._put(each) for each in lists),
+            *(self._put(each, np.int32) for each in lists),
+            len(walk.entries) if len(walk.references) else 0,
+            *(self._put(each, np.int32) for each in (walk.entries, walk.back, walk.several)),
+            len(sieves),
+            self._put(np.array(sieves), np.int32),
+            self._put(np.array([at for own in places for at in own]), np.int32),
             kinds,
-            self._put(np.array([(sight.position, sight.reach) for sight in crowd.sights], np.int64)),
-            self._put(np.array([*ends, *(at for words in crowd.nears for at in words)], np.int64)),
+            self._put(np.array([(sight.position, sight.reach) for sight in crowd.sights]), np.int64),
+            self._put(np.array([*ends, *(at for words in crowd.nears for at in words)]), np.int64),
         )
 
-    def _actions(self, walk: Walk, begins: Sequence[int], bases: NDArray[np.int64]) -> NDArray[np.int64]:
-        """With places in the memory in place of rooms."""
+    def _placed(
+        self, walk: Walk, rows: NDArray[np.int64], begins: Sequence[int], bases: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Actions or references with places in the memory in place of rooms."""
+        if not rows.size:
+            return rows
         states = np.array([room.state for room in walk.crowd.rooms])
-        found = walk.actions.copy()
+        found = rows.copy()
         store, room = found[:, 0], found[:, 3].copy()
         kept = (store == Store.BEFORE) | (store == Store.AFTER)
         found[:, 3] = np.where(store == Store.WORK, np.array(walk.work)[room], np.where(kept, states[room], 0))
         found[:, 2] += np.where(store == Store.WORK, bases[room], np.where(kept, np.array(begins)[room], 0))
         return found
 
-    def _put(self, values: NDArray[Any]) -> int:
-        values = np.ascontiguousarray(values) if values.size else np.zeros(1, np.int64)
+    def _put(self, values: NDArray[Any], kind: type[np.signedinteger[Any]]) -> int:
+        values = np.ascontiguousarray(values, kind) if values.size else np.zeros(1, kind)
         self._kept.append(values)
         return int(values.ctypes.data)
 
@@ -233,8 +260,9 @@ def compile_crowd(
     """
     started = time.perf_counter()
     lanes = processor().lanes(False) if lanes is None else lanes
-    planned = crowd_plan(crowd)
-    with shared_library(_sources(planned, lanes), cache or default_cache()) as built:
+    several = processor().lanes(False) if lanes == 1 else 0
+    planned = crowd_plan(crowd, several)
+    with shared_library(_sources(planned, lanes, several), cache or default_cache()) as built:
         library = loaded(built.path)
     report = BuildReport(
         compiler=built.compiler.version,
@@ -251,13 +279,26 @@ def compile_crowd(
     return CrowdKernel(crowd, planned, library, report, processors() if threads is None else threads)
 
 
-def _sources(planned: CrowdPlan, lanes: int) -> list[SourceFile]:
+def _sources(planned: CrowdPlan, lanes: int, several: int) -> list[SourceFile]:
+    """The C files; ``several``: calls that functions for several members do at once."""
     dialect = ONE_LANE if lanes == 1 else VECTORS
     head, found = head_of(lanes, single=False, dialect=dialect), list[SourceFile]()
+    dialect, team = (replace(each, dense=True) for each in (dialect, TEAM))
+    numbers = range(len(planned.functions))
     for backward in (False, True):
-        mine = [i for i, (_, form) in enumerate(planned.functions) if form.backward == backward]
-        texts = [write(f"f{i}", *planned.functions[i], dialect, ()) for i in mine]
-        for group in spread(texts, [len(planned.functions[i][0].nodes) for i in mine], FILES):
-            found.append(SourceFile("\n".join([head, *group]), straight=True))
-    driver = head_of(lanes, single=False, dialect=dialect) + listed(len(planned.functions)) + resource("neighbours.c")
-    return [*found, SourceFile(driver)]
+        own = [i for i in numbers if planned.functions[i][1].backward == backward and i not in planned.wide]
+        found += _files(planned, own, head, [write(f"f{i}", *planned.functions[i], dialect, ()) for i in own])
+    wide, texts = sorted(planned.wide), list[str]()
+    for i in wide:
+        graph, form = planned.functions[i]
+        accesses = (Access(EACH, (1,) * several),) * (len(graph.sizes) + len(graph.results))
+        texts.append(write(f"f{i}", graph, form, team, (), Shape(several, accesses)))
+    gathering = _files(planned, wide, team_head(several, single=False), texts)
+    found += (replace(file, gathers=True) for file in gathering)
+    driver = [head, f"#define SEVERAL {several}\n" if wide else "", listed(len(numbers), dialect)]
+    return [*found, SourceFile("".join([*driver, *map(resource, DRIVER)]))]
+
+
+def _files(planned: CrowdPlan, numbers: Sequence[int], head: str, texts: Sequence[str]) -> Iterator[SourceFile]:
+    for group in spread(texts, [len(planned.functions[i][0].nodes) for i in numbers], FILES):
+        yield SourceFile("\n".join([head, *group]), straight=True)

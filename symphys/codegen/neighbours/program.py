@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 from symphys.codegen.program.program import Place, Program
 
@@ -30,6 +31,28 @@ class Store(IntEnum):
     GIVEN = 3
 
 
+class Word(NamedTuple):
+    """One that is 0 where something is without effect: the number of its sieve, and which word of that it is."""
+
+    sieve: int
+    point: int
+
+
+@dataclass(frozen=True)
+class Sieve:
+    """Words by which members are told apart.
+
+    Attributes:
+        room: whose members.
+        places: of the words, in the work of a member.
+        loop: number of the loop before which they are looked at, once a step.
+    """
+
+    room: int
+    places: tuple[int, ...]
+    loop: int
+
+
 @dataclass(frozen=True)
 class Move:
     """Words that are copied between the work of a member and another store.
@@ -42,7 +65,7 @@ class Move:
         at: in the member's work.
         size: words.
         out: whether they are copied from the member.
-        guard: where a word of the member's work is 0 if this may be left out; None: it may not.
+        guard: a word that is 0 if this may be left out; None: it may not.
     """
 
     store: Store
@@ -52,7 +75,16 @@ class Move:
     at: int
     size: int
     out: bool = False
-    guard: int | None = None
+    guard: Word | None = None
+
+
+class MemberReference(NamedTuple):
+    """Words that are read where they lie; see ``Move``."""
+
+    store: Store
+    room: int
+    of: Of
+    offset: int
 
 
 @dataclass(frozen=True)
@@ -61,14 +93,16 @@ class MemberCall:
 
     Attributes:
         number: of the call in the sample's body.
-        inputs, outputs: where they begin in the work of the member.
-        guard: where a word of that is 0 if results are 0 or not read; None: the call is always needed.
+        inputs, outputs: where they begin in the work of the member, or elsewhere.
+        guard: a word that is 0 if results are 0 or not read; None: the call is always needed.
+        cleared: (start, words) of results that are read where that word is 0.
     """
 
     number: int
-    inputs: tuple[int, ...]
+    inputs: tuple[int | MemberReference, ...]
     outputs: tuple[int, ...]
-    guard: int | None = None
+    guard: Word | None = None
+    cleared: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -133,6 +167,7 @@ class Crowd:
     Attributes:
         sample: one step of a few bodies: its z is their state, "x" the state after.
         loops: in order.
+        sieves: whose words guards are, in the order of their loops.
         rooms: what is there once, then each species, then the pairs of each meeting.
         meetings: of the rooms of pairs.
         sights: of the species.
@@ -142,10 +177,12 @@ class Crowd:
         nears: by meeting, where in the work of a pair words lie of which one is not 0 if it is near.
         given: words that are given for all steps.
         chains: where in the sample lies what members hand on as it begins.
+        taped: the same for adjoints, where they are faster with other calls.
     """
 
     sample: Program
     loops: tuple[MemberLoop, ...]
+    sieves: tuple[Sieve, ...]
     rooms: tuple[Room, ...]
     meetings: tuple[Meeting, ...]
     sights: tuple[SightPlaces, ...]
@@ -155,6 +192,7 @@ class Crowd:
     nears: tuple[tuple[int, ...], ...]
     given: int
     chains: tuple[Place, ...]
+    taped: Crowd | None = None
 
     @property
     def state(self) -> int:

@@ -9,7 +9,17 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from symphys.codegen.neighbours.program import ONLY, Crowd, MemberCall, MemberLoop, Move, SightPlaces, Store
+from symphys.codegen.neighbours.program import (
+    ONLY,
+    Crowd,
+    MemberCall,
+    MemberLoop,
+    MemberReference,
+    Move,
+    SightPlaces,
+    Store,
+)
+from symphys.codegen.neighbours.references import with_references
 
 
 @dataclass
@@ -27,14 +37,19 @@ class _Region:
     last: int
 
 
-def reused(crowd: Crowd) -> Crowd:
-    """The same crowd with less work; it has no adjoint."""
-    places = _Places(crowd)
+def reused(crowd: Crowd, alone: bool = False) -> Crowd:
+    """The same crowd with less work; it has no adjoint. ``alone``: for one scene, ``with_references``."""
+    begin = _begin(crowd)
+    crowd = with_references(crowd) if alone else crowd
+    places = _Places(crowd, begin)
     loops = tuple(_moved(loop, places) for loop in crowd.loops)
     species = len(crowd.sights)
     return replace(
         crowd,
         loops=loops,
+        sieves=tuple(
+            replace(sieve, places=tuple(places.of(sieve.room, at) for at in sieve.places)) for sieve in crowd.sieves
+        ),
         rooms=tuple(replace(room, work=places.size(r)) for r, room in enumerate(crowd.rooms)),
         sights=tuple(
             SightPlaces(places.of(1 + s, each.position), places.of(1 + s, each.reach))
@@ -47,23 +62,40 @@ def reused(crowd: Crowd) -> Crowd:
 
 def _moved(loop: MemberLoop, places: _Places) -> MemberLoop:
     def move(each: Move) -> Move:
-        own = replace(each, at=places.of(loop.room, each.at), guard=places.maybe(loop.room, each.guard))
+        own = replace(each, at=places.of(loop.room, each.at))
         return replace(own, offset=places.of(each.room, each.offset)) if each.store is Store.WORK else own
 
     def call(each: MemberCall) -> MemberCall:
-        inputs, outputs = (tuple(places.of(loop.room, at) for at in side) for side in (each.inputs, each.outputs))
-        return MemberCall(each.number, inputs, outputs, places.maybe(loop.room, each.guard))
+        inputs = tuple(
+            places.referred(at) if isinstance(at, MemberReference) else places.of(loop.room, at) for at in each.inputs
+        )
+        outputs = tuple(places.of(loop.room, at) for at in each.outputs)
+        cleared = tuple((places.of(loop.room, at), size) for at, size in each.cleared)
+        return replace(each, inputs=inputs, outputs=outputs, cleared=cleared)
 
     does = tuple(move(each) if isinstance(each, Move) else call(each) for each in loop.does)
-    return MemberLoop(loop.room, does, places.maybe(ONLY, loop.section), tuple(map(move, loop.instead)))
+    section = None if loop.section is None else places.of(ONLY, loop.section)
+    return MemberLoop(loop.room, does, section, tuple(map(move, loop.instead)))
+
+
+def _begin(crowd: Crowd) -> list[set[int]]:
+    """By room, where regions begin: results of a call, and what is copied in."""
+    found: list[set[int]] = [set() for _ in crowd.rooms]
+    for loop in crowd.loops:
+        for does in loop.does:
+            if isinstance(does, MemberCall):
+                found[loop.room].update(does.outputs[:1])
+            elif not does.out:
+                found[loop.room].add(does.at)
+    return found
 
 
 class _Places:
     """Where words of the work go."""
 
-    def __init__(self, crowd: Crowd) -> None:
+    def __init__(self, crowd: Crowd, begin: list[set[int]]) -> None:
         self._crowd = crowd
-        self._starts = [sorted(starts) for starts in self._begin()]
+        self._starts = [sorted(starts) for starts in begin]
         self._regions: list[dict[int, _Region]] = [{} for _ in crowd.rooms]
         for time, room, at in self._touched():
             self._touch(time, room, at)
@@ -79,9 +111,9 @@ class _Places:
         start = self._start(room, at)
         return self._to[room][start] + at - start
 
-    def maybe(self, room: int, at: int | None) -> int | None:
-        """The same, if there is one."""
-        return None if at is None else self.of(room, at)
+    def referred(self, to: MemberReference) -> MemberReference:
+        """The same words elsewhere."""
+        return to._replace(offset=self.of(to.room, to.offset)) if to.store is Store.WORK else to
 
     def size(self, room: int) -> int:
         """Words of a member."""
@@ -89,17 +121,6 @@ class _Places:
 
     def _start(self, room: int, at: int) -> int:
         return self._starts[room][bisect_right(self._starts[room], at) - 1]
-
-    def _begin(self) -> list[set[int]]:
-        """By room, where regions begin: results of a call, and what is copied in."""
-        found: list[set[int]] = [set() for _ in self._crowd.rooms]
-        for loop in self._crowd.loops:
-            for does in loop.does:
-                if isinstance(does, MemberCall):
-                    found[loop.room].update(does.outputs[:1])
-                elif not does.out:
-                    found[loop.room].add(does.at)
-        return found
 
     def _touched(self) -> Iterator[tuple[int, int, int]]:
         """(time, room, word) of all that is written or read, in order."""
@@ -113,16 +134,18 @@ class _Places:
             if number == crowd.looked:
                 for kind, words in enumerate(crowd.nears):
                     yield from ((time, 1 + len(crowd.sights) + kind, at) for at in words)
+            for sieve in crowd.sieves:
+                if number == sieve.loop:
+                    yield from ((time, sieve.room, at) for at in sieve.places)
             if loop.section is not None:
                 yield time, ONLY, loop.section
             for does in (*loop.does, *loop.instead):
                 time += 1
                 places = (*does.inputs, *does.outputs) if isinstance(does, MemberCall) else (does.at,)
-                yield from ((time, loop.room, at) for at in places)
-                if does.guard is not None:
-                    yield time, loop.room, does.guard
-                if isinstance(does, Move) and does.store is Store.WORK:
-                    yield time, does.room, does.offset
+                yield from ((time, loop.room, at) for at in places if not isinstance(at, MemberReference))
+                for each in (does,) if isinstance(does, Move) else places:
+                    if isinstance(each, Move | MemberReference) and each.store is Store.WORK:
+                        yield time, each.room, each.offset
             time += 1
 
     def _touch(self, time: int, room: int, at: int) -> None:

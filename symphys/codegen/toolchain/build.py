@@ -287,7 +287,7 @@ def compile_for(given: IO[bytes]) -> None:
 def texts_of(parts: Sequence[SourceFile]) -> str:
     """A checksum of C files."""
     return hashlib.sha256(
-        "\0".join(f"{part.narrow} {part.straight} {part.text}" for part in parts).encode()
+        "\0".join(f"{part.narrow} {part.straight} {part.gathers} {part.text}" for part in parts).encode()
     ).hexdigest()
 
 

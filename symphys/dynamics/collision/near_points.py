@@ -120,12 +120,26 @@ def near_points(
         reach: of the step.
         smoothing: all are near where it is above 0.
     """
+    gaps, ahead = _measured(shapes, bodies, reach)
+    return tuple((ca.logic_and(near, ca.logic_or(gap < ahead, smoothing > 0)),) for gap in gaps)
+
+
+@traced
+def point_gaps(
+    shapes: tuple[Surface, Surface], bodies: tuple[Sight, Sight | None], reach: Travel
+) -> tuple[list[Expr], Expr]:
+    """(of each point of a pair at least how far it is apart, how far it comes within ``reach``) [m]."""
+    return _measured(shapes, bodies, reach)
+
+
+def _measured(
+    shapes: tuple[Surface, Surface], bodies: tuple[Sight, Sight | None], reach: Travel
+) -> tuple[list[Expr], Expr]:
     (one, other), (a, b) = shapes, bodies
     assert a is not None
-    ahead = reach.of_points(a, b, (_arm(one), _arm(other)))
     rule = RULES.get((type(one), type(other)))
     gaps = rule(one, other, a, b) if rule else RULES[type(other), type(one)](other, one, b, a)
-    return tuple((ca.logic_and(near, ca.logic_or(gap < ahead, smoothing > 0)),) for gap in gaps)
+    return gaps, reach.of_points(a, b, (_arm(one), _arm(other)))
 
 
 def _arm(shape: Surface) -> float:

@@ -24,7 +24,7 @@ from symphys.dynamics.contact.effective_mass import (
     separates,
     symmetric_mobilities,
 )
-from symphys.dynamics.context import StepSettings
+from symphys.dynamics.context import NEAR, StepSettings
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import clip, positive
 from symphys.model.world import Law
@@ -35,9 +35,6 @@ Expr = Any
 MARGIN = 1e-4
 """Width of chi's rise, as a share of the reference acceleration: a rebound that barely leaves is part rest."""
 
-
-NEAR = 0.1
-"""Of the distance a_ref dt^2: surfaces that carried load and are that near to each other go on touching."""
 TIE = 1e-11
 """[m] surfaces that move at speed and are that near at the end of a substep do not touch then; see ``_slack``."""
 ANY = 1e6

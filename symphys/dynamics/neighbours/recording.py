@@ -23,6 +23,7 @@ class MemberRecorder(Recorder):
         folds: numbers of the results of calls that hand a chain on to the next body.
         sights: numbers of vectors: of each body its position and its reach, then how far what strikes comes.
         words: for the number of the vector of a guard what it is about.
+        points: for the same which point of that alone it is about, if it is.
     """
 
     def __init__(self) -> None:
@@ -31,13 +32,18 @@ class MemberRecorder(Recorder):
         self.roots: dict[int, int | None] = {}
         self.folds: set[int] = set()
         self.words: dict[int, Hashable] = {}
+        self.points: dict[int, int] = {}
         self.sights: list[int] = []
 
-    def guard(self, word: Any, of: Hashable) -> None:
+    def guard(self, word: Any, of: Hashable, point: int | None, late: bool) -> None:
         """See ``decorator.guard``."""
-        known = len(self.guards)
-        super().guard(word, of)
-        self.words.update((vector.number, of) for vector in self.guards[known:])
+        guards = self.late_guards if late else self.guards
+        known = len(guards)
+        super().guard(word, of, point, late)
+        for vector in guards[known:]:
+            self.words[vector.number] = of
+            if point is not None:
+                self.points[vector.number] = point
 
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
         """See ``Tracer``."""

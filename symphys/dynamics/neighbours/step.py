@@ -57,9 +57,23 @@ class RecordedStep:
 
 
 def recorded_step(
-    sample: Sample, scheme: Scheme, inputs: Sequence[str] = (), parameters: Sequence[Any] = (), exact: bool = False
+    sample: Sample,
+    scheme: Scheme,
+    inputs: Sequence[str] = (),
+    parameters: Sequence[Any] = (),
+    exact: bool = False,
+    again: bool = True,
 ) -> RecordedStep:
-    """The step of a sample; ``exact``: at smoothing 0 only."""
+    """The step of a sample.
+
+    Args:
+        sample: a few bodies.
+        scheme: how a step is taken.
+        inputs: of the step.
+        parameters: of the step.
+        exact: at smoothing 0 only.
+        again: whether what is near is looked at again in each substep, which changes no bit.
+    """
     world = sample.world
     scheme = replace(scheme, cuts=_cuts(world, scheme))
     x, u, p, smoothing = arguments_of(world, inputs, parameters)
@@ -69,13 +83,13 @@ def recorded_step(
     owners, offsets = _names(sample, layout)
     with tracing(recorder):
         context = context_of(world, scheme, inputs, [x, u, p, ca.SX(0) if exact else smoothing])
-        context = replace(context, sample=True)
+        context = replace(context, sample=True, again=again)
         after, _ = take_step(context, parts_of(layout, x))
         results = {}
         for owner in dict.fromkeys(owners.values()):
             own = [name for name in layout.names() if owners[name] == owner]
             results[recorder.give("next", [after[name] for name in own]).number] = offsets[own[0]]
-    calls = with_guards(without_dead_code(recorder.calls), recorder.guards, recorder.sections)
+    calls = with_guards(without_dead_code(recorder.calls), recorder.guards, recorder.sections, recorder.late_guards)
     calls = _seen_first(calls, recorder.sights)
     sizes = {"u": u.numel(), "p": p.numel(), "smoothing": 1}
     return RecordedStep(calls, recorder, StateNames(owners, offsets, results), sizes)

@@ -22,7 +22,7 @@ C = TypeVar("C")
 class Tracing(Protocol):
     """What traces the calls of a step."""
 
-    def guard(self, word: Any, of: Hashable) -> None:
+    def guard(self, word: Any, of: Hashable, point: int | None, late: bool) -> None:
         """Where ``word`` is 0, what depends on it may be left out."""
         ...
 
@@ -75,14 +75,18 @@ def traced(function: Callable[P, T]) -> Callable[P, T]:
     return call
 
 
-def guard(word: T, of: Hashable = None) -> T:
+def guard(word: T, of: Hashable = None, point: int | None = None, late: bool = False) -> T:
     """The same word, 0 or 1, marked: a compiled kernel leaves out the calls that are without effect where it is 0.
 
-    ``of`` says what it is about.
+    Args:
+        word: marked.
+        of: what it is about.
+        point: about which point of that alone; None: about all.
+        late: whether it is known only within the step; else all that it depends on comes before what is left out.
     """
     tracer = _TRACER.get()
     if tracer is not None:
-        tracer.guard(word, of)
+        tracer.guard(word, of, point, late)
     return word
 
 

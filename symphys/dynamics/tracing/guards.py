@@ -65,7 +65,10 @@ Simplified = tuple[_Same | None, Known]
 
 
 def with_guards(
-    calls: Sequence[TracedCall], guards: Sequence[TracedVector], sections: Sequence[tuple[TracedVector, int]]
+    calls: Sequence[TracedCall],
+    guards: Sequence[TracedVector],
+    sections: Sequence[tuple[TracedVector, int]],
+    late: Sequence[TracedVector] = (),
 ) -> tuple[TracedCall, ...]:
     """The calls, with what leaves them without effect; each section in one piece.
 
@@ -73,20 +76,21 @@ def with_guards(
         calls: of a step.
         guards: words that each leave out a few calls, here and there. What they depend on comes first.
         sections: words, as entries of vectors, that each leave out many calls that follow one another.
+        late: more guards, known only where they are computed.
     """
     search = _Search(calls)
-    first, found = search.needed(guards), dict[int, Guard]()
-    own, implied, taken = search.implied(guards), dict[int, list[int]](), set(first)
-    for word in sorted(guards, key=lambda each: bool(own[each.number])):
+    first, found, words = search.needed(guards), dict[int, Guard](), [*guards, *late]
+    own, implied, taken = search.implied(words), dict[int, list[int]](), set(first)
+    for word in sorted(words, key=lambda each: len(own[each.number])):
         weaker = {k for number in own[word.number] for k in implied[number]}
         taken -= search.writers(own[word.number])
         left = search.left_out(Part(word), taken, weaker, [found[k] for k in weaker])
         implied[word.number] = list(left)
         found |= left
         taken |= left.keys()
-    late = [k for k in range(len(calls)) if k in first and k in found]
-    early = [k for k in range(len(calls)) if k in first and k not in found]
-    order = [*early, *late, *(k for k in range(len(calls)) if k not in first)]
+    free = [k for k in range(len(calls)) if k in first and k not in found]
+    held = [k for k in range(len(calls)) if k in first and k in found]
+    order = [*free, *held, *(k for k in range(len(calls)) if k not in first)]
     apart: dict[int, Guard] = {}
     for vector, entry in sections:
         left = search.left_out(Part(vector, entry), apart.keys())
@@ -263,8 +267,9 @@ class _Search:
             for vector, (_, zero) in zip(call.outputs, results, strict=True):
                 if zero:
                     known[vector.number] = zero
-                    for reader in () if until else self._readers.get(vector.number, ()):
-                        heappush(waiting, reader)
+                    for reader in self._readers.get(vector.number, ()):
+                        if not until or self._gives(reader, until):
+                            heappush(waiting, reader)
         return found
 
     def _gives(self, k: int, numbers: Collection[int]) -> bool:

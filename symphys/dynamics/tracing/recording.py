@@ -53,6 +53,7 @@ class Recorder(Tracer):
         super().__init__()
         self.calls: list[TracedCall] = []
         self.guards: list[TracedVector] = []
+        self.late_guards: list[TracedVector] = []
         self.sections: list[tuple[TracedVector, int]] = []
         self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
@@ -63,11 +64,11 @@ class Recorder(Tracer):
         """A slot for an argument of the step."""
         self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
 
-    def guard(self, word: Any, of: Hashable) -> None:
+    def guard(self, word: Any, of: Hashable, point: int | None, late: bool) -> None:
         """See ``decorator.guard``; what is known already guards nothing."""
         (code,) = word.codes if isinstance(word, TracedMatrix) else self._codes(word)
         if not isinstance(code, float):
-            self.guards.append(self._slots[code[0]])
+            (self.late_guards if late else self.guards).append(self._slots[code[0]])
 
     def section(self, word: Any) -> None:
         """See ``decorator.section``."""

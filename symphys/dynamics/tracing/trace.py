@@ -78,9 +78,9 @@ class Tracer(ABC):
             state = once(context, state)
         return state
 
-    def guard(self, word: Any, of: Hashable) -> None:
+    def guard(self, word: Any, of: Hashable, point: int | None, late: bool) -> None:
         """What tells which calls are without effect; of use to a recorder alone."""
-        del word, of
+        del word, of, point, late
 
     def section(self, word: Any) -> None:
         """Likewise."""

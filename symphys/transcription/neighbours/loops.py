@@ -8,18 +8,20 @@ Of bodies and pairs that are alike only the first is kept.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from symphys.codegen.neighbours.program import ONLY, MemberCall, MemberLoop, Move, Of, Store
+from symphys.codegen.neighbours.program import ONLY, MemberCall, MemberLoop, Move, Of, Sieve, Store, Word
 from symphys.dynamics.neighbours.sample import TWINS, Sample
 from symphys.dynamics.neighbours.step import RecordedStep
 from symphys.dynamics.tracing.guards import Guard, Part
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.errors import SymphysError
+from symphys.transcription.neighbours.clearing import with_clearing
 
 NONE = -1
+MOST_WORDS = 31
+"""Of a sieve, which are bits of an integer; points of a pair beyond these are always computed."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +30,13 @@ class LoopStep:
 
     Attributes:
         loops: in order.
+        sieves: in the order of their loops.
         work, states: words of a member of each room: first what is there once, then each species, then pairs by kind.
         homes: for the numbers of vectors (room, where they lie in its work).
     """
 
     loops: tuple[MemberLoop, ...]
+    sieves: tuple[Sieve, ...]
     work: tuple[int, ...]
     states: tuple[int, ...]
     homes: Mapping[int, tuple[int, int]]
@@ -48,20 +52,6 @@ def loops_of(sample: Sample, recorded: RecordedStep) -> LoopStep:
     return _Builder(sample, recorded).built(recorded.calls)
 
 
-def _points(sample: Sample, words: Mapping[int, Hashable]) -> dict[int, int]:
-    """For the words of guards that are about one point which that is: they come in order, behind that of the pair."""
-    points = Counter((pair.first, pair.second) for pair in sample.world.pairs)
-    by_sides: dict[Hashable, list[int]] = {}
-    for number, sides in words.items():
-        by_sides.setdefault(sides, []).append(number)
-    found: dict[int, int] = {}
-    for sides, own in by_sides.items():
-        count = points[sides]  # type: ignore[index]
-        if len(own) >= count:
-            found |= zip(own[len(own) - count :], range(count), strict=True)
-    return found
-
-
 @dataclass
 class _Loop:
     """A loop that grows."""
@@ -70,6 +60,8 @@ class _Loop:
     section: Part | None
     does: list[Move | MemberCall] = field(default_factory=list)
     instead: list[Move] = field(default_factory=list)
+    made: set[int] = field(default_factory=set)
+    """Numbers of the vectors that its calls have computed."""
 
     def done(self, section: int | None) -> MemberLoop:
         """As it is; ``section``: where its word lies."""
@@ -89,8 +81,9 @@ class _Builder:
         for k, pair in enumerate(sample.world.pairs):
             self._members[pair.name] = "pair", leads.setdefault((pair.first, pair.second), k)
         self._of_word = {number: ("pair", leads[sides]) for number, sides in self._recorder.words.items()}
-        self._points = _points(sample, self._recorder.words)
+        self._points, self._words, self._sifted = self._recorder.points, dict[int, Word](), list[list[int]]()
         self._kinds = {own[0]: kind for kind, own in enumerate(sample.pairs)}
+        self._sift()
         rooms = 1 + len(sample.species) + len(sample.kinds)
         self._work, self._states = [0] * rooms, [0] * rooms
         self._loops: list[_Loop] = []
@@ -122,8 +115,27 @@ class _Builder:
             for vector in call.outputs:
                 if vector.number in self._root:
                     self._newest[self._root[vector.number]] = vector.number
-        loops = tuple(loop.done(self._word(loop.section)) for loop in self._loops)
-        return LoopStep(loops, tuple(self._work), tuple(self._states), self._homes)
+        sieves, kept = self._sieves(), {*self._recorder.words, *self._names.results}
+        loops = [loop.done(self._word(loop.section)) for loop in self._loops]
+        return LoopStep(
+            with_clearing(loops, calls, kept, self._root), sieves, tuple(self._work), tuple(self._states), self._homes
+        )
+
+    def _sift(self) -> None:
+        """Put the words together that tell the points of a pair apart at one instant."""
+        latest: dict[Owner, tuple[int, int]] = {}
+        for number, point in self._points.items():
+            pair = self._of_word[number]
+            if pair[1] not in self._kinds:
+                continue
+            sieve, last = latest.get(pair, (NONE, NONE))
+            if point <= last or sieve == NONE:
+                sieve = len(self._sifted)
+                self._sifted.append([])
+            latest[pair] = sieve, point
+            if len(self._sifted[sieve]) < MOST_WORDS:
+                self._words[number] = Word(sieve, len(self._sifted[sieve]))
+                self._sifted[sieve].append(number)
 
     def _member(self, call: TracedCall) -> Owner:
         """Who makes a call."""
@@ -259,11 +271,14 @@ class _Builder:
         late = late and not self._reached < point  # the points of a pair follow one another
         section = None if call.section is None else call.section.word
         last = self._loops[-1] if self._loops else None
+        if last is not None and call.guard is not None and call.guard.word.vector is not None:
+            late = late or call.guard.word.vector.number in last.made
         if last is None or (last.room, last.section) != (room, section) or late:
             self._loops.append(_Loop(room, section))
             self._touched, self._reached = {}, NONE
         self._reached = max(self._reached, point)
         self._touched |= dict.fromkeys(read, False) | dict.fromkeys(written, True)
+        self._loops[-1].made.update(vector.number for vector in call.outputs)
         return self._loops[-1]
 
     def _point(self, call: TracedCall) -> int:
@@ -272,14 +287,31 @@ class _Builder:
         words += [vector.number for vector in call.outputs]
         return next((self._points[number] for number in words if number in self._points), NONE)
 
-    def _guard(self, call: TracedCall) -> int | None:
-        """Where the word of a call's point lies, if it is about one of several."""
+    def _guard(self, call: TracedCall) -> Word | None:
+        """The word of a call's point."""
         if call.guard is None or call.guard.word.vector is None or call.guard.word.start:
             return None
-        number = call.guard.word.vector.number
-        return self._homes[number][1] if number in self._points else None
+        return self._words.get(call.guard.word.vector.number)
 
-    def _copied(self, loop: _Loop, vector: TracedVector, member: Owner, guard: int | None) -> int:
+    def _sieves(self) -> tuple[Sieve, ...]:
+        """All that guards use, in the order of their loops, with new numbers of the guards."""
+        first: dict[int, int] = {}
+        for number, loop in enumerate(self._loops):
+            for does in loop.does:
+                if does.guard is not None:
+                    first.setdefault(does.guard.sieve, number)
+        to = {sieve: k for k, sieve in enumerate(first)}
+        for loop in self._loops:
+            loop.does = [
+                does if does.guard is None else replace(does, guard=Word(to[does.guard.sieve], does.guard.point))
+                for does in loop.does
+            ]
+        homes = [[self._homes[number] for number in self._sifted[sieve]] for sieve in first]
+        return tuple(
+            Sieve(own[0][0], tuple(at for _, at in own), loop) for own, loop in zip(homes, first.values(), strict=True)
+        )
+
+    def _copied(self, loop: _Loop, vector: TracedVector, member: Owner, guard: Word | None) -> int:
         """Where a call finds in its own work what it reads."""
         room, number = loop.room, vector.number
         if number in self._root:

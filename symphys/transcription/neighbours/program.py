@@ -9,6 +9,7 @@ import casadi as ca
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.codegen.neighbours.program import Crowd, Meeting, MemberCall, Move, Room, SightPlaces
+from symphys.dynamics.collision.near_points import can_measure
 from symphys.dynamics.neighbours.sample import TWINS, Sample, sample_of
 from symphys.dynamics.neighbours.step import RecordedStep, recorded_step
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
@@ -38,7 +39,14 @@ def crowd_of(world: World, law: Law, scheme: Scheme, exact: bool = False) -> Cro
     """
     _check(world)
     sample = sample_of(world, law)
-    recorded = recorded_step(sample, scheme, exact=exact)
+    crowd = _crowd(sample, recorded_step(sample, scheme, exact=exact))
+    if any(can_measure(body) for body in sample.world.bodies):
+        return crowd
+    # Of balls all that is near touches in a heap, so that to look again costs more than it saves where a tape is read.
+    return replace(crowd, taped=_crowd(sample, recorded_step(sample, scheme, exact=exact, again=False)))
+
+
+def _crowd(sample: Sample, recorded: RecordedStep) -> Crowd:
     step = loops_of(sample, recorded)
     species, counts = len(sample.species), [len(own) for own in sample.species]
     members = [1, *counts, *(ROOM_FOR * counts[kind.first] for kind in sample.kinds)]
@@ -60,6 +68,7 @@ def crowd_of(world: World, law: Law, scheme: Scheme, exact: bool = False) -> Cro
     return Crowd(
         program,
         step.loops,
+        step.sieves,
         tuple(rooms),
         tuple(meetings),
         tuple(sights),
@@ -76,13 +85,16 @@ def _looks(does: Move | MemberCall, recorded: RecordedStep) -> bool:
     """Whether an action is a call that finds out whether a pair is near."""
     if isinstance(does, Move):
         return False
-    return any(vector.number in recorded.recorder.words for vector in recorded.calls[does.number].outputs)
+    early = {vector.number for vector in recorded.recorder.guards}
+    return any(vector.number in early for vector in recorded.calls[does.number].outputs)
 
 
 def _near_words(sample: Sample, recorded: RecordedStep, step: LoopStep, kind: int) -> tuple[int, ...]:
-    """Where the words of guards of a kind of pairs lie."""
+    """Where the words of guards of a kind of pairs lie: those of its points, where these are looked at."""
     first = {(pair.first, pair.second) for pair in (sample.world.pairs[k] for k in sample.pairs[kind])}
-    return tuple(step.homes[number][1] for number, sides in recorded.recorder.words.items() if sides in first)
+    recorder = recorded.recorder
+    words = [vector.number for vector in recorder.guards if recorder.words[vector.number] in first]
+    return tuple(step.homes[number][1] for number in [n for n in words if n in recorder.points] or words)
 
 
 def step_program(
