@@ -116,8 +116,9 @@ def _in_order(monkeypatch: pytest.MonkeyPatch) -> None:
         (["sphere"] * 6, LAW),
         (["sphere"] * 4, Law(friction=0.6, restitution=0.2, torsion=0.01, rolling=0.01)),
         (["sphere"] * 5 + ["capsule"], LAW),
+        pytest.param(["capsule"] * 6, LAW, marks=pytest.mark.thorough),
     ],
-    ids=["spheres", "torques", "mixed"],
+    ids=["spheres", "torques", "mixed", "capsules"],
 )
 def test_near_pairs_are_all_that_matters(kinds: list[str], law: Law) -> None:
     """To the last bit, one scene alone and in lanes, and so are slopes up to rounding."""
