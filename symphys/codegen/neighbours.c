@@ -327,7 +327,8 @@ static void enter(scene *s, const crowd *c) {
   s->entries = c->length ? memcpy(s->own_entries, c->entries, c->length * sizeof(place)) : (place *)c->entries;
 }
 
-/* The rows of scenes, whose values and whose adjoints are walked apart; returns how many fit: the pairs of the next row are more than there is room for. */
+/* The rows of scenes, whose values and whose adjoints are walked apart; returns how many fit: the pairs of the next row are
+   more than there is room for. */
 API word roll(const crowd *c, const crowd *taped, const scenes *q, V *memory) {
   const word words = q->slopes && taped->words > c->words ? taped->words : c->words;
   word kinds = c->rooms - 1 - c->species, steps = q->steps, slots = 0, before[kinds + 1];

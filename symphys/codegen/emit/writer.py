@@ -124,10 +124,8 @@ def _entry(
     moving: Collection[int] | None,
 ) -> str:
     """The function itself; pieces of one that is cut are called apart, and each finds the places that it needs."""
-    each, moves = (1, False) if dialect.dense else (2, True)
-    steps = [
-        f" + k * t[{each * i + 1}]" if moves and (moving is None or i in moving) else "" for i in range(len(pointers))
-    ]
+    each, moving = (1, ()) if dialect.dense else (2, moving)
+    steps = [f" + k * t[{2 * i + 1}]" if moving is None or i in moving else "" for i in range(len(pointers))]
     places = [f"{memory} + t[{each * i}]{steps[i]}" for i, (_, _, memory) in enumerate(pointers)]
     slots = len(pieces[0].piece.slots)
     arguments = ", ".join([*places, "w" if slots else "0"])

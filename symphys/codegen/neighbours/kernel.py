@@ -203,9 +203,8 @@ class CrowdKernel:
             rooms[r] = _Room(walk.work[r], room.state, members[r], int(bases[r]), begins[r])
         self._kept.append(rooms)
         ends = 1 + len(crowd.nears) + np.cumsum([0, *map(len, crowd.nears)])
-        lists = walk.loops, walk.runs, walk.turns, *(
-            self._placed(walk, each, begins, bases) for each in (walk.actions, walk.references)
-        )  # fmt: skip
+        actions, references = (self._placed(walk, each, begins, bases) for each in (walk.actions, walk.references))
+        lists = walk.loops, walk.runs, walk.turns, actions, references
         places = [sieve.places for sieve in crowd.sieves]
         starts = np.cumsum([0, *map(len, places)]).tolist()
         sieves = [(s.room, at, len(s.places), s.loop) for s, at in zip(crowd.sieves, starts, strict=False)]

@@ -250,7 +250,7 @@ class _Search:
     def _simplified(self, word: TracedVector, start: int, until: Collection[int] = ()) -> dict[int, list[Simplified]]:
         """For each call that reads something known what its results are, as far as they are known; in order.
 
-        Nothing is followed beyond vectors with numbers in ``until``, where there are any, nor what has no such.
+        Where there are numbers in ``until``, only calls that give vectors with such numbers are followed.
         """
         known: dict[int, Known] = {word.number: 1 << start}
         found: dict[int, list[Simplified]] = {}

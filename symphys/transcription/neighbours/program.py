@@ -8,7 +8,7 @@ from dataclasses import replace
 import casadi as ca
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
-from symphys.codegen.neighbours.program import Crowd, Meeting, MemberCall, Move, Room, SightPlaces
+from symphys.codegen.neighbours.program import Crowd, Meeting, MemberCall, Room, SightPlaces
 from symphys.dynamics.collision.near_points import can_measure
 from symphys.dynamics.neighbours.sample import TWINS, Sample, sample_of
 from symphys.dynamics.neighbours.step import RecordedStep, recorded_step
@@ -74,19 +74,24 @@ def _crowd(sample: Sample, recorded: RecordedStep) -> Crowd:
         tuple(sights),
         step.homes[striking][1],
         next(k for k, loop in enumerate(step.loops) if loop.room > species),
-        1 + max(k for k, loop in enumerate(step.loops) for does in loop.does if _looks(does, recorded)),
+        _looked(step, recorded),
         tuple(_near_words(sample, recorded, step, kind) for kind in range(len(sample.kinds))),
         sum(recorded.sizes.values()),
         roots,
     )
 
 
-def _looks(does: Move | MemberCall, recorded: RecordedStep) -> bool:
-    """Whether an action is a call that finds out whether a pair is near."""
-    if isinstance(does, Move):
-        return False
-    early = {vector.number for vector in recorded.recorder.guards}
-    return any(vector.number in early for vector in recorded.calls[does.number].outputs)
+def _looked(step: LoopStep, recorded: RecordedStep) -> int:
+    """The number of the loop after the last call that finds out whether a pair is near."""
+    words = {vector.number for vector in recorded.recorder.guards}
+    found = 0
+    for number, loop in enumerate(step.loops):
+        for does in loop.does:
+            if isinstance(does, MemberCall) and not words.isdisjoint(
+                vector.number for vector in recorded.calls[does.number].outputs
+            ):
+                found = number + 1
+    return found
 
 
 def _near_words(sample: Sample, recorded: RecordedStep, step: LoopStep, kind: int) -> tuple[int, ...]:
