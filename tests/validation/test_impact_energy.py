@@ -87,3 +87,51 @@ def test_balls_are_not_held_back():
     ball = make_world([Body("ball", 1.0, 0.004, (Sphere(0.1),))], [Plane.ground()], Law(0.5, 1.0))
     steps = [Lab(ball, Scheme(energy_cap=capped)).step.n_instructions() for capped in (True, False)]
     assert steps[0] == steps[1]
+
+
+@lru_cache
+def balls(count, restitution, friction, dt=0.01):
+    each = [Body(f"ball{k}", 1.0, 0.004, (Sphere(0.1),)) for k in range(count)]
+    return Lab(make_world(each, [Plane.ground()], Law(friction, restitution)), Scheme(dt=dt))
+
+
+def energies_of_balls(states, count):
+    """Kinetic and potential energy [J] of balls of 1 kg at every step."""
+    found = 0.0
+    for k in range(count):
+        position, velocity, spin = (states[f"ball{k}.{f}"] for f in ("position", "velocity", "angular_velocity"))
+        moving = (velocity**2).sum(axis=1) + 0.004 * (spin**2).sum(axis=1)
+        found = found + moving / 2 + 9.81 * position[:, 2]
+    return found
+
+
+KNOCKED_DOWN = {
+    "ball0.position": [0, 0, 0.1087],
+    "ball0.velocity": [-0.98, 0.09, -0.545],
+    "ball1.position": [-0.028, -0.052, 0.3043],
+    "ball1.velocity": [-0.6, -0.23, -1.645],
+}
+
+
+def test_a_ball_that_another_knocks_down_bounces_before_it_is_hit_again():
+    """Both impacts are in one step: the ground throws the lower ball up, behind the upper one that has just left it."""
+    coarse = balls(2, 0.9, 0.3).states(KNOCKED_DOWN, 0.02)
+    fine = balls(2, 0.9, 0.3, dt=0.0005).states(KNOCKED_DOWN, 0.02)
+    assert np.diff(energies_of_balls(coarse, 2)).max() < 1e-9
+    for name in ("ball0.velocity", "ball1.velocity"):
+        assert coarse[name][-1] == pytest.approx(fine[name][-1], abs=1e-6), name
+
+
+@pytest.mark.parametrize("seeds", [(10,), thorough(range(20))])
+@pytest.mark.parametrize(("count", "restitution", "friction"), [(8, 0.9, 0.3), (8, 1.0, 0.0)])
+def test_a_cloud_of_balls_that_falls_gains_nothing(count, restitution, friction, seeds):
+    lab = balls(count, restitution, friction)
+    for seed in seeds:
+        rng, states = np.random.default_rng(seed), {}
+        for k in range(count):
+            place = np.array([k % 2, k // 2 % 2, k // 4])
+            states[f"ball{k}.position"] = [0, 0, 0.15] + 0.21 * place + rng.normal(size=3) * 0.003
+            states[f"ball{k}.velocity"] = rng.normal(size=3)
+            states[f"ball{k}.angular_velocity"] = rng.normal(size=3) * 5
+        energy = energies_of_balls(lab.states(states, 1.0), count)
+        assert np.diff(energy).max() < 1e-4 * energy[0], seed

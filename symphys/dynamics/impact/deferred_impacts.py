@@ -10,7 +10,7 @@ import casadi as ca
 
 from symphys.dynamics.collision import Contact
 from symphys.dynamics.context import State, StepContext, StepSettings
-from symphys.dynamics.impact.impact import TOUCHING, StepSplit, strikes
+from symphys.dynamics.impact.impact import TOGETHER, TOUCHING, StepSplit, strikes
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.tracing.decorator import opened, traced
@@ -48,32 +48,41 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
     held back before it is hit.
     """
     pairs, world = context.world.pairs, context.world
-    contacts = detect_contacts(context, predicted_motions(context, x, duration), duration)
+    motions = predicted_motions(context, x, duration)
+    contacts = detect_contacts(context, motions, duration)
     near = [each for _, each in context.pairs_and_near()]
     looked_at = list(zip(pairs, near, contacts, strict=True))
     hits = [_hit(context.settings, pair.law, contact, each) for pair, each, contact in looked_at]
     eccentric, sides = eccentric_bodies(world), {k for pair in pairs for k in bodies_of(pair)}
     rebounds = {k for pair in pairs if not is_zero(pair.law.restitution) for k in bodies_of(pair)}
-    first: dict[int, tuple[Expr, Expr]] = {
-        body: opened((duration, ca.SX(0)), body) for body in sorted(sides & (eccentric | rebounds))
-    }
+    first: dict[int, Expr] = {body: opened(duration, body) for body in sorted(sides & (eccentric | rebounds))}
     for pair, contact, (_, meets) in zip(pairs, contacts, hits, strict=True):
         for body in first.keys() & set(bodies_of(pair)):
-            first[body] = _sooner(first[body], meets, contact.time, contact.rate)
-    found, chained, plastic = list[Expr](), opened(ca.SX(0)), opened(ca.SX(0))
+            first[body] = _sooner(first[body], meets, contact.time)
     struck = {body: opened(ca.SX(0), body) for body in sorted(first.keys() & eccentric)}
     for j, pair in enumerate(pairs):
         for body in struck.keys() & set(bodies_of(pair)):
             for split in splits:
                 struck[body] = _or(struck[body], split.struck[j])
-    for (pair, each, contact), (fast, meets) in zip(looked_at, hits, strict=True):
-        waits = _passes(fast, meets)
-        for body in sorted(first.keys() & set(bodies_of(pair))):
-            waits = _later(waits, fast, contact.time, first[body][0], struck.get(body, ca.SX(0)))
-            if (room := _room(world, pair, eccentric)) is not None:
-                before, sight = ((waits,), (chained,), (plastic,)), (fast, contact, each)
-                flags = _driven(context.settings, before, sight, first[body], duration, room)
-                (waits,), (chained,), (plastic,) = flags
+    rooms = [_room(world, pair, eccentric) for pair in pairs]
+    central = {k for pair, room in zip(pairs, rooms, strict=True) if room is not None for k in bodies_of(pair)}
+    blows = {body: opened(ca.SX.zeros(3), body) for body in sorted(central)}
+    for pair, contact, (_, meets) in zip(pairs, contacts, hits, strict=True):
+        bodies = bodies_of(pair)
+        masses = tuple(motions[i].mass for i in bodies)
+        for side, body in enumerate(bodies):
+            if body in blows:
+                before = blows[body], first[body]
+                blows[body] = _blown(context.settings, pair.law, side, masses, before, meets, contact)
+    found, chained, plastic = list[Expr](), opened(ca.SX(0)), opened(ca.SX(0))
+    for (pair, each, contact), (fast, meets), room in zip(looked_at, hits, rooms, strict=True):
+        waits, bodies = _passes(fast, meets), bodies_of(pair)
+        for body in sorted(first.keys() & set(bodies)):
+            waits = _later(waits, fast, contact.time, first[body], struck.get(body, ca.SX(0)))
+        if room is not None:
+            before, sight = ((waits,), (chained,), (plastic,)), (fast, contact, each)
+            own = tuple((first[body], blows[body]) for body in bodies)
+            (waits,), (chained,), (plastic,) = _driven(context.settings, before, sight, own, duration, room)
         found.append(waits)
         chained = _chained(chained, waits, meets)
     return DeferredImpacts(tuple(found), chained, plastic)
@@ -85,7 +94,7 @@ def _room(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
         return None
     shapes = [world.surface(side) for side in (pair.first, pair.second) if side.body is not None]
     radii = [shape.radius for shape in shapes if isinstance(shape, Sphere)]
-    return radii[0] if len(radii) == 1 else ca.fmin(*radii)
+    return (radii[0] if len(radii) == 1 else ca.fmin(*radii)) / 2
 
 
 @traced
@@ -96,9 +105,27 @@ def _hit(settings: StepSettings, law: Law, contact: Contact, near: Expr) -> tupl
 
 
 @traced
-def _sooner(first: tuple[Expr, Expr], meets: Expr, time: Expr, rate: Expr) -> tuple[Expr, Expr]:
-    """(when a body is first hit, the greatest speed at which it is), with one more contact looked at."""
-    return ca.if_else(meets, ca.fmin(first[0], time), first[0]), ca.if_else(meets, ca.fmax(first[1], -rate), first[1])
+def _sooner(first: Expr, meets: Expr, time: Expr) -> Expr:
+    """When a body is first hit, with one more contact looked at."""
+    return ca.if_else(meets, ca.fmin(first, time), first)
+
+
+@traced
+def _blown(
+    settings: StepSettings,
+    law: Law,
+    side: int,
+    masses: tuple[Expr, ...],
+    before: tuple[Expr, Expr],
+    meets: Expr,
+    contact: Contact,
+) -> Expr:
+    """How the velocity of a ball changes as it is first hit [m/s], with one more contact; hits at one instant add."""
+    blow, first = before
+    share = 1 / masses[side] / sum(1 / mass for mass in masses)
+    kick = (1 + law.restitution) * share * ca.fmax(-contact.rate, 0) * (1 - 2 * side)
+    counts = ca.logic_and(meets, contact.time < first + TOGETHER * settings.scheme.dt)
+    return blow + ca.if_else(counts, kick, 0) * contact.geometry.frame(contact.time).normal
 
 
 @traced
@@ -106,19 +133,25 @@ def _driven(
     settings: StepSettings,
     before: tuple[tuple[Expr], ...],
     sight: tuple[Expr, Contact, Expr],
-    first: tuple[Expr, Expr],
+    blows: tuple[tuple[Expr, Expr], ...],
     duration: Expr,
     room: Expr,
 ) -> tuple[tuple[Expr], ...]:
-    """(whether a pair waits, whether there is a chain, one without room), with a pair that a hit may drive together.
+    """(whether a pair waits, whether there is a chain, one without room), with a pair that hits may drive together.
 
-    Its surfaces are apart, and the hit comes before they meet. It waits if they cannot go far into each other. Each
-    flag is a tuple of its own, so that it lies by itself and stands for what it was where the pair is far.
+    Its surfaces are apart, or part at speed as after an impact, and its bodies are hit before they meet. It waits if
+    they do not go far into each other by that. Each flag is a tuple of its own, so that it lies by itself and stands
+    for what it was where the pair is far.
     """
-    (fast, contact, near), way = sight, 2 * first[1] * duration
-    apart = ca.logic_and(contact.gap > TOUCHING * settings.reference * settings.scheme.dt**2, 1 - fast)
-    driven = ca.logic_and(near, ca.logic_and(ca.logic_and(apart, first[1] > 0), contact.gap < way))
-    waits = ca.logic_and(driven, way < room)
+    fast, contact, near = sight
+    normal, touch = contact.geometry.frame(duration).normal, TOUCHING * settings.reference * settings.scheme.dt**2
+    speeds = [-(1 - 2 * side) * ca.dot(normal, blow) for side, (_, blow) in enumerate(blows)]
+    way = duration * sum(ca.fmax(speed, 0) for speed in speeds)
+    depth = sum((duration - time) * speed for (time, _), speed in zip(blows, speeds, strict=True)) - contact.end
+    parts = ca.logic_and(contact.rate > settings.fast, contact.end > touch)
+    apart = ca.logic_and(either(contact.gap > touch, parts), 1 - fast)
+    driven = ca.logic_and(near, ca.logic_and(ca.logic_and(apart, way > 0), contact.end < way))
+    waits = ca.logic_and(driven, depth < room)
     found = waits, driven, ca.logic_and(driven, 1 - waits)
     return tuple((either(flag, new),) for (flag,), new in zip(before, found, strict=True))
 

@@ -39,7 +39,7 @@ Expr = Any
 
 
 def eccentric_bodies(world: World) -> set[int]:
-    """The bodies on which contacts may act off the centre: on others friction cannot make a rebound add energy."""
+    """The bodies on which contacts may act off the centre: on others no single impact with friction adds energy."""
     held = {index for joint in world.joints for index in joint.bodies}
     return held | {index for index, body in enumerate(world.bodies) if not all(shape.central for shape in body.shapes)}
 
