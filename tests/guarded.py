@@ -16,9 +16,9 @@ from symphys.transcription import rollout_program
 from symphys.transcription.rollout import symbolic_rollout
 
 HEAPS = {
-    "spheres": heap(["sphere"] * 6),
+    "spheres": heap(["sphere"] * 5),
     "capsules": heap(["capsule"] * 5, law="friction = 0.4\ntorsion = 0.01\nrolling = 0.005"),
-    "a box": heap(["box", *["sphere"] * 3], restitution=0.0),
+    "a box": heap(["box", "sphere", "sphere"], restitution=0.0),
     "soft": heap(["sphere"] * 6, law="friction = 0.4\nfrequency = 30", restitution=0.0),
 }
 

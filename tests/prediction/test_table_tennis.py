@@ -75,6 +75,7 @@ def test_flights_without_spin_leave_the_lift_open() -> None:
     assert found["drag_C"].lower < TRUTH["drag_C"] < found["drag_C"].upper
 
 
+@pytest.mark.thorough
 def test_bounces_straight_down_leave_lift_and_friction_open() -> None:
     """No spin before the bounce, and none after it."""
     found = symphys.identify(recorded(DROPS, ABOVE, [THROWN], list(TRUTH)), threads=1)

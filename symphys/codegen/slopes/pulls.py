@@ -18,6 +18,10 @@ from symphys.codegen.program.program import Function, Place
 
 TABLED = 1.5
 """Operations of products with slopes on the tape that take as long as one of other adjoints, which store more."""
+SOON_MADE = 100
+"""Slopes of a call: so many are tried."""
+AS_COUNTED = 0.95
+"""Of the operations that a slope is counted with: products with 1 are none. Measured in large calls: 0.99."""
 LARGEST = 6000
 """Slopes of a call beyond which it is not asked whether a table of them is less."""
 
@@ -114,9 +118,17 @@ def _cheaper(
     forward = functions.forward(function)
     graph = functions.adjoint(function, inputs, outputs)
     taped = functions.taped(forward, graph)
-    if sparsity(forward).sum() > LARGEST:
+    most, slopes = TABLED * _operations(graph, taped), sparsity(forward)
+    if slopes.sum() > LARGEST or _products(forward, slopes, inputs, outputs) > most:
         return graph, taped
     table = functions.adjoint(function, inputs, outputs, tabled=True)
     other = functions.taped(forward, table)
-    less = _operations(table, other) < TABLED * _operations(graph, taped)
-    return (table, other) if less else (graph, taped)
+    return (table, other) if _operations(table, other) < most else (graph, taped)
+
+
+def _products(forward: Graph, slopes: NDArray[np.float32], inputs: Mask, outputs: Mask) -> float:
+    """Operations of products with a table of that many slopes, which takes long to make; 0 where it is soon made."""
+    by = np.repeat(inputs, forward.sizes)
+    of = np.repeat(outputs, [len(result) for result in forward.results])
+    counts = slopes[of][:, by].sum(axis=0)
+    return float(AS_COUNTED * (counts + np.maximum(counts - 1, 0)).sum()) if counts.sum() > SOON_MADE else 0.0

@@ -16,6 +16,7 @@ import programs
 import pytest
 from heaps import heap
 from operations import alone, every_operation
+from repeats import thorough
 from toys import require
 
 import symphys
@@ -81,8 +82,14 @@ def same(found: Any, wanted: Any) -> None:
         np.testing.assert_array_equal(found[0][name], values)
 
 
-@pytest.mark.parametrize("single", [False, True])
-@pytest.mark.parametrize("name", ["pendulum", "chain", "operations", "spheres"])
+@pytest.mark.parametrize(
+    ("name", "single"),
+    [
+        *((name, single) for name in ("pendulum", "chain", "operations") for single in (False, True)),
+        ("spheres", False),
+        thorough("spheres", True),
+    ],
+)
 def test_the_interpreter_gives_the_same_bits(
     name: str, single: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

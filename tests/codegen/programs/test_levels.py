@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import programs
 import pytest
+from repeats import thorough
 from toys import require
 
 import symphys
@@ -27,8 +28,7 @@ def robot() -> Program:
     return rollout_program(symbolic_rollout(symphys.load("cart_pole")), exact=True)
 
 
-@pytest.mark.parametrize("rows", [9, 1])
-@pytest.mark.parametrize("name", ["chain", "robot"])
+@pytest.mark.parametrize(("name", "rows"), [("chain", 9), ("chain", 1), ("robot", 1), thorough("robot", 9)])
 def test_values_and_gradients_do_not_depend_on_the_level(
     name: str, rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

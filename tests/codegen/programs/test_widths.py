@@ -10,6 +10,7 @@ import numpy as np
 import programs
 import pytest
 from heaps import heap
+from repeats import thorough
 from toys import require
 
 import symphys
@@ -66,8 +67,14 @@ def test_the_rows_choose_the_lanes() -> None:
 
 
 @pytest.mark.usefixtures("never")
-@pytest.mark.parametrize("precision", ["double", "single"])
-@pytest.mark.parametrize("name", ["pendulum", "chain", "spheres"])
+@pytest.mark.parametrize(
+    ("name", "precision"),
+    [
+        *((name, precision) for name in ("pendulum", "chain") for precision in ("double", "single")),
+        ("spheres", "double"),
+        thorough("spheres", "single"),
+    ],
+)
 def test_all_widths_give_the_same_bits(name: str, precision: Literal["double", "single"], own: Cache) -> None:
     program = falling(own.folder.parent) if name == "spheres" else getattr(programs, name)()
     caches = {rows: Cache(own.folder / str(rows)) for rows in (9, 1, 2)}  # none finds what another has built

@@ -20,7 +20,7 @@ from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.staged import linearized_step
 from symphys.transcription.staged.linearization import Linearization
 
-KERNELS = ("loop", "leg", thorough("soft"), thorough("hopper_jump"))
+KERNELS = ("leg", *map(thorough, ("loop", "soft", "hopper_jump")))
 
 
 def guess_of(problem: Problem) -> np.ndarray:
@@ -107,7 +107,7 @@ def test_without_a_compiler_casadi_evaluates(tmp_path: Path, monkeypatch: pytest
 
 
 def test_steps_are_those_of_the_rollout_to_the_bit() -> None:
-    made = compiled("loop")
+    made = compiled("leg")
     rollout, z = made.rollout, guess_of(made.rollout.problem)
     states = ca.Function("states", [rollout.z, rollout.smoothing], [rollout.x])(z, 0.0)
     motion = made.motion(z, 0.0)
@@ -131,7 +131,7 @@ def test_small_batches_are_prepared_once_and_differences_compiled() -> None:
 
 
 def test_states_and_threads_do_not_change_each_others_numbers() -> None:
-    made = [compiled("loop", threads) for threads in (1, 2)]
+    made = [compiled("ball_throw", threads) for threads in (1, 2)]
     motion = made[0].motion(guess_of(made[0].rollout.problem), 0.0)
     one, two = (each.linearize(motion) for each in made)
     assert np.array_equal(one.a, two.a) and np.array_equal(one.b, two.b)
@@ -141,7 +141,7 @@ def test_states_and_threads_do_not_change_each_others_numbers() -> None:
 
 
 def test_what_is_not_finite_stays_so() -> None:
-    made = compiled("loop")
+    made = compiled("leg")
     motion = made.motion(guess_of(made.rollout.problem), 0.0)
     motion.x[1, 0] = np.nan
     found = made.linearize(motion).a
