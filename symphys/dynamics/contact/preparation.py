@@ -88,7 +88,8 @@ def prepare(
     column = delassus_column(terms, applied.normal, same)
     parts = separates(terms, frame.normal, column)
     weight, load = LOADED * settings.reference / k_normal, ca.dot(applied.normal, conditions.force)
-    lasts = _lasts(settings, law, contact, touch.leaving, load > weight)
+    loaded = ca.logic_and(load > weight, ca.logic_not(suppressed))
+    lasts = _lasts(settings, law, contact, touch.leaving, loaded)
     target = ca.if_else(lasts, -_parting(settings, contact, k_normal, ca.fmax(load, weight), duration), target)
     return ContactConstraint(
         law=law,
