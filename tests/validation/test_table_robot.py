@@ -109,7 +109,7 @@ def test_it_stands_and_so_does_its_gradient() -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("toi", "cuts", "decades"), [(False, 0, 6.5), (True, 1, 6.5), (True, 0, 10)])
+@pytest.mark.parametrize(("toi", "cuts", "decades"), [(False, 0, 7.5), (True, 1, 6.5), (True, 0, 10)])
 def test_trotting_lets_the_adjoint_grow_slowly(toi: bool, cuts: int, decades: float) -> None:
     """Over 3 s; by 13 and 7 decades with instants of touch where pushes leave bodies behind that nothing touches."""
     assert np.log10(grown(*rollout_of(toi, cuts, stride=0.1))).sum() < decades

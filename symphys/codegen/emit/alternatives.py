@@ -105,7 +105,7 @@ def _alternative(
 ) -> Alternative | None:
     both = zip(call.outputs, others, strict=False)
     pairs = [(place, other) for place, other in both if other is not None and place.size]
-    if word is None or _meet([other for _, other in pairs]):
+    if word is None or _meet([other for _, other in pairs if _read(other, call)]):
         return None
     reads = [Span(word.offset, 0, 1)]
     if adjoint is None:
@@ -125,6 +125,15 @@ def _source(place: Place, arguments: Sequence[Span]) -> tuple[int, int]:
     return NONE, 0
 
 
+def _read(place: Place, call: FunctionCall) -> bool:
+    """Whether a call reads a place: to others, such as zeros, no adjoints are added."""
+    return any(_overlap(each, place) for each in call.inputs)
+
+
 def _meet(places: Sequence[Place]) -> bool:
     """Whether two share a word: their adjoints would be added up in another order."""
-    return any(a.offset < b.offset + b.size and b.offset < a.offset + a.size for a, b in combinations(places, 2))
+    return any(_overlap(a, b) for a, b in combinations(places, 2))
+
+
+def _overlap(a: Place, b: Place) -> bool:
+    return a.offset < b.offset + b.size and b.offset < a.offset + a.size

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -101,3 +102,36 @@ def test_numbers_that_are_none_stay_at_their_point(cache: Cache) -> None:
     found = kernel.jacobians(Z, np.zeros((9, 0)))
     assert np.isnan(found[4]).any()
     assert all(np.array_equal(found[k], expected[0]) for k in range(9) if k != 4)
+
+
+def rooted(guarded: bool) -> Program:
+    """x + 3 sqrt(x) where a word says so, else x: what stands for two results are the same zeros."""
+    at = MemoryLayout()
+    z, none, word, root = at.take(2), at.take(2), at.take(1), at.take(1)
+    one, two, out = at.take(1), at.take(2), at.series(1, 1)
+    x, r, w, t = ca.SX.sym("x", 2), ca.SX.sym("r"), ca.SX.sym("w"), ca.SX.sym("t", 2)
+    more: dict[str, Any] = {"guard": word} if guarded else {}
+    others = [(None,), (Place(none.offset, 1), none)] if guarded else [(), ()]
+    calls = [
+        FunctionCall(ca.Function("above", [x], [x[1] > 0]), (z,), (word,)),
+        FunctionCall(ca.Function("root", [x], [ca.sqrt(x[0])]), (z,), (root,), otherwise=others[0], **more),
+        FunctionCall(
+            ca.Function("times", [w, r, x], [w * r, w * ca.vertcat(r, x[0] / r)]),
+            (word, root, z),
+            (one, two),
+            otherwise=others[1],
+            **more,
+        ),
+        FunctionCall(ca.Function("last", [x, r, t], [x[0] + r + t[0] + t[1]]), (z, one, two), (out,)),
+    ]
+    return Program(at.size, z, Place(0, 0), 1, {"out": out.still()}, body=tuple(calls))
+
+
+def test_zeros_may_stand_for_several_results(cache: Cache) -> None:
+    """Their call is left out with those that it reads, whose slopes would be none where nothing has computed them."""
+    Z = np.array([[4.0, -1.0], [4.0, 1.0]])
+    with_guards, without = (compiled(rooted(guarded), "out", cache) for guarded in (True, False))
+    found = with_guards.jacobians(Z, np.zeros((2, 0)))
+    assert np.array_equal(found[:, 0, 0], [1.0, 1.75])
+    assert np.array_equal(found, without.jacobians(Z, np.zeros((2, 0))))
+    assert np.isfinite(with_guards.jacobians(Z[:1], np.zeros((1, 0)))).all()
