@@ -72,8 +72,8 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
         masses = tuple(motions[i].mass for i in bodies)
         for side, body in enumerate(bodies):
             if body in blows:
-                before = blows[body], first[body]
-                blows[body] = _blown(context.settings, pair.law, side, masses, before, meets, contact)
+                so_far = blows[body], first[body]
+                blows[body] = _blown(context.settings, pair.law, side, masses, so_far, meets, contact)
     found, chained, plastic = list[Expr](), opened(ca.SX(0)), opened(ca.SX(0))
     for (pair, each, contact), (fast, meets), room in zip(looked_at, hits, rooms, strict=True):
         waits, bodies = _passes(fast, meets), bodies_of(pair)
