@@ -54,6 +54,10 @@ class Emulated:
         """Memory in which what is not written is not a number."""
         return np.full(shape, np.nan, dtype)
 
+    def lacks(self) -> str:
+        """Nothing."""
+        return ""
+
     def address(self, array: NDArray[Any]) -> int:
         """Of its first word."""
         return array.ctypes.data

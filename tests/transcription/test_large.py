@@ -337,6 +337,30 @@ def test_nets_on_a_device(
     assert growth["factor"] == pytest.approx(examined[1]["growth"]["factor"], rel=1e-7)
 
 
+@needs_compiler
+@problems(LIFTS[0])
+def test_a_device_that_cannot_multiply(
+    both: tuple[Transcription, LargeTranscription], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The processor does, with what it wants in a note."""
+
+    class Poor(Remote):
+        def lacks(self) -> str:
+            return "no cuBLAS"
+
+    monkeypatch.setattr("symphys.codegen.cuda.find_gpu", lambda: Poor(tmp_path))
+    there = transcribe(both[1].problem, backend="cuda")
+    assert (there.backend.name, there.backend.note) == (
+        "cuda",
+        "nets by matrix products, which the processor computes: no cuBLAS",
+    )
+    Z = points(both[1])
+    a, b = (context.shooting.evaluator.gradient(Z, 0.0) for context in (both[1], there))
+    assert a.gradient is not None and b.gradient is not None
+    assert np.array_equal(a.merit, b.merit)
+    assert np.allclose(a.gradient, b.gradient, rtol=0, atol=1e-11 * np.abs(a.gradient).max())
+
+
 def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Formulas that look at their weights, and ``export``: refused by name, before anything is built."""
     path = tmp_path / "hopping.toml"

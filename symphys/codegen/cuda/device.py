@@ -36,6 +36,9 @@ class Device(Protocol):
     def empty(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
         """Memory."""
 
+    def lacks(self) -> str:
+        """What is missing for products of its arrays, in a line; empty: nothing."""
+
     def address(self, array: Array) -> int:
         """Of the array's first word."""
 

@@ -56,6 +56,15 @@ class Gpu:
         with self._told():
             return self.cupy.empty(shape, dtype)
 
+    def lacks(self) -> str:
+        """See ``Device``: CuPy looks for cuBLAS when it multiplies first."""
+        try:
+            array = self.put(np.ones((1, 1)))
+            np.tanh(np.matmul(array, array))
+        except (ImportError, RuntimeError, self.cupy.cuda.compiler.CompileException) as error:
+            return f"CuPy cannot multiply on {self.name} ({' '.join(str(error).split())}): {ADVICE}"
+        return ""
+
     def address(self, array: Any) -> int:
         """See ``Device``."""
         return int(array.data.ptr)

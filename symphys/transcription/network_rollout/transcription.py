@@ -133,5 +133,7 @@ def _evaluator(context: RolloutContext, exact: bool, backend: str, threads: int)
     shared, nets = threads if device is None else 1, "nets by matrix products"
     if precision == "single":
         nets += " in single precision, steps in double"
+    if device is not None and (lack := device.lacks()):
+        device, nets = None, f"{nets}, which the processor computes: {lack}"
     description = replace(described(kernel, perf_counter() - began, precision, nets), threads=shared)
     return LargeEvaluator(context, KernelStep(kernel), shared, REALS[precision], device), description

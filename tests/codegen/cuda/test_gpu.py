@@ -38,6 +38,7 @@ def cupy(count: int = 1, **own: Any) -> Any:
         runtime=runtime,
         memory=SimpleNamespace(OutOfMemoryError=Full),
         driver=SimpleNamespace(CUDADriverError=type("CUDADriverError", (RuntimeError,), {})),
+        compiler=SimpleNamespace(CompileException=type("CompileException", (Exception,), {})),
         get_current_stream=lambda: SimpleNamespace(synchronize=lambda: None),
     )
     pool = SimpleNamespace(free_all_blocks=lambda: None)
@@ -78,6 +79,20 @@ def test_what_cuda_refuses_is_told_in_a_line(error: Exception, tmp_path: Path) -
     gpu = Gpu(cupy(empty=fail), Cache(tmp_path))
     with pytest.raises(KernelUnavailable, match=r"^NVIDIA H200 failed: [^\n]*$"):
         gpu.empty((3,), float)
+
+
+class Alone:
+    """An array that wants a library to be multiplied."""
+
+    def __array_ufunc__(self, *given: object, **named: object) -> None:
+        raise ImportError("libcublas.so.12: cannot open shared object file:\n No such file or directory")
+
+
+def test_a_library_that_is_missing_is_told_in_a_line(tmp_path: Path) -> None:
+    """As CuPy 14 says it where NVIDIA's driver is installed and CUDA is not."""
+    said = Gpu(cupy(asarray=lambda values: Alone()), Cache(tmp_path)).lacks()
+    assert "libcublas.so.12: cannot open" in said and "pip install 'symphys[cuda]'" in said and "\n" not in said
+    assert Gpu(cupy(), Cache(tmp_path)).lacks() == ""
 
 
 def test_a_fault_of_ours_is_not_cudas(tmp_path: Path) -> None:
