@@ -39,6 +39,29 @@ class BufferedFunction:
         return [dense(*each) for each in zip(self.shapes, self.places, self.nonzeros, strict=True)]
 
 
+def row_by_row(function: Function, *arguments: Array) -> list[Array]:
+    """Arguments (B, n), dense -> of each result (B, its size); RuntimeError where casadi fails.
+
+    Numbers go from arrays to arrays: casadi takes half a millisecond to hand over 16,000 of them as a ``DM``.
+    """
+    rows = [np.ascontiguousarray(argument, float) for argument in arguments]
+    places = [np.array(function.sparsity_out(i).find(), int) for i in range(function.n_out())]
+    found = [np.zeros((len(rows[0]), function.numel_out(i))) for i in range(function.n_out())]
+    nonzeros = [np.zeros(own.size) for own in places]
+    buffer, evaluate = function.buffer()
+    for i, values in enumerate(nonzeros):
+        buffer.set_res(i, values.data)
+    for b in range(len(rows[0])):
+        for i, argument in enumerate(rows):
+            buffer.set_arg(i, argument[b].data)
+        evaluate()
+        if buffer.ret():
+            raise RuntimeError(f"the evaluation of {function.name()} failed")
+        for into, own, values in zip(found, places, nonzeros, strict=True):
+            into[b, own] = values
+    return found
+
+
 def mapped(function: Function, batch: int, threads: int) -> Function:
     """The function for so many columns at once."""
     if batch == 1:

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.codegen.backends.calls import row_by_row
 from symphys.transcription.network_rollout.context import BatchStep, RolloutContext
 from symphys.transcription.network_rollout.layers import Layers
 from symphys.transcription.network_rollout.net_values import NetValues, values_of
@@ -58,8 +59,7 @@ def forward(
 ) -> ForwardPass:
     """Roll out robots (B, s) that share these nets; ``room``: see ``values_of``."""
     steps, dt = context.rollout.steps, context.rollout.dt
-    starts = [[np.array(part).ravel() for part in context.start(z)] for z in Z]
-    x0, given, p, sensed0 = (np.array([start[i] for start in starts]) for i in range(4))
+    x0, given, p, sensed0 = row_by_row(context.start, Z)
     nx, nu = x0.shape[1], context.rollout.given.shape[0]
     rows = np.empty((steps + 1, len(Z), nx + nu + p.shape[1] + 2 + Z.shape[1]))
     parts = np.split(rows, np.cumsum([nx, nu, p.shape[1], 2]), axis=2)
@@ -152,17 +152,15 @@ class BackwardPass:
 
     def run(self) -> tuple[Array, list[Array]]:
         """(B, s) the gradients of what robots do not share, and for each net that of the shared weights, summed."""
-        steps, robots = len(self.motion.given), len(self.motion.z)
+        steps = len(self.motion.given)
         length = max((own.length for own in self.motion.values), default=steps)
         x, sensed = self.at_x.get(steps, np.zeros_like(self.motion.x[0])), np.zeros_like(self.motion.sensed[0])
         given = np.zeros_like(self.motion.given)
         for number in reversed(range(-(-steps // length))):
             x, sensed = self.segment(number, min(steps, number * length + length), x, sensed, given)
-        flat = given.swapaxes(0, 1).reshape(robots, -1)
-        for b in range(robots):
-            parts = [self.motion.x[0, b], self.motion.given[:, b].ravel(), self.motion.p[b], self.motion.sensed[0, b]]
-            seeds = [x[b], flat[b], self.p[b], sensed[b]]
-            self.z[b] += np.array(self.context.pull(self.motion.z[b], *parts, *seeds)).ravel()
+        first = [self.motion.x[0], _flat(self.motion.given), self.motion.p, self.motion.sensed[0]]
+        (pulled,) = row_by_row(self.context.pull, self.motion.z, *first, x, _flat(given), self.p, sensed)
+        self.z += pulled
         return self.z, self.weights
 
     def segment(self, number: int, end: int, x: Array, sensed: Array, given: Array) -> tuple[Array, Array]:
@@ -223,3 +221,8 @@ def back(
         through = sense(motion.x[k, 0], motion.p[0], k * dt, motion.sensed[k, 0], sensed.T)[0]
         x = slopes[:, :nx] + np.array(through).T
         yield x.T
+
+
+def _flat(given: Array) -> Array:
+    """(N, B, nu) -> (B, N * nu)."""
+    return given.swapaxes(0, 1).reshape(given.shape[1], -1)

@@ -20,6 +20,8 @@ from symphys.model.controllers.net import Activation
 Array = NDArray[Any]
 FEW = 8
 """Robots at a time for which a transposed copy of the matrices is not worth making."""
+PAGE = 2**12
+"""[bytes] Rows of so many or more have ``PADDING``; shorter ones follow each other, and are one run of numbers."""
 PADDING = 16
 """More columns than are used: rows a power of two apart would share few lines of a cache."""
 
@@ -57,7 +59,8 @@ class Layers:
 
     def room(self, width: int, columns: int) -> Any:
         """(width, columns) that is not set."""
-        shape = (width, columns + PADDING) if self.rows else (columns + PADDING, width)
+        padding = PADDING if columns * self.real.itemsize >= PAGE else 0
+        shape = (width, columns + padding) if self.rows else (columns, width)
         made = np.empty(shape, self.real) if self.device is None else self.device.empty(shape, self.real)
         return (made if self.rows else made.T)[:, :columns]
 
@@ -135,9 +138,9 @@ def activate(activation: Activation, raw: Any) -> None:
 def through(activation: Activation, value: Any, back: Any, out: Any) -> None:
     """Adjoints (width, columns) before an activation where its value is this, from those after it."""
     if activation == "tanh":
-        np.multiply(value, value, out=out)
-        np.subtract(1, out, out=out)
-        np.multiply(out, back, out=out)
+        slope = value * value  # one run of numbers, unlike ``out``
+        np.subtract(1, slope, out=slope)
+        np.multiply(slope, back, out=out)
     elif activation == "relu":
         np.multiply(value > 0, back, out=out)
     else:

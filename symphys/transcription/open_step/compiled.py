@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
+from symphys.codegen.backends.calls import row_by_row
 from symphys.problem import ALIVE, Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.open_step.opening import Opening, opened
@@ -145,7 +146,7 @@ class CompiledStep:
 
     def start_at(self, rows: Sequence[Array]) -> StepStart:
         """Where motions begin, of values of all variables, a row each."""
-        x, inputs, p, sensed = (np.array(part) for part in zip(*map(self._started, rows), strict=True))
+        x, inputs, p, sensed = row_by_row(self._start, np.array(rows))
         z = [np.array(rows)] if self._sizes[-1] else []
         state = np.concatenate([x, p, np.zeros((len(x), 1)), *z], axis=1)
         return StepStart(state, sensed, inputs.reshape(len(x), self.steps, -1))
@@ -288,9 +289,6 @@ class CompiledStep:
         sensed = sense_function(rollout, self._opening.sensors)(x0, start.p, 0.0)
         results = [x0, ca.vec(start.u), start.p, sensed]
         return ca.Function("start", [rollout.z], [ca.densify(result) for result in results]).expand()
-
-    def _started(self, z: Array) -> list[Array]:
-        return [np.array(part).ravel() for part in self._start.call([z])]
 
 
 def compile_open_step(
