@@ -235,6 +235,8 @@ def test_values_and_gradients(both: tuple[Transcription, LargeTranscription], sm
         assert np.allclose(a.merit, b.merit, rtol=1e-12)
         assert np.allclose(a.errors, b.errors, rtol=1e-12)
         assert np.allclose(a.gradient, b.gradient, rtol=1e-7, atol=1e-8 * np.abs(a.gradient).max())
+    alone = beside.shooting.evaluator.value(Z, smoothing)
+    assert np.allclose(a.merit, alone.merit, rtol=1e-12) and np.allclose(a.errors, alone.errors, rtol=1e-12)
 
 
 @problems(HOPS[0])

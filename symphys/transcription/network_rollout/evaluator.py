@@ -101,7 +101,8 @@ class LargeEvaluator(WithoutResiduals):
         ]
 
     def _part(self, nets: Sequence[Layers], Z: Array, smoothing: float, room: int) -> Shared:
-        motion = forward(self.context, self.batch_step, nets, Z, smoothing, room)
+        kept = None if room else {k for k, _ in self.context.objectives.samples.moments}
+        motion = forward(self.context, self.batch_step, nets, Z, smoothing, room, kept)
         values = Shared(*self._values(motion))
         if not room:
             return values

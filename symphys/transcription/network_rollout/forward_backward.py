@@ -7,8 +7,10 @@ gradient of the weights is one product a layer and segment.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -29,7 +31,8 @@ class ForwardPass:
     Attributes:
         rows: (N + 1, B, m) what each step is computed from: x, given, p, the times of the step, z.
         z: (B, s) what robots do not share.
-        x: (N + 1, B, nx) states.
+        x: (N + 1, B, nx) states; of a pass of which only some are kept, these by their steps, and above and below one
+            row for all steps.
         given: (N, B, nu) inputs before small controllers add to them.
         p: (B, np).
         sensed: (N + 1, B, o) what large nets sense.
@@ -40,7 +43,7 @@ class ForwardPass:
 
     rows: Array
     z: Array
-    x: Array
+    x: Any
     given: Array
     p: Array
     sensed: Array
@@ -56,37 +59,43 @@ def forward(
     Z: Array,
     smoothing: float,
     room: int = 0,
+    kept: Collection[int] | None = None,
 ) -> ForwardPass:
-    """Roll out robots (B, s) that share these nets; ``room``: see ``values_of``."""
+    """Roll out robots (B, s) that share these nets.
+
+    ``room``: see ``values_of``; ``kept``: the steps whose states are wanted, after which there is no pass backwards;
+    None: all.
+    """
     steps, dt = context.rollout.steps, context.rollout.dt
-    x0, given, p, sensed0 = row_by_row(context.start, Z)
-    nx, nu = x0.shape[1], context.rollout.given.shape[0]
-    rows = np.empty((steps + 1, len(Z), nx + nu + p.shape[1] + 2 + Z.shape[1]))
-    parts = np.split(rows, np.cumsum([nx, nu, p.shape[1], 2]), axis=2)
+    x0, flat, p, sensed0 = row_by_row(context.start, Z)
+    nx, nu, whole = x0.shape[1], context.rollout.given.shape[0], kept is None
+    at = [k if whole else 0 for k in range(steps + 1)]
+    rows = np.empty((at[-1] + 1, len(Z), nx + nu + p.shape[1] + 2 + Z.shape[1]))
+    x, given, _, times, _ = parts = np.split(rows, np.cumsum([nx, nu, p.shape[1], 2]), axis=2)
     motion = ForwardPass(
         rows=rows,
         z=Z,
-        x=parts[0],
-        given=parts[1][:steps],
+        x=x if kept is None else dict.fromkeys(kept, x0),
+        given=given[:steps],
         p=p,
-        sensed=np.empty((steps + 1, *sensed0.shape)),
+        sensed=np.empty((at[-1] + 1, *sensed0.shape)),
         asked=np.empty((steps, len(Z), batch_step.sizes.get("asked", 0))),
         u=np.empty((steps, len(Z), nu)),
         values=values_of(nets, len(Z), steps, room),
     )
-    motion.x[0], motion.sensed[0], parts[2][:], parts[4][:] = x0, sensed0, p, Z
-    motion.given[:] = given.reshape(len(Z), steps, nu).swapaxes(0, 1)
-    parts[3][:] = dt * np.stack([np.arange(steps + 1), np.arange(1, steps + 2)], axis=1)[:, None]
+    x[0], motion.sensed[0], parts[2][:], parts[4][:] = x0, sensed0, p, Z
     beside = list(zip(nets, motion.values, context.columns, context.partition.places, strict=True))
-    for k in range(steps):
+    for k, (now, then) in enumerate(pairwise(at)):
+        given[now], times[now] = flat[:, k * nu : (k + 1) * nu], (k * dt, (k + 1) * dt)
         for net, own, columns, place in beside:
             values = own.at(k)
-            net.set(values[0], motion.sensed[k][:, columns])
+            net.set(values[0], motion.sensed[now][:, columns])
             net.forward(values)
-            motion.given[k] += net.outputs(values) @ place.T
-        found = batch_step.forward(rows[k], [smoothing])
-        motion.x[k + 1], motion.u[k] = found["after"], found["inputs"]
-        motion.sensed[k + 1] = found["sensed"]
+            given[now] += net.outputs(values) @ place.T
+        found = batch_step.forward(rows[now], [smoothing])
+        x[then], motion.u[k], motion.sensed[then] = found["after"], found["inputs"], found["sensed"]
+        if kept is not None and k + 1 in kept:
+            motion.x[k + 1] = found["after"]
         if "asked" in found:
             motion.asked[k] = found["asked"]
     return motion
@@ -95,7 +104,7 @@ def forward(
 def objective_arguments(context: RolloutContext, motion: ForwardPass, b: int) -> list[Array]:
     """What ``context.objectives`` takes, for one robot."""
     samples = context.objectives.samples
-    moments = [part for k, row in samples.moments for part in (motion.x[k, b], motion.u[row, b])]
+    moments = [part for k, row in samples.moments for part in (motion.x[k][b], motion.u[row, b])]
     series, start = [], 0
     for symbol in samples.series.values():
         size = symbol.shape[0]
