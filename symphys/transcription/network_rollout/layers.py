@@ -59,10 +59,14 @@ class Layers:
 
     def room(self, width: int, columns: int) -> Any:
         """(width, columns) that is not set."""
+        return self.rooms(1, width, columns)[0]
+
+    def rooms(self, count: int, width: int, columns: int) -> list[Any]:
+        """So many, one after the other: of large pieces of memory systems give large pages, which are sooner there."""
         padding = PADDING if columns * self.real.itemsize >= PAGE else 0
-        shape = (width, columns + padding) if self.rows else (columns, width)
+        shape = (count, width, columns + padding) if self.rows else (count, columns, width)
         made = np.empty(shape, self.real) if self.device is None else self.device.empty(shape, self.real)
-        return (made if self.rows else made.T)[:, :columns]
+        return [(made[i] if self.rows else made[i].T)[:, :columns] for i in range(count)]
 
     @cached_property
     def _turned(self) -> list[Any]:

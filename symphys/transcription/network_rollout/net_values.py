@@ -33,10 +33,9 @@ class NetValues:
         segments = -(-steps // length) if any(kept) else 0
         columns = robots * min(length, steps)
         self._shared = [None if own else net.room(width, columns) for width, own in zip(net.widths, kept, strict=True)]
-        self._own = [
-            [net.room(width, columns) if own else None for width, own in zip(net.widths, kept, strict=True)]
-            for _ in range(segments)
-        ]
+        layers = zip(net.widths, kept, strict=True)
+        rooms = [net.rooms(segments, width, columns) if own else [None] * segments for width, own in layers]
+        self._own = [list(segment) for segment in zip(*rooms, strict=True)]
 
     def at(self, step: int) -> list[Any]:
         """For each layer (width, robots) the values at a step: where they are, or are to be written."""
