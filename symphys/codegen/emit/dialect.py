@@ -21,6 +21,7 @@ class Dialect:
         inline: how a function begins that its only caller takes in; ``apart``: one that it does not.
         entry: how a function begins that the driver calls.
         memory: type of the memories.
+        both: a statement for sine and cosine of a number at once; empty: none.
         fuses: whether adjoints have fused products, written out: all compilers give the same bits, at any level.
         ahead: loads that come together, ahead of what uses them; 0: each where it is used.
         dense: whether places are numbers of 32 bits without strides, not pairs of words.
@@ -35,6 +36,7 @@ class Dialect:
     apart: str = "static NOINLINE void"
     entry: str = "void"
     memory: str = "V *"
+    both: str = "sincos_({0}, &{1}, &{2})"
     fuses: bool = True
     ahead: int = 0
     dense: bool = False
@@ -46,7 +48,7 @@ class Dialect:
 
 
 VECTORS = Dialect(FORMS)
-NUMBERS = Dialect(PLAIN, fuses=False)
+NUMBERS = Dialect(PLAIN, both="", fuses=False)
 ONE_LANE = Dialect(SCALAR)
 TEAM = Dialect(FORMS, reads="const R *", writes="R *restrict ", shares="R *", memory="R *")
 """Several calls of one rollout at once: lanes are calls, and memories are those of one lane."""
@@ -56,6 +58,7 @@ DEVICE = Dialect(
     word="{0}[{1} * LANES]",
     inline="static __device__ __forceinline__ void",
     apart="static __device__ __noinline__ void",
+    both="",
     entry='extern "C" __device__ void',
     fuses=False,
     ahead=64,

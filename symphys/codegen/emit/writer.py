@@ -58,7 +58,7 @@ class _Written:
         """Its C statements."""
         names: dict[int, str] = {}
         lines = Lines(self.dialect.ahead)
-        piece = self.piece
+        piece, both = self.piece, self._both(graph)
         for x in piece.nodes:
             node = graph.nodes[x]
             operands = [self._use(graph, y, names, lines, form) for y in node.operands]
@@ -67,7 +67,11 @@ class _Written:
                 for r, word, _ in piece.targets[x]:
                     lines.store(self.words.add(f"o{r}", word, product))
                 continue
-            lines.compute(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
+            if x not in both:
+                lines.compute(f"const {_type(node.op)} v{x} = {self.dialect.forms[node.op].format(*operands)};")
+            elif names.keys().isdisjoint(both[x]):
+                sine, cosine = (f"v{y}" for y in both[x])
+                lines.compute(f"V {sine}, {cosine}; {self.dialect.both.format(operands[0], sine, cosine)};")
             names[x] = f"v{x}"
             if x in piece.slots:
                 lines.compute(f"w[{piece.slots[x]}] = (V)v{x};")
@@ -75,6 +79,17 @@ class _Written:
         for x in piece.copied():
             self._stores(graph, x, self._use(graph, x, names, lines, form), lines, form.adds)
         return lines.all()
+
+    def _both(self, graph: Graph) -> dict[int, tuple[int, int]]:
+        """Sines, and cosines of the same numbers, that are computed together."""
+        if not self.dialect.both:
+            return {}
+        found: dict[int, dict[str, int]] = {}
+        for x in self.piece.nodes:
+            if graph.nodes[x].op in ("sin", "cos"):
+                found.setdefault(graph.nodes[x].operands[0], {})[graph.nodes[x].op] = x
+        pairs = [(each["sin"], each["cos"]) for each in found.values() if len(each) == 2]
+        return {x: pair for pair in pairs for x in pair}
 
     def _use(self, graph: Graph, x: int, names: dict[int, str], lines: Lines, form: Form) -> str:
         """How a value is called here; what comes from elsewhere is loaded first."""

@@ -78,6 +78,16 @@ def test_a_long_function_is_cut(cache: Cache) -> None:
     compare([long_function()], cache, np.array([[0.1, -0.2, 0.3, 0.4, -0.5]]))
 
 
+def test_sines_and_cosines_are_found_together(cache: Cache) -> None:
+    """In numbers of all sizes they are casadi's to the bit, which finds one after the other."""
+    x, y = ca.SX.sym("x", 3), ca.SX.sym("y", 2)
+    turned = ca.Function("turned", [x, y], [ca.cos(x[0]) + x[1] * ca.sin(x[0]), ca.sin(y[0]) * ca.sin(x[0])])
+    text = write("f", graph_of(turned), Form(2, adds=False))
+    assert text.count("sincos_(") == 1 and text.count(" sin_(") == 1 and " cos_(" not in text
+    sizes = np.random.default_rng(0).normal(size=(400, 5)) * np.logspace(-9, 6, 400)[:, None]
+    compare([turned], cache, sizes)
+
+
 @pytest.mark.parametrize("pair", [(0, 1), (1, 0)])
 def test_nan_passes_fmin_and_fmax(cache: Cache, pair: tuple[int, int]) -> None:
     x, y = ca.SX.sym("x", 3), ca.SX.sym("y", 2)
