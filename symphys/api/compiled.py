@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symphys.api.transcriptions import linearized, recorded, transcribed
 from symphys.api.values import by_name, vector
+from symphys.codegen.backends import require_backend
 from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
@@ -162,6 +163,7 @@ def compile(
         >>> rollout.value(Z).shape, rollout.gradient(Z).shape
         ((4,), (4, 6))
     """
+    require_backend(backend)
     read = load(problem)
     return CompiledRollout(read, smoothing, transcribed(read, smoothing == 0, backend, threads), (backend, threads))
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from symphys import threads as linear_algebra
 from symphys.api.solution import Solution
 from symphys.api.transcriptions import transcribed
+from symphys.codegen.backends import require_backend
 from symphys.errors import SymphysError
 from symphys.interrupts import Interrupts
 from symphys.problem import Problem
@@ -56,14 +57,15 @@ def solve(
         backend: what evaluates: "auto", "simd", "simd32", "c", "cuda", "cuda32" or "casadi".
         threads: that share a batch; None: one for each processor.
         progress: sees each iteration: its ``iteration``, ``objective``, ``max_violation``, ``seconds``.
-        options: of the solver, as in its table [solver.NAME]: ``iterations=200``, ``max_seconds=10``.
+        options: of the solver, as in its table [solver.NAME]: ``iterations=200``, ``max_seconds=10``; one whose name is
+            taken here by ``problem.set({"solver.multiple_shooting.backend": "fatrop"})``.
 
     Returns:
         The solution, whether or not it is one; see ``solved`` and ``verdict``.
 
     Raises:
         ProblemError: the problem or an option cannot be used; says what would be valid.
-        SymphysError: there is no such solver, the run failed, or nothing of the guess fits.
+        SymphysError: there is no such solver or backend, the run failed, or nothing of the guess fits.
         KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call goes on from there.
 
     Example:
@@ -72,6 +74,7 @@ def solve(
         >>> solution.solved, sorted(solution.value)
         (True, ['spin', 'throw'])
     """
+    require_backend(backend)
     read_in = load(problem)
     name = solver or (read_in.solvers or [each.solver for each in chosen(read_in)])[0]
     taken = guess_of(guess)

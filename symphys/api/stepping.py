@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from symphys.api.loading import Source, load
 from symphys.api.transcriptions import stepped
+from symphys.codegen.backends import NAMES, require_backend
 from symphys.transcription.open_step import CompiledStep as CompiledStep
 
 
@@ -34,7 +35,7 @@ def compile_step(
         threads: that share a batch; None: one for each processor.
 
     Raises:
-        SymphysError: there is no such controller or sensor, or nothing that could act.
+        SymphysError: there is no such controller, sensor or backend, or nothing that could act.
         ProblemError: a cost looks at the numbers of a controller that is left open.
 
     Example:
@@ -45,5 +46,6 @@ def compile_step(
         >>> step.actions, cost.shape
         (('rail.command',), (4,))
     """
+    require_backend(backend, [name for name in NAMES if name != "c"])
     named, read = (None if names is None else tuple(names) for names in (controllers, sensors))
     return stepped(load(problem), named, read, smoothing, backend, threads)

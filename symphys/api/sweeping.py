@@ -16,6 +16,7 @@ from typing import Any, TypedDict, Unpack
 from symphys.api.solution import Solution
 from symphys.api.solving import Guess, guess_of, kept
 from symphys.batches import ENGINES, BatchLimits, BatchResult, run_batch, run_on
+from symphys.codegen.backends import require_backend
 from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
@@ -99,6 +100,7 @@ def solve_all(
         [(1, True), (2, True)]
     """
     check_engine(on, scheduler, folder, multi_start)
+    require_backend(backend)
     limits, rerun = limits_of(how), how.get("rerun") or ""
     asked, counted = list(numbered(map(load, problems))), range(seeds) if isinstance(seeds, int) else tuple(seeds)
     with kept(folder) as out:

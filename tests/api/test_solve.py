@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import signal
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +99,21 @@ def test_a_run_that_fails_raises(problem: symphys.Problem, monkeypatch: pytest.M
     monkeypatch.setattr("symphys.api.solving.transcribed", broken)
     with pytest.raises(symphys.SymphysError, match="nothing works here"):
         symphys.solve(problem, "gradient", backend="casadi")
+
+
+@pytest.mark.parametrize(
+    ("call", "valid"),
+    [
+        (lambda: symphys.solve("ball_throw", "multiple_shooting", backend="ipopt"), "cuda32, c, casadi"),
+        (lambda: symphys.solve_all(["ball_throw"], backend="ipopt"), "cuda32, c, casadi"),
+        (lambda: symphys.compile("ball_throw", backend="ipopt"), "cuda32, c, casadi"),
+        (lambda: symphys.compile_step("cart_pole", backend="ipopt"), "cuda32, casadi"),
+    ],
+)
+def test_a_backend_that_is_none(call: Callable[[], object], valid: str) -> None:
+    """Such as a name that is one of an option of a solver."""
+    with pytest.raises(SymphysError, match=f"there is no backend 'ipopt'; valid: auto, simd, simd32, cuda, {valid}$"):
+        call()
 
 
 def test_read_names_what_is_no_run(tmp_path: Path) -> None:

@@ -12,9 +12,10 @@ GRAVITY = 9.81
 
 @first("solver", ["ilqr", "multiple_shooting", "least_squares"])
 def test_the_bounce_repeats_itself(solver: str) -> None:
+    """What meets the target, 1e-3 m/s, is within 2e-4 m: the speed at the ground, 3.9 m/s, over 2 g is 0.2 s."""
     found = solve(solver, shipped("bounce_cycle"))
     height, speed = found.z
-    assert height == pytest.approx(0.1 + GRAVITY * 0.8**2 / 8, abs=1e-4)
+    assert height == pytest.approx(0.1 + GRAVITY * 0.8**2 / 8, abs=2e-4)
     assert speed == pytest.approx(1.2 / 0.8, abs=1e-4)
 
 
@@ -32,9 +33,11 @@ def test_the_push_of_least_cost_of_transport_falls_linearly(solver: str) -> None
 def test_the_fastest_move_is_bang_bang(solver: str) -> None:
     made = shipped("fastest_move")
     found = solve(solver, made)
-    barrier = 4e-6 if solver == "multiple_shooting" else 1e-6  # its tolerance leaves the push 2e-5 N off its bounds
+    # multiple shooting ends with a barrier: the push is 2e-5 N off its bounds, and near the switch, where these
+    # matter less, in inverse proportion to the time from it, 3e-4 N
+    barrier, push = (4e-6, 5e-4) if solver == "multiple_shooting" else (1e-6, 1e-4)
     assert found.z[0] == pytest.approx(2 * np.sqrt(1.5 * 2 / 10), abs=barrier)
-    assert found.z[1:] == pytest.approx(np.repeat([10.0, -10.0], 10), abs=1e-4)
+    assert found.z[1:] == pytest.approx(np.repeat([10.0, -10.0], 10), abs=push)
     assert made.simulate(found.z).time[-1] == pytest.approx(found.z[0])
 
 

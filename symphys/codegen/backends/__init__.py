@@ -3,7 +3,7 @@
 ``choose`` takes the one that is asked for, or the best that this machine has.
 """
 
-from symphys.codegen.backends.choose import BACKENDS, NAMES, choose
+from symphys.codegen.backends.choose import BACKENDS, NAMES, choose, require_backend
 from symphys.codegen.backends.interface import Backend, BackendSource, Description, ProblemFunctions
 from symphys.codegen.backends.kernels import BEST, PRECISIONS, build_kernel, described, require_kernels
 
@@ -19,5 +19,6 @@ __all__ = [
     "build_kernel",
     "choose",
     "described",
+    "require_backend",
     "require_kernels",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -11,6 +11,7 @@ from symphys.codegen.backends.casadi_ import casadi
 from symphys.codegen.backends.interface import Backend, BackendSource
 from symphys.codegen.backends.kernels import PRECISIONS
 from symphys.codegen.backends.simd import by_kernel
+from symphys.errors import SymphysError
 
 
 def c(source: BackendSource, threads: int) -> Backend:
@@ -26,6 +27,12 @@ BACKENDS: dict[str, Callable[[BackendSource, int], Backend]] = {
     "casadi": casadi,
 }
 NAMES = tuple(BACKENDS)
+
+
+def require_backend(name: str, valid: Sequence[str] = NAMES) -> None:
+    """SymphysError that names those that are valid, where this one is not."""
+    if name not in valid:
+        raise SymphysError(f"there is no backend {name!r}; valid: {', '.join(valid)}")
 
 
 def choose(name: str, source: BackendSource, threads: int | None = None) -> Backend:

@@ -34,7 +34,7 @@ def entries_of(program: Program, phase: str) -> list[int]:
 @pytest.mark.parametrize("name", ["spheres", thorough("capsules"), thorough("a box"), thorough("soft")])
 @pytest.mark.parametrize("warps", [4, thorough(1)])
 def test_a_heap_is_the_processors_and_that_of_all_calls(name: str, warps: int, tmp_path: Path, cache: Cache) -> None:
-    program = program_of(name, duration=0.1)
+    program, soft = program_of(name, duration=0.1), name == "soft"
     here = compile_program(program, cache=cache, threads=1, seeded=("merit",), lanes=4)
     z = np.random.default_rng(2).uniform(-2, 2, (7, program.z.size))
     wanted, slopes = here.gradient(z, [1.0], [0.0])
@@ -47,7 +47,8 @@ def test_a_heap_is_the_processors_and_that_of_all_calls(name: str, warps: int, t
         np.testing.assert_array_equal(values[name], value)
         np.testing.assert_array_equal(others[name], value)
     np.testing.assert_array_equal(gradient, expected)
-    np.testing.assert_allclose(gradient, slopes, rtol=1e-9, atol=1e-9 * np.abs(slopes).max())
+    # starts that are off by 1e-15 change gradients of the soft heap by up to 1e-7 of the largest
+    np.testing.assert_allclose(gradient, slopes, rtol=0, atol=(1e-7 if soft else 1e-9) * np.abs(slopes).max())
 
 
 @pytest.mark.parametrize("make", [halving, guarded_sections])
