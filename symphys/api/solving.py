@@ -57,8 +57,7 @@ def solve(
         backend: what evaluates: "auto", "simd", "simd32", "c", "cuda", "cuda32" or "casadi".
         threads: that share a batch; None: one for each processor.
         progress: sees each iteration: its ``iteration``, ``objective``, ``max_violation``, ``seconds``.
-        options: of the solver, as in its table [solver.NAME]: ``iterations=200``, ``max_seconds=10``; one whose name is
-            taken here by ``problem.set({"solver.multiple_shooting.backend": "fatrop"})``.
+        options: of the solver, as in its table [solver.NAME]: ``iterations=200``; its ``backend`` by ``problem.set``.
 
     Returns:
         The solution, whether or not it is one; see ``solved`` and ``verdict``.
@@ -75,9 +74,8 @@ def solve(
         (True, ['spin', 'throw'])
     """
     require_backend(backend)
-    read_in = load(problem)
+    read_in, taken = load(problem), guess_of(guess)
     name = solver or (read_in.solvers or [each.solver for each in chosen(read_in)])[0]
-    taken = guess_of(guess)
     asked = read_in.set({f"solver.{name}.{key}": value for key, value in options.items()}) if options else read_in
     with kept(folder) as out:
         solvers, settings = [solver] if solver else None, dict(asked.settings)

@@ -100,7 +100,6 @@ def solve_all(
         [(1, True), (2, True)]
     """
     check_engine(on, scheduler, folder, multi_start)
-    require_backend(backend)
     limits, rerun = limits_of(how), how.get("rerun") or ""
     asked, counted = list(numbered(map(load, problems))), range(seeds) if isinstance(seeds, int) else tuple(seeds)
     with kept(folder) as out:
@@ -117,7 +116,8 @@ def solve_all(
 
 
 def transcriber(backend: str, shared: bool) -> Transcribe:
-    """What transcribes problems; ``shared``: the processors are for several runs at once."""
+    """What transcribes problems, by a backend that there is; ``shared``: the processors are for several runs at once."""
+    require_backend(backend)
     return partial(transcribe, backend=backend, threads=1 if shared else None)
 
 
