@@ -116,7 +116,7 @@ def solve_all(
 
 
 def transcriber(backend: str, shared: bool) -> Transcribe:
-    """What transcribes problems, by a backend that there is; ``shared``: the processors are for several runs at once."""
+    """What transcribes problems, by a known backend; ``shared``: the processors are for several runs at once."""
     require_backend(backend)
     return partial(transcribe, backend=backend, threads=1 if shared else None)
 
