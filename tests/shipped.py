@@ -58,14 +58,15 @@ def short_descent(name: str, iterations: int) -> tuple[float, float]:
     return float(merits[0]), float(merits[1])
 
 
-def first_steps(name: str, seconds: float, evaluations: int) -> tuple[Transcription, Array]:
-    """A shipped robot over a time so short that no kernel pays, with the file's own numbers, and what CMA-ES found."""
+def first_steps(name: str, seconds: float, evaluations: int, searches: int = 1) -> tuple[Transcription, list[Array]]:
+    """A shipped robot over a time so short that no kernel pays, with the file's own numbers, and what CMA-ES finds."""
     problem = load_problem(problems.find(name), {"simulation.duration": seconds})
     made = transcribe(replace(problem, scenarios=None), exact=True, backend="casadi")
     chosen = solver("cma")
     asked = {"evaluations": evaluations, "samples": 8, "sigma": 0.05}
     options = validate_options(chosen.Options, asked, problem.file, "cma")
-    return made, chosen.solve(made.shooting, made.shooting.start(0), options, 0).z
+    start = made.shooting.start(0)
+    return made, [chosen.solve(made.shooting, start, options, seed).z for seed in range(searches)]
 
 
 def work(found: Outcome) -> int:

@@ -27,7 +27,7 @@ def taught(name: str, settings: dict[str, object], seed: int = 0) -> tuple[Trans
 @pytest.mark.thorough
 def test_its_first_steps_get_faster() -> None:
     """Over a second and a half, from values alone: faster than by hand."""
-    made, z = first_steps("gait_robot_fast", 1.5, 160)
+    made, (z,) = first_steps("gait_robot_fast", 1.5, 160)
     assert made.judge(z).outputs[SPEED] > 1.3 * made.judge(made.shooting.start(0)).outputs[SPEED]
 
 

@@ -56,7 +56,7 @@ def test_the_gait_closes(seed: int) -> None:
     """
     made = shipped("hopper_gait")
     found = solve("ipopt", made, seed)
-    assert found.status in (Status.CONVERGED, Status.STALLED)
+    assert found.status == Status.CONVERGED or (seed > 0 and found.status == Status.STALLED)
     close = 1e-6 if seed == 0 else 2e-5
     verdict, motion = made.judge(found.z), made.simulate(found.z)
     assert verdict.solved

@@ -38,13 +38,15 @@ def ahead(made: Transcription, z: Array) -> Any:
     return motion.position[-1, torso, 0], (1 - 2 * (q[:, 1] ** 2 + q[:, 2] ** 2)).min()
 
 
-@pytest.mark.parametrize(("seconds", "evaluations", "share"), [(1.0, 120, 0.9), thorough(1.5, 240, 0.85)])
-def test_its_first_steps_help(seconds: float, evaluations: int, share: float) -> None:
-    """Over a second and more, from values alone: what stood steps ahead."""
-    made, z = first_steps("quadruped_walk", seconds, evaluations)
-    still, learnt = (made.judge(each) for each in (made.shooting.start(0), z))
-    assert learnt.objective < share * still.objective
-    assert ahead(made, z)[0] > ahead(made, made.shooting.start(0))[0] + 0.1
+@pytest.mark.parametrize(
+    ("seconds", "evaluations", "share", "searches"), [(1.0, 120, 0.9, 1), thorough(1.5, 240, 0.8, 3)]
+)
+def test_its_first_steps_help(seconds: float, evaluations: int, share: float, searches: int) -> None:
+    """Over a second and more, from values alone: what stood steps ahead, by the middle one of some searches."""
+    made, found = first_steps("quadruped_walk", seconds, evaluations, searches)
+    still = made.judge(made.shooting.start(0))
+    assert np.median([made.judge(z).objective for z in found]) < share * still.objective
+    assert all(ahead(made, z)[0] > ahead(made, made.shooting.start(0))[0] + 0.1 for z in found)
 
 
 @pytest.mark.thorough
