@@ -13,6 +13,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from symphys.errors import SymphysError
+from symphys.solvers.core.checkpoint import OUTCOME, plain_outcome, revived_outcome
 from symphys.solvers.core.interface import Solver
 from symphys.solvers.core.multi_start import solve_multi_start
 from symphys.solvers.core.options import recorded_options
@@ -27,6 +28,7 @@ from symphys.solvers.methods.multiple_shooting import MULTIPLE_SHOOTING, Multipl
 from symphys.solvers.methods.stochastic import STOCHASTIC, StochasticOptions
 
 __all__ = [
+    "OUTCOME",
     "SOLVERS",
     "CmaOptions",
     "Counts",
@@ -44,7 +46,9 @@ __all__ = [
     "Status",
     "StochasticOptions",
     "TraceRow",
+    "plain_outcome",
     "recorded_options",
+    "revived_outcome",
     "solve_multi_start",
     "solver",
 ]

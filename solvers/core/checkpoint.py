@@ -12,7 +12,7 @@ import numpy as np
 
 from symphys.errors import SymphysError
 from symphys.shooting import ShootingProblem
-from symphys.solvers.core.outcome import Array, Counts, StageResult, Status, TraceRow
+from symphys.solvers.core.outcome import Array, Counts, Outcome, StageResult, Status, TraceRow
 from symphys.solvers.core.point import Point
 
 T = TypeVar("T")
@@ -26,6 +26,8 @@ READERS: dict[str, Callable[[Any], Any]] = {
     "tuple[float, ...]": lambda value: tuple(float(number) for number in value),
 }
 """By the annotation of a field; float() also reads the strings "nan" and "inf" of strict JSON."""
+OUTCOME = "outcome"
+"""The key of a checkpoint whose solve is over, and only has to be judged."""
 OLD_NAMES = {"miss": "max_violation"}
 """Of fields in checkpoints that were written before these were renamed."""
 
@@ -96,6 +98,46 @@ def from_plain(
     if tuple(stage.smoothing for stage in stages) != problem.smoothing[:-1][: len(stages)]:
         raise SymphysError("this checkpoint has other stages of smoothing than the problem")
     return Checkpoint(stages, state, point, last, counts, len(rows), seconds), state, rows
+
+
+def plain_outcome(outcome: Outcome, solver: str, seconds: float) -> dict[str, object]:
+    """Everything that ``revived_outcome`` reads of a solve that is over; ``seconds``: what it took."""
+    return {
+        "solver": solver,
+        "best": {"z": plain(outcome.z)},
+        "counts": list(astuple(outcome.counts)),
+        "seconds": seconds,
+        "rows": [list(astuple(row)) for row in outcome.trace],
+        OUTCOME: {
+            "status": outcome.status.value,
+            "advice": outcome.advice,
+            "stages": plain(outcome.stages),
+            "gains": plain(dict(outcome.gains)),
+            "multipliers": plain(dict(outcome.multipliers)),
+        },
+    }
+
+
+def revived_outcome(saved: dict[str, Any], solver: str) -> Outcome:
+    """The outcome in such a checkpoint; SymphysError if damaged or of another solver."""
+    if saved.get("solver") != solver:
+        raise SymphysError(f"this checkpoint is of the solver {saved.get('solver')!r}, not of {solver!r}")
+    try:
+        found = saved[OUTCOME]
+        arrays = {
+            key: {name: np.array(each, float) for name, each in found[key].items()} for key in ("gains", "multipliers")
+        }
+        return Outcome(
+            status=Status(found["status"]),
+            advice=str(found["advice"]),
+            z=np.array(saved["best"]["z"], float),
+            trace=tuple(revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in saved["rows"]),
+            counts=Counts(*map(int, saved["counts"])),
+            stages=tuple(revive(StageResult, each, Counts) for each in found["stages"]),
+            **arrays,
+        )
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise damaged(error) from error
 
 
 def present(stage: dict[str, Any]) -> dict[str, Any]:

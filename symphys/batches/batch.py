@@ -64,15 +64,16 @@ def run_batch(
     """Run what is not done yet, here or in ``processes`` workers, until all is done or Ctrl-C is pressed.
 
     ``multi_start``: here, solve the seeds of a problem and solver side by side where the solver can. ``rerun``: also do
-    again what is over, a key of ``symphys.runs.standing.RERUN``.
+    again what is over, a key of ``symphys.runs.standing.RERUN``. ``limits``: a run that has to end at a time has a
+    process of its own, which can be killed whatever it is at; seeds side by side stop at the budget after an iteration.
     """
     ledger = Ledger(jobs, observer)
     with Interrupts().listening() as stop:
         halt = Halt(stop, limits.budget)
         waiting = dict(plan(jobs, ledger, rerun))
         queue = Queue(waiting)
-        bounded = limits.timeout < float("inf")
-        if bounded or (processes > 1 and len(waiting) > 1):
+        apart = limits.timeout < float("inf") or (limits.bounded and not multi_start)
+        if apart or (processes > 1 and len(waiting) > 1):
             side_by_side(waiting, queue, processes, transcribe, ledger, halt, limits)
         else:
             Here(waiting, queue, transcribe, ledger, halt, limits).run(multi_start)

@@ -36,7 +36,7 @@ SHARE = 20
 MOST_ROUNDS = 3
 """How often drivers are started again while no run comes to its end."""
 GRACE = 5.0
-"""[s] that drivers have to end by themselves when nothing is left."""
+"""[s] that drivers have to end by themselves when nothing is left, and their runs when the time of the batch is up."""
 
 
 def run_on(
@@ -219,8 +219,11 @@ class Follower:
         return True
 
     def wind_down(self, alive: int) -> bool:
-        """After a halt: whether to wait for runs to stop; the rest of the drivers is not waited for."""
-        return bool(alive and self.at_work)
+        """After a halt: whether to wait for runs to stop; the rest of the drivers is not waited for.
+
+        After Ctrl-C a run may take its time, since a second one ends it. The time of the batch is a limit.
+        """
+        return bool(alive and self.at_work) and self.halt.overdue < GRACE
 
     def sweep(self, asked: bool) -> None:
         """Take what is in the folders of runs of which no news came; say what is missing."""

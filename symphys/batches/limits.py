@@ -23,6 +23,11 @@ class BatchLimits:
     timeout: float = math.inf
     budget: float = math.inf
 
+    @property
+    def bounded(self) -> bool:
+        """Whether a limit may end a run, which needs a process of its own for that."""
+        return min(self.timeout, self.budget) < math.inf
+
 
 UNLIMITED = BatchLimits()
 """Whatever it takes; no second try."""
@@ -40,6 +45,11 @@ class Halt:
     def spent(self) -> bool:
         """Whether the time of the batch is used up."""
         return monotonic() - self.began > self.budget
+
+    @property
+    def overdue(self) -> float:
+        """[s] since the time of the batch was used up; 0 before."""
+        return max(monotonic() - self.began - self.budget, 0.0)
 
     def __call__(self) -> bool:
         """Whether to stop."""

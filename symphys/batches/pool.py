@@ -19,19 +19,22 @@ from multiprocessing.context import SpawnProcess
 from symphys import threads
 from symphys.batches.ledger import Ledger
 from symphys.batches.limits import BatchLimits, Halt, timed_out
+from symphys.batches.process_tree import end_tree
 from symphys.batches.queue import Queue
 from symphys.batches.worker import TICK, Begun, Ended, News, Order, Ready, Stopping, serve
 from symphys.interrupts import ignoring_interrupts
 from symphys.results.file_names import RESULT
 from symphys.results.result import Result
-from symphys.runs.execute import give_up
+from symphys.runs.execute import give_up, stop_at_limit
 from symphys.runs.job import Job
 from symphys.runs.standing import stamped
 from symphys.runs.transcription_cache import Transcribe
 from symphys.solvers import TraceRow
 
-GRACE = 10.0
-"""[s] that a run has to stop by itself after its time is up."""
+GRACE = 1.0
+"""[s] that a run has to stop by itself after its time is up; then its process is killed, and its compilers with it."""
+BUILDING, SOLVING = "building and compiling", "solving"
+"""What a run is at before its first iteration and after it; the judging announces its parts."""
 MOST_STARTS = 3
 """Workers that end before they are ready, one after the other, until no more are tried."""
 
@@ -50,7 +53,10 @@ class Seat:
         index: of the job that it is at.
         last: the subject that it has transcribed.
         until: [s] when the time of its run is up.
+        doing: what its run is at.
         asked: whether its run was asked to stop.
+        why: which limit its run has reached, in words; empty for none.
+        ended: whether its process was killed for that.
     """
 
     process: SpawnProcess
@@ -59,7 +65,10 @@ class Seat:
     index: int | None = None
     last: Hashable = None
     until: float = math.inf
+    doing: str = BUILDING
     asked: bool = False
+    why: str = ""
+    ended: bool = False
 
 
 @dataclass
@@ -101,7 +110,8 @@ class Pool:
         while len(self.seats) < wanted:
             context = multiprocessing.get_context("spawn")
             ours, theirs = context.Pipe()
-            process = context.Process(target=serve, args=(theirs, self.transcribe), name="symphys-worker", daemon=True)
+            given = theirs, self.transcribe, self.limits.bounded
+            process = context.Process(target=serve, args=given, name="symphys-worker", daemon=True)
             with ignoring_interrupts():
                 process.start()
             theirs.close()
@@ -117,18 +127,21 @@ class Pool:
                 if not self.working:
                     self.ledger.wait_for(self.queue.claimed)
                 return
-            seat.index, seat.asked, seat.until = index, False, math.inf
+            seat.index, seat.asked, seat.why, seat.doing = index, False, "", BUILDING
+            seat.until = time.monotonic() + self.limits.timeout
             send(seat, (self.jobs[index],))
 
     def bound(self) -> None:
-        """Ask runs to stop whose time is up, or all of them at a halt; end a process that does not."""
+        """Ask runs to stop whose time is up, or all of them at a halt; kill a process that a limit does not stop."""
         now, halt = time.monotonic(), self.halt()
         for seat in self.working:
             if not seat.asked and (halt or now > seat.until):
-                seat.asked, seat.until = True, math.inf if halt else now + GRACE
-                send(seat, Stopping(self.halt.reason if halt else timed_out(self.limits.timeout)))
-            elif seat.asked and now > seat.until:
-                seat.process.kill()
+                seat.asked, seat.why = True, self.halt.reason if halt else timed_out(self.limits.timeout)
+                seat.until = now + GRACE if seat.why else math.inf
+                send(seat, Stopping(seat.why))
+            elif seat.asked and now > seat.until and seat.process.pid and not seat.ended:
+                seat.ended = True
+                end_tree(seat.process.pid)
 
     def listen(self) -> None:
         """Wait for news, and take them."""
@@ -158,14 +171,15 @@ class Pool:
         elif index is None:
             return
         elif isinstance(news, Begun):
-            seat.until = time.monotonic() + self.limits.timeout
             self.ledger.started(index, news.resumed)
         elif isinstance(news, TraceRow):
+            seat.doing = SOLVING
             self.ledger.advanced(index, news)
         elif isinstance(news, Ended):
             seat.last, seat.index = self.queue.done(index), None
             self.end(index, news.result)
         else:
+            seat.doing = news
             self.ledger.judging(index, news)
 
     def end(self, index: int, result: Result | None) -> None:
@@ -202,9 +216,8 @@ class Pool:
         self.queue.done(index)
         self.tries[index] += 1
         job = self.jobs[index]
-        if seat.asked and not self.halt():
-            message = f"it did not stop {GRACE:g} s after {self.limits.timeout:g} s, its timeout, and was ended"
-            self.ledger.ended(index, give_up(job, message, again=False))
+        if seat.ended:
+            self.ledger.ended(index, stop_at_limit(job, f"{seat.why} (it was at: {seat.doing})"))
         elif self.tries[index] <= max(self.limits.retries, 1) and not self.halt():
             self.again(index, f"its process {cause}")
         elif not seat.asked:

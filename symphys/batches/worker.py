@@ -54,10 +54,11 @@ Order = tuple[Job] | Stopping
 
 @dataclass
 class Worker:
-    """A worker process and the run that it is at."""
+    """A worker process and the run that it is at; ``bounded``: whether a limit may kill it."""
 
     parent: Connection[News, Order]
     transcriptions: TranscriptionCache
+    bounded: bool = False
     reported: float = field(default=0.0)
 
     def serve(self) -> None:
@@ -80,6 +81,7 @@ class Worker:
                 self.transcriptions,
                 tell=self.tell,
                 begin=lambda resumed: self.tell(Begun(resumed)),
+                bounded=self.bounded,
             )
         except FolderBusy:
             return None
@@ -109,10 +111,10 @@ class Worker:
             os._exit(1)
 
 
-def serve(parent: Connection[News, Order], transcribe: Transcribe) -> None:
-    """The life of a worker process; it ends with its parent."""
+def serve(parent: Connection[News, Order], transcribe: Transcribe, bounded: bool = False) -> None:
+    """The life of a worker process; it ends with its parent. ``bounded``: see ``Worker``."""
     threading.Thread(target=end_with_parent, daemon=True).start()
-    Worker(parent, TranscriptionCache(transcribe)).serve()
+    Worker(parent, TranscriptionCache(transcribe), bounded).serve()
 
 
 def end_with_parent() -> None:

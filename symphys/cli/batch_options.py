@@ -52,7 +52,11 @@ OPTIONS = (
         show_default=True,
         help="How often a run that fails is tried again; one whose process dies is so once in any case.",
     ),
-    click.option("--timeout", metavar="TIME", help="Stop a run after so long: 90, 10min, 2h. It can go on later."),
+    click.option(
+        "--timeout",
+        metavar="TIME",
+        help="End a run after so long, whatever it is at: 90, 10min, 2h. It can go on later.",
+    ),
     click.option("--budget", metavar="TIME", help="Stop the whole batch after so long. The same command goes on."),
     click.option(
         "--rerun",

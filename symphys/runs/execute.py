@@ -14,7 +14,7 @@ from symphys.results.result import Result
 from symphys.results.table.journal import Journal
 from symphys.runs.claim import Claim, FolderBusy, claimed
 from symphys.runs.job import Job
-from symphys.runs.record import failure
+from symphys.runs.record import checkpoint_rows, failure, interruption
 from symphys.runs.requirements import transcribed
 from symphys.runs.solving import silent, solve
 from symphys.runs.standing import MISSING, Standing, Stands, standing
@@ -38,12 +38,14 @@ def execute(
     solved: Outcome | None = None,
     tell: Callable[[str], None] = silent,
     begin: Callable[[bool], None] = unheard,
+    bounded: bool = False,
 ) -> Result:
     """Do the run, or go on with it, unless it is over; write its folder; return what it found.
 
     ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can go on later.
     ``solved``: what its solver has found already, side by side with other seeds. ``tell``: see ``solving.solve``.
     ``begin``: is called with whether it goes on, once it is claimed; not for a run that was over.
+    ``bounded``: whether a limit may kill this process, so that checkpoints are kept as often as they are cheap.
     A run that fails is a result with the status "failed", and so is one whose folder cannot be written.
 
     Raises:
@@ -54,7 +56,7 @@ def execute(
         return found.result
     try:
         with claimed(job.folder.path) as claim:
-            return with_claim(job, claim, monitor, transcriptions, solved, tell, begin)
+            return with_claim(job, claim, monitor, transcriptions, solved, tell, begin, bounded)
     except FolderBusy:
         raise
     except files.FileError as error:
@@ -69,13 +71,14 @@ def with_claim(
     solved: Outcome | None = None,
     tell: Callable[[str], None] = silent,
     begin: Callable[[bool], None] = unheard,
+    bounded: bool = False,
 ) -> Result:
     """``execute`` for a run that this process has claimed; FileError for a folder that cannot be written."""
     found = standing(job)
     if found.result and over(job, found):
         return found.result
     begin(found.checkpoint is not None)
-    return proceed(job, claim, found, monitor, transcriptions, solved, tell)
+    return proceed(job, claim, found, monitor, transcriptions, solved, tell, bounded)
 
 
 def over(job: Job, found: Standing) -> bool:
@@ -91,15 +94,16 @@ def proceed(
     transcriptions: Transcriptions,
     solved: Outcome | None,
     tell: Callable[[str], None],
+    bounded: bool = False,
 ) -> Result:
     """Solve and write down what came of it."""
     job.folder.clear()
     if not found.checkpoint:
         job.folder.begin(job.config, job.problem.text)
     log = Log(job)
-    keeper = CheckpointKeeper(job, log)
+    keeper = CheckpointKeeper(job, log, 0.0 if bounded else KEPT)
     try:
-        result = solve(job, transcribed(job, transcriptions), monitor, log, keeper, found, solved, tell)
+        result = solve(job, transcribed(job, transcriptions), monitor, log, keeper, found, solved, tell, bounded)
     except files.FileError:
         raise
     except Unavailable as error:
@@ -138,10 +142,10 @@ class Log:
 class CheckpointKeeper:
     """Writes a checkpoint now and then, so that a run whose process is killed goes on from there."""
 
-    def __init__(self, job: Job, log: Log) -> None:
-        """The first is due after KEPT."""
-        self.path, self.log = job.folder.path / CHECKPOINT, log
-        self.due = monotonic() + KEPT
+    def __init__(self, job: Job, log: Log, every: float) -> None:
+        """The first is due after so many seconds, ``every``, and so is each that follows one."""
+        self.path, self.log, self.every = job.folder.path / CHECKPOINT, log, every
+        self.due = monotonic() + every
 
     def __call__(self, make: Callable[[], dict[str, object]]) -> None:
         """Take an offered checkpoint, if one is due; a folder that cannot be written now may be so later."""
@@ -153,7 +157,7 @@ class CheckpointKeeper:
             self.log.write()
         except files.FileError as error:
             self.log(f"no checkpoint: {error}")
-        self.due = monotonic() + max(KEPT, SHARE * (monotonic() - began))
+        self.due = monotonic() + max(self.every, SHARE * (monotonic() - began))
 
 
 def finish(job: Job, claim: Claim, result: Result) -> None:
@@ -172,6 +176,27 @@ def write_result(job: Job, result: Result) -> None:
     found = files.strict(result.to_json())
     files.write_json(job.folder.path / RESULT, found)
     Journal(job.folder.path.parents[1]).add(job.folder.path, (files.strict(job.config.to_json()), found))
+
+
+def stop_at_limit(job: Job, message: str) -> Result:
+    """Write that a limit ended the run's process, with the best point of its checkpoint, from where it can go on.
+
+    A folder that says how the run ended is left as it is, and so is one that another process works in.
+    """
+    result = interruption(job, message, None)
+    with contextlib.suppress(files.FileError), claimed(job.folder.path) as claim:
+        found = standing(job)
+        if found.result and over(job, found):
+            return found.result
+        if found.stands in (Stands.NEW, Stands.CHANGED, Stands.DAMAGED):
+            job.folder.begin(job.config, job.problem.text)
+        checkpoint = job.folder.checkpoint()
+        result = interruption(job, message, checkpoint)
+        if rows := checkpoint_rows(checkpoint):
+            job.folder.write_trace(rows)
+        claim.check()
+        write_result(job, result)
+    return result
 
 
 def give_up(job: Job, message: str, again: bool) -> Result:

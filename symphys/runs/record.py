@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from symphys import files
+from symphys import json_values as values
 from symphys.codegen.backends import Description
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import rule
+from symphys.problem import Problem
 from symphys.results.result import (
     REACHED,
     BackendRecord,
@@ -26,10 +28,11 @@ from symphys.results.trace import OUTPUT
 from symphys.runs.job import Job
 from symphys.runs.provenance import provenance as origin
 from symphys.runs.provenance import versions
-from symphys.shooting import Array
-from symphys.solvers import Counts, Outcome, StageResult, TraceRow
+from symphys.shooting import Array, VariableBlock
+from symphys.solvers import Counts, Outcome, StageResult, Status, TraceRow
 from symphys.trajectory import Trajectory
 from symphys.transcription import Assessment, Transcription
+from symphys.transcription.decision_variables import blocks as blocks_of
 
 JUDGED = frozenset(("objective", "costs", "outputs", "checks"))
 """What is not known where the exact rollout cannot be simulated."""
@@ -77,7 +80,7 @@ def make_result(
         **ruled(rule(outcome.status.value, judged(verdict), files.strict(judgement.trust))),
         status=outcome.status.value,
         advice=judgement.advice,
-        z=variables(transcription, outcome.z),
+        z=variables(transcription.problem, transcription.shooting.blocks, outcome.z),
         iterations=outcome.trace[-1].iteration if outcome.trace else 0,
         counts=asdict(outcome.counts),
         price=price,
@@ -95,6 +98,42 @@ def failure(job: Job, message: str, again: bool = False) -> Result:
     return Result(**provenance(job), solved=False, status="failed", advice=message, again=again, absent=REACHED)
 
 
+def interruption(job: Job, message: str, checkpoint: Mapping[str, object] | None) -> Result:
+    """The result of a run whose process a limit has ended: the best point of its checkpoint, not judged."""
+    kept = checkpoint or {}
+    known: dict[str, Any] = {}
+    rows = checkpoint_rows(checkpoint)
+    z, blocks = values.numbers(values.table(kept.get("best")).get("z")), blocks_of(job.problem)
+    if z.size and z.size == blocks[-1].stop:
+        counts = values.numbers(kept.get("counts"))
+        known = {
+            "z": variables(job.problem, blocks, z),
+            "iterations": rows[-1]["iteration"] if rows else np.nan,
+            "counts": dict(zip([each.name for each in fields(Counts)], counts.tolist(), strict=False)),
+            "seconds": {"solve": values.number(kept.get("seconds"))},
+        }
+    status, unread = Status.INTERRUPTED.value, judged(None)
+    return Result(
+        **provenance(job),
+        **ruled(rule(status, unread, None)),
+        **known,
+        status=status,
+        advice=message,
+        absent=REACHED - known.keys(),
+    )
+
+
+def checkpoint_rows(checkpoint: Mapping[str, object] | None) -> list[dict[str, object]]:
+    """The iterations of a checkpoint as lines of trace.csv; none of one that cannot be read."""
+    rows = (checkpoint or {}).get("rows")
+    names = [each.name for each in fields(TraceRow)]
+    whole = [row for row in rows if isinstance(row, list) and len(row) == len(names)] if isinstance(rows, list) else []
+    found = [dict(zip(names, row, strict=True)) for row in whole]
+    return [
+        {**row, **{OUTPUT + key: number for key, number in values.table(row.pop("outputs")).items()}} for row in found
+    ]
+
+
 def judged(verdict: Assessment | None) -> Judged:
     """What is known of how the exact rollout does."""
     if verdict is None:
@@ -102,9 +141,9 @@ def judged(verdict: Assessment | None) -> Judged:
     return Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks))
 
 
-def variables(transcription: Transcription, z: Array) -> dict[str, VariableRecord]:
+def variables(problem: Problem, blocks: Iterable[VariableBlock], z: Array) -> dict[str, VariableRecord]:
     """The variables by name."""
-    sets = {v.name: tuple(slot.name for slot in v.slots) for v in transcription.problem.variables}
+    sets = {v.name: tuple(slot.name for slot in v.slots) for v in problem.variables}
 
     def block(flat: Array, shape: tuple[int, int]) -> Array:
         return flat.reshape(shape[::-1]).T
@@ -115,7 +154,7 @@ def variables(transcription: Transcription, z: Array) -> dict[str, VariableRecor
             sets[each.name],
             *(block(flat, each.shape) for flat in (z[each.start : each.stop], each.guess, each.lower, each.upper)),
         )
-        for each in transcription.shooting.blocks
+        for each in blocks
     }
 
 

@@ -19,7 +19,7 @@ from symphys.runs.job import Job
 from symphys.runs.record import Judgement, judged, make_result, trace_row, used
 from symphys.runs.standing import Standing
 from symphys.shooting import Array, ShootingProblem
-from symphys.solvers import Keep, Monitor, Outcome, Status, solver
+from symphys.solvers import OUTCOME, Keep, Monitor, Outcome, Status, plain_outcome, revived_outcome, solver
 from symphys.transcription import Record, Transcription
 
 SMOOTHED = (
@@ -44,11 +44,13 @@ def solve(
     found: Standing,
     solved: Outcome | None = None,
     tell: Callable[[str], None] = silent,
+    bounded: bool = False,
 ) -> Result:
     """Solve from the seed's guess, or go on from the checkpoint that was ``found``; write what comes of it.
 
     ``solved``: what was found already, side by side with other seeds; its seconds are those of the group. ``tell``: is
-    called with a few words before each part of judging what was found.
+    called with a few words before each part of judging what was found. ``bounded``: whether a limit may kill the
+    process, so that what the solver has found is kept before it is judged.
     """
     shooting = replace(transcription.shooting, multipliers=job.guess.multipliers)
     log(f"evaluated by {transcription.backend}")
@@ -59,6 +61,7 @@ def solve(
     files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays(), at_once)
     if solved is None:
         outcome, spent = alone(job, shooting, start, monitor, log, keep, found.checkpoint)
+        keep_outcome(job, outcome, spent + spent_before(found), bounded)
     else:
         log("solved side by side with other seeds: the seconds are those of all")
         outcome, spent = solved, solved.trace[-1].seconds if solved.trace else 0.0
@@ -79,7 +82,10 @@ def alone(
     keep: Keep,
     checkpoint: dict[str, Any] | None,
 ) -> tuple[Outcome, float]:
-    """Solve; the outcome and the seconds that it took."""
+    """Solve; the outcome and the seconds that it took. One that was found already waits in the checkpoint."""
+    if checkpoint and OUTCOME in checkpoint:
+        log("solved before; what it found is judged")
+        return revived_outcome(checkpoint, job.config.solver), 0.0
     chosen = solver(job.config.solver)
     chosen.prepare()
     began = time.perf_counter()
@@ -87,6 +93,15 @@ def alone(
         shooting, start, job.options, job.config.seed, monitor=monitor, checkpoint=checkpoint, log=log, keep=keep
     )
     return outcome, time.perf_counter() - began
+
+
+def keep_outcome(job: Job, outcome: Outcome, seconds: float, bounded: bool) -> None:
+    """Write what the solver needs to go on, or, where a limit may end the judging, what it has found."""
+    path = job.folder.path / CHECKPOINT
+    if outcome.status is Status.INTERRUPTED:
+        files.write_json(path, outcome.checkpoint)
+    elif bounded:
+        files.write_json(path, plain_outcome(outcome, job.config.solver, seconds))
 
 
 def spent_before(found: Standing) -> float:
@@ -147,5 +162,3 @@ def write(
         files.write_json(job.folder.path / SCENE, scene.to_json(), at_once)
     if outcome.multipliers:
         files.write_npz(job.folder.path / MULTIPLIERS, outcome.multipliers, at_once)
-    if outcome.status is Status.INTERRUPTED:
-        files.write_json(job.folder.path / CHECKPOINT, outcome.checkpoint)
