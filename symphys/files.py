@@ -92,16 +92,20 @@ def write_text(path: Path, text: str, at_once: bool = True) -> None:
 
 
 def write_json(path: Path, value: object, at_once: bool = True) -> None:
-    """Write strict JSON; numbers that are not finite become the strings "nan", "inf" and "-inf".
+    """Write strict JSON; see ``json_text``."""
+    write_text(path, json_text(value), at_once)
+
+
+def json_text(value: object) -> str:
+    """Strict JSON; numbers that are not finite become the strings "nan", "inf" and "-inf".
 
     An object has a line for each of its keys: all lines of nested values would take ten times as long to write.
     """
     plain = strict(value)
     if not isinstance(plain, dict) or not plain:
-        write_text(path, as_json(plain) + "\n", at_once)
-        return
+        return printable(as_json(plain)) + "\n"
     lines = ",\n".join(f" {as_json(key)}: {as_json(item)}" for key, item in plain.items())
-    write_text(path, f"{{\n{lines}\n}}\n", at_once)
+    return printable(f"{{\n{lines}\n}}\n")
 
 
 def emptied(text: bytes, keys: Iterable[str]) -> bytes:

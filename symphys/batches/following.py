@@ -21,7 +21,7 @@ from symphys.batches.limits import UNLIMITED, BatchLimits, Halt
 from symphys.interrupts import Interrupts
 from symphys.results.file_names import RESULT
 from symphys.results.result import Result, read_result
-from symphys.runs.claim import is_over, numbers, path_of, read_owner
+from symphys.runs.claim import holder, is_over
 from symphys.runs.execute import give_up
 from symphys.runs.folder import RunFolder
 from symphys.runs.job import Job
@@ -178,13 +178,8 @@ class Follower:
 
     def deserted(self, index: int) -> str:
         """Whose claim it is that is left on a run at which nobody works any more; empty if there is none."""
-        folder = self.task.jobs[index].folder.path
-        held = numbers(folder)
-        if not held:
-            return ""
-        path = path_of(folder, held[-1])
-        owner = read_owner(path)
-        return str(owner) if is_over(path, owner) else ""
+        found = holder(self.task.jobs[index].folder.path)
+        return str(found[1]) if found and is_over(*found) else ""
 
     def give_up(self, index: int, message: str) -> None:
         """Write that a run failed, so that no driver takes it up, unless one has already."""

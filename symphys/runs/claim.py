@@ -1,18 +1,23 @@
-"""The right to work in a run folder: claimed by a file, so that any number of commands on any machines share a batch.
+"""The right to work in a run folder: claimed by a folder in it, so that any number of commands share a batch.
 
-A claim is a symbolic link ``.claim-N`` in the run folder, whose target is a text that says who holds it; so it is there
-whole, or not at all. Its process touches it every BEAT seconds. One that belongs to a process of this machine is over
-when the process is. One of another machine is over when it was not touched for LEASE seconds by the clock of whoever
-waits, so that clocks need not agree. What is over is taken up under the next number, which again only one can get.
+A claim is a folder ``.claim/TOKEN`` in the run folder, with a text that says who holds it. It is made under a name of
+its own, and the folder around it is renamed to ``.claim``. That works only where ``.claim`` is missing or empty, so
+there is one claim at most. All that ends a claim names its token, so nobody can end another's: its holder renames
+``.claim/TOKEN`` away, and so does who takes over; one of them succeeds. An empty ``.claim`` is free.
+
+The process of a claim touches it every BEAT seconds. A claim of a process of this machine is over when the process is.
+One of another machine is over when it was not touched for LEASE seconds by the clock of whoever waits, so that clocks
+need not agree. A holder that stood still for longer may wake up: what counts is published by a rename out of
+``.claim/TOKEN``, which fails once that was renamed away, and what does not count is written after a look at it.
 Nothing here needs locks of the file system.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
-import re
 import socket
 import threading
 import time
@@ -29,7 +34,14 @@ BEAT = 10.0
 """[s] between two touches of a claim."""
 LEASE = 120.0
 """[s] without a touch after which a claim of another machine is over; longer than any call that stops all threads."""
-NAME = re.compile(r"\.claim-(\d+)")
+HELD = ".claim"
+"""The folder that holds the claim of a run folder."""
+ASIDE = ".claim-"
+"""What the names begin with under which claims are made and put away."""
+OWNER = "owner"
+"""The file of a claim that says who holds it."""
+TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOENT)
+"""How a claim fails where another is, or where another has tidied up what was made for it."""
 
 
 class FolderBusy(files.FileError):
@@ -46,7 +58,6 @@ class Owner:
         process: its number.
         begun: when the process began, as the system counts; empty where that is not known.
         token: different for each claim.
-        after: the token of the claim that it took over; empty for one that was the first.
     """
 
     host: str = ""
@@ -54,7 +65,6 @@ class Owner:
     process: int = 0
     begun: str = ""
     token: str = ""
-    after: str = ""
 
     def __str__(self) -> str:
         """For messages."""
@@ -96,9 +106,9 @@ def beginning(process: int) -> str:
     return "over" if fields[0] in "ZX" else fields[19]
 
 
-def myself(after: str = "") -> Owner:
-    """This process, for a new claim; ``after``: see ``Owner``."""
-    return Owner(*this_process(os.getpid()), uuid.uuid4().hex, after)
+def myself() -> Owner:
+    """This process, for a new claim."""
+    return Owner(*this_process(os.getpid()), uuid.uuid4().hex)
 
 
 @cache
@@ -113,34 +123,79 @@ class Claim:
 
     Attributes:
         folder: the run folder.
-        number: of the claim; the highest in the folder is the one that counts.
         owner: this process.
     """
 
     folder: Path
-    number: int
     owner: Owner
 
     @property
     def path(self) -> Path:
-        """Its file."""
-        return path_of(self.folder, self.number)
+        """Its folder."""
+        return self.folder / HELD / self.owner.token
 
     @property
     def held(self) -> bool:
         """Whether it still counts: nobody has taken the run over since, as after a sleep that was longer than LEASE."""
-        later = [read_owner(path_of(self.folder, number)) for number in numbers(self.folder) if number > self.number]
-        return read_owner(self.path).token == self.owner.token and all(o.after != self.owner.token for o in later)
+        return self.path.is_dir()
 
     def check(self) -> None:
         """Raise FolderBusy if the run was taken over."""
         if not self.held:
-            raise FolderBusy(f"{self.folder} was taken over by another command while this one stood still")
+            raise self.lost()
+
+    def publish(self, name: str, content: bytes) -> None:
+        """Put a file into the run folder, whole, at an instant at which the claim is held.
+
+        Raises:
+            FolderBusy: it is not held any more; nothing was written.
+            FileError: the file cannot be written.
+        """
+        made, path = self.path / name, self.folder / name
+        try:
+            put(made, content)
+            made.replace(path)
+        except (FileNotFoundError, NotADirectoryError) as error:
+            raise self.lost() from error
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                made.unlink()
+            raise files.FileError(f"cannot write {path}: {files.reason(error)}") from error
+
+    def touch(self) -> None:
+        """Say that this process is at work."""
+        with contextlib.suppress(OSError):
+            os.utime(self.path)
+
+    def enter(self) -> bool:
+        """Make the claim; False where another is there.
+
+        Raises:
+            FileError: the folder cannot be written.
+        """
+        outer = self.folder / f"{ASIDE}{self.owner.token}"
+        try:
+            outer.mkdir()
+            (outer / self.owner.token).mkdir()
+            put(outer / self.owner.token / OWNER, json.dumps(asdict(self.owner)).encode())
+            with contextlib.suppress(OSError):
+                (self.folder / HELD).rmdir()  # not every system renames over an empty folder
+            outer.rename(self.folder / HELD)
+        except OSError as error:
+            discard(outer / self.owner.token)
+            discard(outer)
+            if error.errno in TAKEN or occupied(self.folder):
+                return False
+            raise files.FileError(f"cannot write {self.folder / HELD}: {files.reason(error)}") from error
+        return True
 
     def release(self) -> None:
-        """Let others in."""
-        with contextlib.suppress(OSError):
-            self.path.unlink(missing_ok=True)
+        """Let others in, unless another has taken the run over."""
+        evict(self.path)
+
+    def lost(self) -> FolderBusy:
+        """The error of a holder that is none any more."""
+        return FolderBusy(f"{self.folder} was taken over by another command while this one stood still")
 
 
 @contextlib.contextmanager
@@ -162,111 +217,80 @@ def claimed(folder: Path) -> Iterator[Claim]:
 
 def take(folder: Path) -> Claim:
     """Claim a folder; see ``claimed``."""
-    files.make_folder(folder)
     while True:
-        earlier = numbers(folder)
-        if not earlier:
-            claim = Claim(folder, 0, myself())
-            if create(claim) and settled(claim):
-                return claim
-            continue
-        before = path_of(folder, earlier[-1])
-        found = read_owner(before)
-        if not os.path.lexists(before):  # released meanwhile
-            continue
-        if not is_over(before, found):
-            raise FolderBusy(f"{found} is working in {folder}; nothing was changed there")
-        claim = Claim(folder, earlier[-1] + 1, myself(after=found.token))
-        if create(claim) and settled(claim, earlier[-1]):
+        files.make_folder(folder)
+        for path in occupied(folder):
+            found = read_owner(path)
+            if not is_over(path, found):
+                raise FolderBusy(f"{found} is working in {folder}; nothing was changed there")
+            evict(path)
+        claim = Claim(folder, myself())
+        if claim.enter():
             return claim
 
 
-def settled(claim: Claim, before: int | None = None) -> bool:
-    """Whether a new claim stands; one that does not is withdrawn.
-
-    It does not where it was made by an older view of the folder: where there is a higher one, or where the one that it
-    was to take over is another by now. ``before``: its number; it goes once it is taken over.
-    """
-    stands = numbers(claim.folder)[-1:] == [claim.number]
-    if stands and before is not None:
-        path = path_of(claim.folder, before)
-        stands = os.path.lexists(path) and read_owner(path).token == claim.owner.after
-        if stands:
-            path.unlink(missing_ok=True)
-    if not stands:
-        claim.release()
-    return stands
-
-
-def create(claim: Claim) -> bool:
-    """Put a claim in its place; False if there is one."""
-    content = json.dumps(asdict(claim.owner))
+def occupied(folder: Path) -> list[Path]:
+    """The claims in a run folder: one at most, unless somebody else has put something there."""
     try:
-        return linked(content, claim.path) or placed(content, claim.path)
-    except FileExistsError:
-        return False
-    except OSError as error:
-        raise files.FileError(f"cannot write {claim.path}: {files.reason(error)}") from error
-
-
-def linked(content: str, path: Path) -> bool:
-    """Make a symbolic link with the text for its target, which nobody follows: it is there whole, in one operation.
-
-    False on systems without such links; FileExistsError if the name is taken.
-    """
-    try:
-        path.symlink_to(content)
-    except FileExistsError:
-        raise
-    except (OSError, NotImplementedError):
-        return False
-    return True
-
-
-def placed(content: str, path: Path) -> bool:
-    """Write a file that is not there yet, where for an instant others see it empty; FileExistsError if it is there."""
-    with path.open("xb") as file:
-        try:
-            file.write(content.encode())
-            file.flush()
-        except OSError:
-            path.unlink()
-            raise
-    return True
-
-
-def path_of(folder: Path, number: int) -> Path:
-    """The file of a claim."""
-    return folder / f".claim-{number}"
-
-
-def numbers(folder: Path) -> list[int]:
-    """The claims in a folder, ascending."""
-    try:
-        found = [NAME.fullmatch(path.name) for path in folder.iterdir()]
+        return sorted((folder / HELD).iterdir())
     except OSError:
         return []
-    return sorted(int(each[1]) for each in found if each)
+
+
+def evict(path: Path) -> None:
+    """End the claim at this path, if there still is one: renamed away, it cannot publish any more."""
+    aside = path.parents[1] / f"{ASIDE}{path.name}.over"
+    with contextlib.suppress(OSError):
+        path.rename(aside)
+        discard(aside)
+    with contextlib.suppress(OSError):
+        path.parent.rmdir()  # only if it is empty
+
+
+def discard(path: Path) -> None:
+    """Remove a folder with its files, or a file, as far as that can be done."""
+    with contextlib.suppress(OSError):
+        for each in path.iterdir():
+            each.unlink()
+        path.rmdir()
+    with contextlib.suppress(OSError):
+        path.unlink()
+
+
+def clear(folder: Path, claim: Claim) -> None:
+    """Remove what processes that were killed have left of their claims."""
+    for path in list(folder.iterdir()):
+        if path.name.startswith(ASIDE) and claim.held:
+            discard(path / path.name.removeprefix(ASIDE))
+            discard(path)
+
+
+def put(path: Path, content: bytes) -> None:
+    """Write a file in a folder that is there; OSError if that cannot be."""
+    files.write_through(path, content)
+
+
+def holder(folder: Path) -> tuple[Path, Owner] | None:
+    """The claim in a folder, and who holds it as far as its file says; None for none."""
+    return next(((path, read_owner(path)) for path in occupied(folder)), None)
 
 
 def owner(folder: Path) -> Owner | None:
     """Who is at work in a folder, as far as its files say; None: nobody."""
-    held = numbers(folder)
-    found = read_owner(path_of(folder, held[-1])) if held else None
-    return None if found is None or (found.here and not found.alive) else found
+    found = holder(folder)
+    return None if found is None or (found[1].here and not found[1].alive) else found[1]
 
 
 def read_owner(path: Path) -> Owner:
     """The owner that a claim names; one without a name if it cannot be read."""
     try:
-        text = str(path.readlink()) if path.is_symlink() else files.read_text(path)
-        return values.record(Owner, json.loads(text), values.verbatim)
-    except (OSError, ValueError, RecursionError, files.FileError):
+        return values.record(Owner, json.loads(files.read_text(path / OWNER)), values.verbatim)
+    except (ValueError, RecursionError, files.FileError):
         return Owner()
 
 
-seen: dict[tuple[Path, str], tuple[int, float]] = {}
-"""Of claims that this process waits for: when the file was last touched, and since when [s] that has been so here."""
+seen: dict[Path, tuple[int, float]] = {}
+"""Of claims that this process waits for: when the folder was last touched, and since when [s] that has been so here."""
 
 
 def is_over(path: Path, found: Owner) -> bool:
@@ -277,9 +301,9 @@ def is_over(path: Path, found: Owner) -> bool:
         touched = path.lstat().st_mtime_ns
     except OSError:
         return True
-    known, now = seen.get((path, found.token)), time.monotonic()
+    known, now = seen.get(path), time.monotonic()
     if known is None or known[0] != touched:
-        seen[path, found.token] = (touched, now)
+        seen[path] = (touched, now)
         return False
     return now - known[1] > LEASE
 
@@ -315,8 +339,7 @@ class Heart:
             with self.lock:
                 held = list(self.claims)
             for claim in held:
-                with contextlib.suppress(OSError):
-                    os.utime(claim.path, follow_symlinks=os.utime not in os.supports_follow_symlinks)
+                claim.touch()
 
 
 HEART = Heart()

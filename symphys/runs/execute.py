@@ -12,7 +12,7 @@ from symphys.errors import SymphysError, Unavailable
 from symphys.results.file_names import CHECKPOINT, LOG, RESULT
 from symphys.results.result import Result
 from symphys.results.table.journal import Journal
-from symphys.runs.claim import Claim, FolderBusy, claimed
+from symphys.runs.claim import Claim, FolderBusy, claimed, clear
 from symphys.runs.job import Job
 from symphys.runs.record import checkpoint_rows, failure, interruption
 from symphys.runs.requirements import transcribed
@@ -98,12 +98,13 @@ def proceed(
 ) -> Result:
     """Solve and write down what came of it."""
     job.folder.clear()
+    clear(job.folder.path, claim)
     if not found.checkpoint:
         job.folder.begin(job.config, job.problem.text)
     log = Log(job)
-    keeper = CheckpointKeeper(job, log, 0.0 if bounded else KEPT)
+    keeper = CheckpointKeeper(claim, log, 0.0 if bounded else KEPT)
     try:
-        result = solve(job, transcribed(job, transcriptions), monitor, log, keeper, found, solved, tell, bounded)
+        result = solve(job, transcribed(job, transcriptions), claim, monitor, log, keeper, found, solved, tell, bounded)
     except files.FileError:
         raise
     except Unavailable as error:
@@ -115,6 +116,7 @@ def proceed(
         result = failure(job, f"unexpected {type(error).__name__}: {error} (details in {job.folder.path / LOG})")
     finally:
         with contextlib.suppress(files.FileError):  # a full disk is reported by what comes after
+            claim.check()
             log.write()
     finish(job, claim, result)
     return result
@@ -142,9 +144,9 @@ class Log:
 class CheckpointKeeper:
     """Writes a checkpoint now and then, so that a run whose process is killed goes on from there."""
 
-    def __init__(self, job: Job, log: Log, every: float) -> None:
+    def __init__(self, claim: Claim, log: Log, every: float) -> None:
         """The first is due after so many seconds, ``every``, and so is each that follows one."""
-        self.path, self.log, self.every = job.folder.path / CHECKPOINT, log, every
+        self.claim, self.log, self.every = claim, log, every
         self.due = monotonic() + every
 
     def __call__(self, make: Callable[[], dict[str, object]]) -> None:
@@ -153,8 +155,10 @@ class CheckpointKeeper:
         if began < self.due:
             return
         try:
-            files.write_json(self.path, make())
+            self.claim.publish(CHECKPOINT, files.json_text(make()).encode())
             self.log.write()
+        except FolderBusy:
+            raise
         except files.FileError as error:
             self.log(f"no checkpoint: {error}")
         self.due = monotonic() + max(self.every, SHARE * (monotonic() - began))
@@ -165,16 +169,15 @@ def finish(job: Job, claim: Claim, result: Result) -> None:
 
     The checkpoint stays where the same command goes on from there.
     """
-    claim.check()
-    write_result(job, result)
-    if not (result.interrupted or result.again):
+    write_result(job, claim, result)
+    if not (result.interrupted or result.again) and claim.held:
         files.remove(job.folder.path / CHECKPOINT)
 
 
-def write_result(job: Job, result: Result) -> None:
-    """Write result.json, and keep the row of the run in the table of all runs."""
+def write_result(job: Job, claim: Claim, result: Result) -> None:
+    """Write result.json if the run was not taken over, and keep the row of the run in the table of all runs."""
     found = files.strict(result.to_json())
-    files.write_json(job.folder.path / RESULT, found)
+    claim.publish(RESULT, files.json_text(found).encode())
     Journal(job.folder.path.parents[1]).add(job.folder.path, (files.strict(job.config.to_json()), found))
 
 
@@ -194,8 +197,7 @@ def stop_at_limit(job: Job, message: str) -> Result:
         result = interruption(job, message, checkpoint)
         if rows := checkpoint_rows(checkpoint):
             job.folder.write_trace(rows)
-        claim.check()
-        write_result(job, result)
+        write_result(job, claim, result)
     return result
 
 
@@ -208,6 +210,5 @@ def give_up(job: Job, message: str, again: bool) -> Result:
             return found.result
         if found.stands in (Stands.NEW, Stands.CHANGED, Stands.DAMAGED):
             job.folder.begin(job.config, job.problem.text)
-        claim.check()
-        write_result(job, result)
+        write_result(job, claim, result)
     return result

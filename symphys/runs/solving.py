@@ -15,6 +15,7 @@ from symphys.findings.obstacles import capital, obstacles
 from symphys.results.file_names import CHECKPOINT, GAINS, GUESS, MULTIPLIERS, SCENE, TRAJECTORY
 from symphys.results.result import Result
 from symphys.results.scene_of_problem import make_scene
+from symphys.runs.claim import Claim
 from symphys.runs.job import Job
 from symphys.runs.record import Judgement, judged, make_result, trace_row, used
 from symphys.runs.standing import Standing
@@ -38,6 +39,7 @@ def silent(what: str) -> None:
 def solve(
     job: Job,
     transcription: Transcription,
+    claim: Claim,
     monitor: Monitor,
     log: Callable[[str], None],
     keep: Keep,
@@ -58,16 +60,18 @@ def solve(
         log(f"guess from {job.guess.folder}: {note}")
     start = shooting.start(job.config.seed)
     at_once = found.result is not None  # else nothing counts before the result is written
+    claim.check()
     files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays(), at_once)
     if solved is None:
         outcome, spent = alone(job, shooting, start, monitor, log, keep, found.checkpoint)
-        keep_outcome(job, outcome, spent + spent_before(found), bounded)
+        keep_outcome(job, claim, outcome, spent + spent_before(found), bounded)
     else:
         log("solved side by side with other seeds: the seconds are those of all")
         outcome, spent = solved, solved.trace[-1].seconds if solved.trace else 0.0
     spent += spent_before(found)
     judgement = judge(transcription, outcome, job.examine, tell)
     price = transcription.prices(used(outcome.counts))
+    claim.check()
     write(job, transcription, outcome, judgement, price, at_once)
     seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
     return make_result(job, transcription, outcome, judgement, price, seconds)
@@ -95,13 +99,13 @@ def alone(
     return outcome, time.perf_counter() - began
 
 
-def keep_outcome(job: Job, outcome: Outcome, seconds: float, bounded: bool) -> None:
+def keep_outcome(job: Job, claim: Claim, outcome: Outcome, seconds: float, bounded: bool) -> None:
     """Write what the solver needs to go on, or, where a limit may end the judging, what it has found."""
-    path = job.folder.path / CHECKPOINT
     if outcome.status is Status.INTERRUPTED:
-        files.write_json(path, outcome.checkpoint)
+        claim.publish(CHECKPOINT, files.json_text(outcome.checkpoint).encode())
     elif bounded:
-        files.write_json(path, plain_outcome(outcome, job.config.solver, seconds))
+        kept = plain_outcome(outcome, job.config.solver, seconds)
+        claim.publish(CHECKPOINT, files.json_text(kept).encode())
 
 
 def spent_before(found: Standing) -> float:

@@ -146,7 +146,9 @@ def test_a_run_that_kills_its_drivers_is_given_up_and_the_same_command_tries_it_
                 return
             index = [job.folder.path for job in task.jobs].index(folder)
             claim = {"host": "far", "machine": "another", "process": 7, "token": death}
-            (folder / ".claim-0").write_text(json.dumps(claim), "utf-8")
+            shutil.rmtree(folder / ".claim", ignore_errors=True)
+            (folder / ".claim" / death).mkdir(parents=True)
+            (folder / ".claim" / death / "owner").write_text(json.dumps(claim), "utf-8")
             task.board.tell(BEGUN, index, death)
             threading.Event().wait(0.1)
 
@@ -154,7 +156,7 @@ def test_a_run_that_kills_its_drivers_is_given_up_and_the_same_command_tries_it_
     batch, _ = run(jobs[:1], Dying())
     (lost,) = batch.results
     assert lost.status == "failed" and lost.again and "process 7 on far died" in lost.advice
-    (folder / ".claim-0").unlink()
+    shutil.rmtree(folder / ".claim")
     batch, _ = run(jobs)
     assert batch.accepted
 

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 import os
 import shutil
+import zlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
 from recorded_runs import record, recorded
 
 from symphys import files
+from symphys.cli.finding.shown import lines, summary, usual_columns
 from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.result import Result
-from symphys.results.table import Journal, read_rows
+from symphys.results.table import Journal, best, columns, ordered, read_rows
 from symphys.results.table import rows as table_rows
-from symphys.results.table.journal import Kept, entry, stamp_of
+from symphys.results.table.journal import BODY, MARK, Kept, entry, stamp_of
 from symphys.results.table.row import HEAVY, read_row
+from symphys.results.table.writing import csv_text, json_lines
 
 
 def test_a_row_has_what_the_files_say(tmp_path: Path) -> None:
@@ -149,6 +154,57 @@ def test_many_append_at_once_and_no_line_is_lost(tmp_path: Path) -> None:
         list(pool.map(append, range(8)))
     kept, lines = Journal(tmp_path).read()
     assert len(kept) == lines == 400
+
+
+NUMBER = [0, -1, 3.5, True, None, "x", "nan", "inf", [], {}, [1], 10**400, 1e308, "\ud800", "", {"a": []}]
+
+
+def mutated(value: Any, random: Random) -> Any:
+    """A value of JSON with a change somewhere."""
+    inside = list(value) if isinstance(value, dict) else list(range(len(value))) if isinstance(value, list) else []
+    if not inside or random.random() < 0.2:
+        return random.choice(NUMBER)
+    found, key = copy.copy(value), random.choice(inside)
+    change = random.randrange(4)
+    if change == 0:
+        del found[key]
+    elif change == 1 and isinstance(found, dict):
+        found[random.choice(["run", "fault", "solved", "seed", "verdict", "\n", "output: x"])] = random.choice(NUMBER)
+    else:
+        found[key] = mutated(found[key], random)
+    return found
+
+
+def test_what_is_odd_in_a_journal_is_read_from_the_folders(tmp_path: Path) -> None:
+    """Lines with a right checksum and other content: a column is right by its type, or all is as the folder says."""
+    folder = record(tmp_path, ground__friction=0.6, text__kind="inf")
+    truth = read_rows(tmp_path).rows
+    Journal(tmp_path).add(folder)
+    (line,) = Journal(tmp_path).path.read_bytes().splitlines()
+    content = json.loads(b"{" + line[BODY:])
+    random, read = Random(0), 0
+    for _ in range(1000):
+        changed = mutated(content, random)
+        body = json.dumps(changed).encode()[1:]
+        if random.random() < 0.1:
+            cut = random.randrange(len(body) + 1)
+            body = body[:cut] + random.randbytes(random.randint(0, 2)).replace(b"\n", b"") + body[cut + 1 :]
+        Journal(tmp_path).path.write_bytes(MARK + b'%08x",' % zlib.crc32(body) + body + b"\n")
+        found = read_rows(tmp_path)
+        (row,) = found.rows
+        read += found.read
+        if found.read:
+            assert found.rows == truth
+        assert {key: type(row.get(key)) for key in ("run", "case", "solver", "verdict", "solved")} == {
+            **dict.fromkeys(("run", "case", "solver", "verdict"), str),
+            "solved": bool,
+        }
+        for key in ("objective", "-seed", "why", "host"):
+            assert ordered(found.rows, key) == best(found.rows, key) == found.rows
+        csv_text(found.rows, columns(found.rows)).encode()
+        assert json.loads("".join(json_lines(found.rows, columns(found.rows))))
+        assert list(lines(found.rows, usual_columns(found.rows))) and summary(found.rows)
+    assert read > 500, "most changes are odd"
 
 
 def test_a_journal_above_and_those_below_are_used(tmp_path: Path) -> None:

@@ -11,14 +11,14 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from symphys.files import FileError
 from symphys.runs import claim as claims
-from symphys.runs.claim import FolderBusy, Owner, claimed, numbers, owner, path_of, read_owner, take
+from symphys.runs.claim import Claim, FolderBusy, Owner, claimed, occupied, owner, take
 
 ELSEWHERE = Owner("far", "another boot", 4711, "1", "token")
 
@@ -36,11 +36,12 @@ def process() -> Iterator[subprocess.Popen[bytes]]:
         started.kill()
 
 
-def leave(folder: Path, held: Owner, number: int = 0) -> Path:
+def leave(folder: Path, held: Owner) -> Path:
     """Write a claim of another process."""
     folder.mkdir(parents=True, exist_ok=True)
-    path_of(folder, number).symlink_to(json.dumps(asdict(held)))
-    return path_of(folder, number)
+    claim = Claim(folder, held)
+    assert claim.enter()
+    return claim.path
 
 
 def of_process(number: int) -> Owner:
@@ -75,7 +76,7 @@ def test_the_claim_of_a_living_process_is_respected_and_that_of_a_dead_one_is_no
     process.wait()
     assert owner(folder) is None
     with claimed(folder) as claim:
-        assert (claim.number, claim.held) == (1, True)
+        assert claim.held
     assert list(folder.iterdir()) == []
 
 
@@ -109,44 +110,73 @@ def test_a_claim_of_another_machine_is_over_once_nobody_touches_it_whatever_its_
     path = leave(folder, ELSEWHERE)
     stamp = time.time() + day
     for beat in range(3):
-        os.utime(path, (stamp + beat, stamp + beat), follow_symlinks=False)
+        os.utime(path, (stamp + beat, stamp + beat))
         with pytest.raises(FolderBusy, match="process 4711 on far"):
             take(folder)
         now[0] += claims.LEASE - 1
     with pytest.raises(FolderBusy):
         take(folder)
     now[0] += 2
-    assert take(folder).number == 1
+    assert take(folder).held
 
 
-def test_a_claim_without_an_owner_is_waited_for(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On file systems without links a claim is empty for an instant; one that stays so is over."""
-    folder.mkdir()
-    path_of(folder, 0).write_bytes(b"")
+@pytest.mark.parametrize("kind", ["folder", "file"])
+def test_what_names_no_owner_is_waited_for_and_then_put_away(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    (folder / ".claim").mkdir(parents=True)
+    odd = folder / ".claim" / "odd"
+    odd.mkdir() if kind == "folder" else odd.write_bytes(b"")
     with pytest.raises(FolderBusy, match="another process"):
         take(folder)
     monkeypatch.setattr(claims, "LEASE", -1.0)
-    assert take(folder).number == 1
+    take(folder).release()
+    assert list(folder.iterdir()) == []
 
 
-def test_what_was_taken_over_is_not_held_any_more(folder: Path) -> None:
-    """As by a process that slept longer than its lease: it must not write its result."""
-    with claimed(folder) as slept:
-        leave(folder, replace(ELSEWHERE, after="another claim"), slept.number + 1)
-        assert slept.held, "a claim that is about to be withdrawn takes nothing over"
-        path_of(folder, 1).unlink()
-        leave(folder, replace(ELSEWHERE, after=slept.owner.token), slept.number + 1)
-        assert not slept.held
-        with pytest.raises(FolderBusy, match="taken over"):
-            slept.check()
-    assert read_owner(path_of(folder, 1)).token == ELSEWHERE.token
+def test_who_was_taken_over_can_publish_nothing_and_ends_no_claim_but_its_own(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a process that slept longer than its lease, and whose successor is over, too, and followed by a third."""
+    monkeypatch.setattr(claims.Owner, "here", False)
+    monkeypatch.setattr(claims, "LEASE", -1.0)
+    slept, after = take_late(folder), take_late(folder)
+    assert not slept.held and after.held
+    with pytest.raises(FolderBusy, match="taken over"):
+        slept.check()
+    with pytest.raises(FolderBusy, match="taken over"):
+        slept.publish("result.json", b"mine")
+    after.release()
+    third = take_late(folder)
+    slept.touch()
+    slept.release()
+    assert third.held and not (folder / "result.json").exists()
+    third.publish("result.json", b"third")
+    assert (folder / "result.json").read_bytes() == b"third"
+
+
+def take_late(folder: Path) -> Claim:
+    """Claim a folder; what is there was looked at before, and not touched since."""
+    for path in occupied(folder):
+        claims.is_over(path, Owner())
+    return take(folder)
+
+
+def test_what_killed_processes_leave_of_claims_is_removed(folder: Path) -> None:
+    for name in (".claim-abc/abc", ".claim-def.over"):
+        (folder / name).mkdir(parents=True)
+        (folder / name / "owner").write_text("{}", "utf-8")
+    (folder / ".claim-0").symlink_to("{}")
+    with claimed(folder) as claim:
+        claims.clear(folder, claim)
+        assert [path.name for path in folder.iterdir()] == [".claim"]
 
 
 def test_a_held_claim_is_touched(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(claims, "BEAT", 0.01)
     monkeypatch.setattr(claims, "HEART", claims.Heart())
     with claimed(folder) as claim:
-        os.utime(claim.path, (1, 1), follow_symlinks=False)
+        os.utime(claim.path, (1, 1))
         end = time.monotonic() + 5
         while claim.path.lstat().st_mtime == 1 and time.monotonic() < end:
             time.sleep(0.01)
@@ -202,42 +232,16 @@ def test_of_many_who_take_over_one_succeeds(folder: Path) -> None:
         with ThreadPoolExecutor(4) as pool:
             won = [each.result() for each in [pool.submit(get) for _ in range(4)]]
         assert sum(won) == 1, turn
-        for number in numbers(folder):
-            path_of(folder, number).unlink()
-
-
-def test_a_claim_that_was_made_by_an_older_view_is_withdrawn(folder: Path) -> None:
-    """Somebody saw a dead claim 0; before he made claim 1, all of it was over, and another has claim 0 now."""
-    leave(folder, ELSEWHERE)
-    late = claims.Claim(folder, 1, claims.myself(after="a dead claim"))
-    assert claims.create(late) and not claims.settled(late, 0)
-    assert numbers(folder) == [0]
-    late = claims.Claim(folder, 1, claims.myself(after=ELSEWHERE.token))
-    assert claims.create(late) and claims.settled(late, 0)
-    assert numbers(folder) == [1]
-    later = claims.Claim(folder, 0, claims.myself())
-    assert claims.create(later) and not claims.settled(later)
-    assert numbers(folder) == [1]
-
-
-def test_where_there_are_no_links_claims_work_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:
-        raise PermissionError("no links here")
-
-    monkeypatch.setattr(Path, "symlink_to", refuse)
-    with claimed(folder) as claim:
-        assert claim.held
-        with pytest.raises(FolderBusy):
-            take(folder)
+        for path in occupied(folder):
+            claims.evict(path)
 
 
 def test_a_folder_that_cannot_be_written_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    claims.myself()
-
     def full(*_: object, **__: object) -> int:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "symlink_to", full)
-    monkeypatch.setattr(Path, "open", full)
-    with pytest.raises(FileError, match=r"cannot write .*run/\.claim-0: no space left on device"):
+    folder.mkdir()
+    monkeypatch.setattr(Path, "mkdir", full)
+    monkeypatch.setattr(claims.files, "make_folder", lambda path: None)
+    with pytest.raises(FileError, match=r"cannot write .*run/\.claim: no space left on device"):
         take(folder)

@@ -278,7 +278,7 @@ def test_a_folder_in_use_is_left_alone(make_job: MakeJob) -> None:
     with claimed(job.folder.path) as claim:
         with pytest.raises(FolderBusy, match=f"process {os.getpid()} on .* is working in"):
             run(job)
-        assert list(job.folder.path.iterdir()) == [claim.path]
+        assert list(job.folder.path.iterdir()) == [claim.path.parent]
     assert run(job).solved
 
 

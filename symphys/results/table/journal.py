@@ -2,13 +2,15 @@
 
 A line is written by a single append, and begins with a checksum. So a line that was torn, or written into by another
 machine, is recognised and skipped: its run is read again. Of several lines of one run the last counts. A row counts
-only as long as result.json has the size and the time of change that its line names, so the journal may be out of date,
-damaged or missing, and the table is right all the same.
+only as long as result.json has the size and the time of change that its line names, and only if its columns have the
+types that ``row_of`` gives them. So the journal may be out of date, damaged or missing, and the table is right all the
+same.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import zlib
 from collections.abc import Iterable, Mapping
@@ -17,7 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from symphys import files
+from symphys.json_values import UNPRINTABLE
 from symphys.results.file_names import RESULT
+from symphys.results.table.columns import FIXED, MOST_EXACT, NUMBERS, numeric
 
 NAME = ".runs.jsonl"
 """Of the journal, in the folder that `symphys solve --out` names."""
@@ -27,6 +31,12 @@ MARK = b'{"crc":"'
 """What every line begins with; eight digits follow, then ``",``, then what they are the checksum of."""
 BODY = len(MARK) + 10
 """Where that begins."""
+TEXTS = frozenset(FIXED) - NUMBERS - {"solved"}
+"""Columns that hold texts."""
+ALWAYS = ("problem", "case", "solver", "verdict")
+"""Those that every row has, beside "solved"."""
+INFINITE = ("inf", "-inf")
+"""Numbers that JSON has no other way to write; what is nan has no entry."""
 Stamp = tuple[int, int]
 """Time of change [ns] and size [bytes] of a result.json."""
 
@@ -128,8 +138,28 @@ def entry(text: bytes) -> Iterable[tuple[str, Kept]]:
     body = text[BODY:]
     if not text.startswith(MARK) or text[len(MARK) : BODY] != b'%08x",' % zlib.crc32(body):
         return []
-    found = json.loads(b"{" + body)
-    if found["rows"] != ROWS:
-        return []
-    time, size = found["stamp"]
-    return [(found["run"], Kept((time, size), found["row"]))]
+    try:
+        match json.loads(b"{" + body):
+            case {"rows": int(rows), "run": str(run), "stamp": [int(time), int(size)], "row": dict(row)}:
+                return [(run, Kept((time, size), row))] if rows == ROWS and sound(row) else []
+    except (ValueError, RecursionError):
+        pass
+    return []
+
+
+def sound(row: Mapping[str, Any]) -> bool:
+    """Whether a row has what every row has, and the types that its columns have."""
+    for column, value in row.items():
+        kind = type(value)
+        if kind is str:
+            odd = value not in INFINITE if numeric(column) else value and UNPRINTABLE.search(value)
+        elif kind is float:
+            odd = column in TEXTS or not math.isfinite(value)
+        elif kind is int:
+            odd = column in TEXTS or abs(value) >= MOST_EXACT
+        else:
+            odd = kind is not bool or numeric(column) or column in TEXTS
+        if odd or UNPRINTABLE.search(column):
+            return False
+    own = "run" in row or "fault" in row
+    return not own and type(row.get("solved")) is bool and all(row.get(column) for column in ALWAYS)

@@ -18,13 +18,11 @@ from symphys.findings.verdict import NOT_SOLVED
 from symphys.results.case_name import case_name
 from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.result import CheckRecord, Result
-from symphys.results.table.columns import COST, OUTPUT, UNFINISHED, UNREADABLE, Row, setting_column
+from symphys.results.table.columns import COST, MOST_EXACT, OUTPUT, UNFINISHED, UNREADABLE, Row, setting_column
 from symphys.results.text_files import ReportError, reason
 
 HEAVY = ("z", "trust")
 """Tables of result.json that no row needs."""
-MOST_EXACT = 2**53
-"""Whole numbers below are doubles, too."""
 WAITING = "there is no result yet: the run goes on, or was stopped before its end"
 
 
