@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -13,20 +14,26 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from symphys import files
 from symphys.version import __version__
 
 PACKAGES = ("casadi", "numpy", "scipy", "cma")
 """Whose versions decide the last digits of a result."""
 PATIENCE = 2.0
-"""[s] that git may take for an answer; without one the commit is not known."""
+"""[s] that a program of the system may take for an answer."""
+COMMIT = re.compile("[0-9a-f]{40}|[0-9a-f]{64}")
+MOST_LINKS = 5
+"""References that lead from one to the next."""
+MOST_LINE, MOST_PACKED = 4096, 64 * 2**20
+"""[bytes] of a file that holds one line, and of one that holds all references."""
 
 
 def provenance() -> dict[str, Any]:
     """The machine, this process and the working copy; what is not known is left out.
 
     Keys: "host", "processor", "python_platform" (that Python is built for), "pid", "peak_memory" [bytes] of this
-    process so far, "commit" of the working folder where it is in a git repository, "dirty", whether tracked files
-    differ from it.
+    process so far, "commit" of the working folder where it is in a git repository. Whether files differ from the
+    commit is not known: see ``working_copy``.
     """
     found = {**machine(), "pid": os.getpid(), "peak_memory": peak_memory(), **working_copy()}
     return {key: value for key, value in found.items() if value not in ("", None)}
@@ -82,20 +89,62 @@ def peak_memory() -> int | None:
 
 @cache
 def working_copy() -> dict[str, Any]:
-    """The "commit" of the folder in which this process works, and whether it is "dirty"; asked once per process.
+    """The "commit" of the folder in which this process works; read once per process, empty outside a git repository.
 
-    Empty without git or outside a repository. ``dirty`` is left out where git does not answer in time.
+    The files of the repository are read, and git is not asked: what is in a folder may name programs in its
+    ``.git/config`` that git runs as soon as it looks for changes (filters, hooks, fsmonitor).
     """
-    commit = git("rev-parse", "--verify", "HEAD")
-    if not commit:
+    try:
+        here = Path.cwd()
+        git = next((folder / ".git" for folder in (here, *here.parents) if (folder / ".git").exists()), None)
+        commit = commit_of(git) if git else ""
+    except (OSError, ValueError):  # a folder that is gone, or may not be looked into
         return {}
-    changed = git("status", "--porcelain", "--untracked-files=no")
-    return {"commit": commit} if changed is None else {"commit": commit, "dirty": bool(changed)}
+    return {"commit": commit} if commit else {}
 
 
-def git(*arguments: str) -> str | None:
-    """What git answers in the working folder, where it takes no locks and starts no helpers; None if it does not."""
-    return answer("git", "-c", "core.fsmonitor=false", "--no-optional-locks", *arguments)
+def commit_of(git: Path) -> str:
+    """The commit that is checked out; empty where there is none yet, or where it is not written in files like these."""
+    if not git.is_dir():  # of a worktree or a submodule: a file that names the folder
+        git = git.parent / named_in(git, "gitdir:")
+    common = git / (line_of(git / "commondir") or ".")
+    value = line_of(git / "HEAD")
+    for _ in range(MOST_LINKS):
+        if not value.startswith("ref:"):
+            break
+        name = value.removeprefix("ref:").strip()
+        if name.startswith("/") or ".." in name:
+            return ""
+        value = line_of(git / name) or line_of(common / name) or packed(common / "packed-refs", name)
+    return value if COMMIT.fullmatch(value) else ""
+
+
+def named_in(path: Path, key: str) -> str:
+    """What follows a word at the beginning of a file; empty if there is no such file."""
+    line = line_of(path)
+    return line.removeprefix(key).strip() if line.startswith(key) else ""
+
+
+def packed(path: Path, name: str) -> str:
+    """The commit of a reference in a list of many; empty if it is not there."""
+    rows = (line.split() for line in read(path, MOST_PACKED).splitlines())
+    return next((row[0] for row in rows if len(row) == 2 and row[1] == name), "")
+
+
+def line_of(path: Path) -> str:
+    """The text of a short file without spaces around it; empty if there is none."""
+    return read(path, MOST_LINE).strip()
+
+
+def read(path: Path, most: int) -> str:
+    """The text of a regular file of so many bytes at most; empty if there is none."""
+    try:
+        files.check_regular(path)
+        with path.open("rb") as file:
+            content = file.read(most + 1)
+    except (OSError, ValueError):
+        return ""
+    return content.decode(errors="replace") if len(content) <= most else ""
 
 
 def answer(program: str, *arguments: str) -> str | None:
