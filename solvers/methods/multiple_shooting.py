@@ -69,8 +69,9 @@ class MultipleShootingOptions(SolverOptions):
         tolerance: on the scaled optimality error of IPOPT or FATROP; defects are at most so large.
         steps_between_nodes: a node every so many steps; 0: so many that there are at most 40 intervals.
         backend: "ipopt" or "fatrop", which factorises stage after stage.
-        hessian: "gauss-newton" leaves the curvature of the steps out; "exact" has it, by differences of slopes, and is
-            what FATROP goes on with where it finds no step; "limited-memory" is IPOPT's own approximation.
+        hessian: "gauss-newton" leaves the curvature of the steps and of the constraints out; "exact" has it, by
+            differences of slopes, and is what FATROP goes on with where it finds no step; "limited-memory" is IPOPT's
+            own approximation. "auto": exact where a cost is no sum of squares, else gauss-newton.
         options: those of IPOPT, such as {mu_strategy = "adaptive"}, or of FATROP, passed on as they are.
     """
 
@@ -78,7 +79,7 @@ class MultipleShootingOptions(SolverOptions):
     tolerance: float = 1e-6
     steps_between_nodes: int = 0
     backend: Literal["ipopt", "fatrop"] = "ipopt"
-    hessian: Literal["gauss-newton", "exact", "limited-memory"] = "gauss-newton"
+    hessian: Literal["auto", "gauss-newton", "exact", "limited-memory"] = "auto"
     options: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -87,10 +88,17 @@ class MultipleShootingOptions(SolverOptions):
         at_least(0, iterations=self.iterations, steps_between_nodes=self.steps_between_nodes)
         require(0 < self.tolerance < math.inf, "tolerance", "above 0")
         require(self.backend in ("ipopt", "fatrop"), "backend", "ipopt or fatrop")
-        known = ("gauss-newton", "exact", "limited-memory")
-        require(self.hessian in known, "hessian", "gauss-newton, exact or limited-memory")
+        known = ("auto", "gauss-newton", "exact", "limited-memory")
+        require(self.hessian in known, "hessian", "auto, gauss-newton, exact or limited-memory")
         taken = self.backend == "ipopt" or self.hessian != "limited-memory"
-        require(taken, "hessian", "gauss-newton or exact with backend = fatrop")
+        require(taken, "hessian", "auto, gauss-newton or exact with backend = fatrop")
+
+    def exact(self, squares: bool) -> bool:
+        """Whether Hessians are exact; ``squares``: whether every cost is a sum of squares.
+
+        Gauss-Newton has no curvature for a cost such as the duration: all of it is in steps and constraints.
+        """
+        return self.hessian == "exact" or (self.hessian == "auto" and not squares)
 
 
 @dataclass(frozen=True)
@@ -130,7 +138,7 @@ def stage(
     point = None if saved else evaluator.value(state.z)
     if point is not None and not point.finite and not evaluator.problem.guessed_states:
         return not_finite(point)
-    layout_in_stages, exact = options.backend == "fatrop", options.hessian == "exact"
+    layout_in_stages, exact = options.backend == "fatrop", options.exact(problem.squares)
     programs = Programs(problem, grid, evaluator, state.z, state.nodes, layout_in_stages, exact)
     if point is not None:
         state = warm_started(context, programs.at(state.nodes), state)

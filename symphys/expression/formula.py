@@ -9,7 +9,7 @@ from typing import Any, Literal
 import casadi as ca
 
 from symphys.expression.columns import Expr
-from symphys.expression.tree import Node, evaluate
+from symphys.expression.tree import Node, evaluate, renamed
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,11 @@ class Formula:
         """Every name of a quantity that it needs, those in its parts too."""
         own = self.names - {part.name for part in self.parts}
         return own.union(*(part.formula.names for part in self.parts))
+
+    def renamed(self, names: Mapping[str, str]) -> Formula:
+        """The formula of an instant with other names in place of some; its text stays as written."""
+        needed = frozenset(names.get(name, name) for name in self.names)
+        return Formula(self.text, needed, renamed(self.root, names))
 
     def evaluate(self, namespace: Mapping[str, Any]) -> Expr:
         """The value as a dense casadi column (n,) of SX, MX or DM; (1,) for a number.

@@ -46,6 +46,15 @@ def evaluate(node: Node, namespace: Mapping[str, Any]) -> Expr:
     return call(node.function, [evaluate(argument, namespace) for argument in node.arguments], node.piece)
 
 
+def renamed(node: Node, names: Mapping[str, str]) -> Node:
+    """The tree with other names in place of some."""
+    if isinstance(node, Reference):
+        return Reference(names.get(node.name, node.name))
+    if isinstance(node, Apply):
+        return Apply(node.function, tuple(renamed(argument, names) for argument in node.arguments), node.piece)
+    return node
+
+
 def look_up(name: str, namespace: Mapping[str, Any]) -> Expr:
     """The value of a name; FormulaError that says which names come close."""
     if name not in namespace:

@@ -187,6 +187,7 @@ class Examination:
             everything is met.
         contradicting: names of targets that cannot all be met nearby.
         opposed: names of targets whose gradients cancel.
+        outweighed: names of missed targets that the costs hold back.
         bounds: those that hold the answer back.
         fault: where the first number that is not finite comes from; empty if all are finite.
     """
@@ -228,6 +229,7 @@ class Examination:
     unknowns: float = np.nan
     contradicting: tuple[str, ...] = ()
     opposed: tuple[str, ...] = ()
+    outweighed: tuple[str, ...] = ()
     bounds: tuple[HeldBound, ...] = ()
     fault: str = ""
 

@@ -1,4 +1,4 @@
-"""What stands in the way of an answer: targets that contradict or oppose each other, too many equations, bounds."""
+"""What stands in the way of an answer: targets in conflict, costs that hold them back, too many equations, bounds."""
 
 from __future__ import annotations
 
@@ -21,6 +21,10 @@ OPPOSED = (
     "{names} hold each other: here, what brings one nearer takes another away as much; give the one that matters more "
     "weight, allow another more tolerance, or let more vary"
 )
+OUTWEIGHED = (
+    "the costs hold {names} back: a [[target]] is a penalty beside them, so weigh it more (`weight`), or state a "
+    "[[constraint]] in its place"
+)
 EQUATIONS = "More equations than numbers that may vary: all are met only where some of them depend on each other."
 HELD = "It ends there, and what is minimised falls beyond: the bound holds it back. Widen it, if it may be wider."
 
@@ -29,10 +33,14 @@ def obstacle_findings(trust: Examination, judged: Judged) -> list[Finding]:
     """Every line on what stands in the way; of targets only where something is missed."""
     lines = []
     if not judged.met:
-        kinds = ((trust.contradicting, "contradict", CONTRADICTING), (against(trust), "oppose", OPPOSED))
-        for names, verb, clause in kinds:
+        kinds = (
+            (trust.contradicting, "that contradict each other", CONTRADICTING),
+            (against(trust), "that oppose each other", OPPOSED),
+            (trust.outweighed, "that costs hold back", OUTWEIGHED),
+        )
+        for names, which, clause in kinds:
             if names:
-                what, number = f"Targets that {verb} each other", several(len(names), "target")
+                what, number = f"Targets {which}", several(len(names), "target")
                 lines.append(Finding(TARGETS, FAIR, what, number, capital(said_of(names, clause)) + "."))
         if trust.equations > trust.unknowns:
             number = f"{show(trust.equations)} for {several(int(trust.unknowns), 'unknown')}"
@@ -50,6 +58,8 @@ def obstacles(trust: Examination, judged: Judged) -> tuple[str, ...]:
             clauses.append(said_of(trust.contradicting, CONTRADICTING))
         if against(trust):
             clauses.append(said_of(against(trust), OPPOSED))
+        if trust.outweighed:
+            clauses.append(said_of(trust.outweighed, OUTWEIGHED))
     bounds = holding(trust, judged)
     if bounds:
         named = [bound_words(bound) for bound in bounds[:MOST_BOUNDS]]

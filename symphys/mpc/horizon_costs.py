@@ -28,6 +28,12 @@ Expr = Any
 """casadi SX"""
 
 
+DRIVEN = (
+    "names an input that a controller or force law adds to, beside a state: a plan has no such sum at the end of a "
+    "step; name the variable (its part of the input), or leave the state out"
+)
+
+
 @dataclass(frozen=True)
 class QuadraticCosts:
     """Costs about a motion, of (state k, decisions k) together; n + w numbers.
@@ -61,7 +67,7 @@ class HorizonCosts:
             weights: (m, w): the inputs of a step are weights @ v.
 
         Raises:
-            ProblemError: for a term that looks at more than one state, one input and the time.
+            ProblemError: for a term of the inputs that controllers or force laws drive, and of the state after them.
         """
         rollout = symbols.rollout
         self._steps, self._dt = rollout.steps, rollout.dt
@@ -102,8 +108,7 @@ class _Asked:
         self._dt = symbols.rollout.dt
         own = ca.vertcat(symbols.x, symbols.u, symbols.p, symbols.tick)
         if not set(_names(term.value)) <= set(_names(own)):
-            text = "looks at more than a state, an input and the time, as a receding horizon cannot"
-            raise ProblemError(symbols.rollout.problem.file, [Issue(term.name, text)])
+            raise ProblemError(symbols.rollout.problem.file, [Issue(term.name, DRIVEN)])
         arguments = [symbols.x, symbols.u, symbols.p, symbols.tick]
         self._value = ca.Function("term", arguments, [ca.densify(term.value)])
         self.by_inputs = bool(self._value.jac_sparsity(0, 1).nnz())

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from symphys.errors import Issue, ProblemError
 from symphys.problem import Problem, ProblemData, RecedingHorizon, Variable
 from symphys.suggest import quote
+from symphys.transcription.formula_names import now
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ def horizon_of(problem: ProblemData) -> RecedingHorizon:
 def receding_model(problem: Problem) -> Problem:
     """The problem over one horizon: its costs and constraints from now on, its targets at the end of the plan.
 
-    Every control has a knot for each step of the model, which holds over it.
+    Every control has a knot for each step of the model, which holds over it; its name is its value at that step.
 
     Raises:
         ProblemError: the problem has no [mpc], or asks for what has no meaning in a horizon that moves.
@@ -40,7 +41,12 @@ def receding_model(problem: Problem) -> Problem:
     smoothing = (horizon.smoothing,)
     simulation = replace(problem.simulation, duration=horizon.horizon, dt=horizon.dt, smoothing=smoothing)
     variables = tuple(resampled(each, problem, horizon) for each in problem.variables)
-    return replace(problem, simulation=simulation, variables=variables, outputs=(), goal=None)
+    names = {each.name: now(each.name) for each in problem.variables}
+    asked: dict[str, Any] = {
+        kind: tuple(replace(each, formula=each.formula.renamed(names)) for each in getattr(problem, kind))
+        for kind in ("costs", "targets", "constraints")
+    }
+    return replace(problem, simulation=simulation, variables=variables, outputs=(), goal=None, **asked)
 
 
 def fixed_times(problem: ProblemData) -> list[Issue]:
@@ -54,6 +60,7 @@ def fixed_times(problem: ProblemData) -> list[Issue]:
         ("target", problem.targets),
         ("constraint", problem.constraints),
     )
+    controls = {each.name for each in problem.variables if each.kind == "control"}
     for kind, tables in kinds:
         for each in tables:
             if not isinstance(each.at, str):
@@ -63,6 +70,10 @@ def fixed_times(problem: ProblemData) -> list[Issue]:
             elif each.formula.parts:
                 text = f"takes {', '.join(part.name for part in each.formula.parts)} of the whole motion, but {moving}"
                 found.append(Issue(f'{kind} "{each.name}"', text))
+            elif each.at == "end" and controls & each.formula.names:
+                named = ", ".join(sorted(controls & each.formula.names))
+                text = f'names {named} at the end, where a plan decides nothing more; take at = "always"'
+                found.append(Issue(f'{kind} "{each.name}".at', text))
     return found
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen import processors
+from symphys.errors import Issue, ProblemError, SymphysError
 from symphys.mpc.horizon_costs import HorizonCosts, QuadraticCosts
 from symphys.mpc.model import horizon_of, receding_model
 from symphys.problem import Problem
@@ -110,7 +111,12 @@ class Planner:
         self._guess = stacked["guess"]
         self.lower, self.upper, self.scale = (stacked[key][0] for key in ("lower", "upper", "scale"))
         self.start, self.p, self.weights = begun(self.rollout, self._order)
-        self._costs = HorizonCosts(symbols, self.tangent, stage_terms(symbols), self.weights)
+        try:
+            terms = stage_terms(symbols)
+        except SymphysError as error:  # of a formula whose sizes do not fit
+            text = f"{error}; in a plan the name of a variable is its value at one instant"
+            raise ProblemError(problem.file, [Issue("mpc", text)]) from None
+        self._costs = HorizonCosts(symbols, self.tangent, terms, self.weights)
         steps, (inputs, width) = self.rollout.steps, self.weights.shape
         self._rolled = PolicyRollout(self._step, PolicySizes(0, width, inputs), self._costs)
         self._bounds = np.tile(self.lower, (steps, 1)), np.tile(self.upper, (steps, 1))

@@ -38,6 +38,7 @@ from symphys.problem.quantities import (
 )
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
+from symphys.problem.reading.range_of_numbers import check_range
 from symphys.problem.recordings.kept import recorded_appendix
 from symphys.problem.recordings.reading import read_identification, with_duration
 from symphys.problem.references import read_references, reference_values
@@ -89,7 +90,9 @@ OWN_NAMES = ("phase", "cost", "target", "constraint", "output", "scenario")
 
 
 def read_document(data: Mapping[str, Any], faults: Faults) -> Document:
-    """Tables and keys of the right kinds, with names that are unique."""
+    """Tables and keys of the right kinds, with names that are unique, and numbers that can be computed with."""
+    check_range(data, faults)
+    faults.stop_if_any()
     try:
         document = Document.model_validate(data)
     except ValidationError as error:

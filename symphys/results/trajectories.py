@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from symphys import json_values as values
-from symphys.results.archives import MOST_BYTES, NUMBER, read_archive
+from symphys.archives import MOST_BYTES, NUMBER
+from symphys.results.archives import read_archive
 from symphys.results.drawable import largest, oversized
 from symphys.results.text_files import ReportError
 from symphys.trajectory import Array, Trajectory, shapes

@@ -132,8 +132,11 @@ def judge(
         return Judgement(None, None, None, f"{outcome.advice} {error}".strip())
     smoothed = outcome.status is Status.MET and not verdict.solved and outcome.trace[-1].smoothing > 0
     well = verdict.solved and outcome.status in (Status.MET, Status.CONVERGED)
-    found = () if well else obstacles(Examination.from_json(files.strict(examined or {})), judged(verdict))
-    return Judgement(verdict, taken.motion, examined, told([*found, outcome.advice or SMOOTHED * smoothed]))
+    known = Examination.from_json(files.strict(examined or {}))
+    found = () if well else obstacles(known, judged(verdict))
+    # more iterations do not help where the costs outweigh a target
+    rest = "" if found and known.outweighed else outcome.advice or SMOOTHED * smoothed
+    return Judgement(verdict, taken.motion, examined, told([*found, rest]))
 
 
 def told(clauses: list[str]) -> str:

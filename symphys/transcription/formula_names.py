@@ -141,6 +141,8 @@ def compile_formula(
     names = namespace(problem, world, inputs, parameters, memory, at, formula.names)
     for variable, (start, stop) in zip(problem.variables, spans(problem.variables), strict=True):
         names[variable.name] = at.z[start:stop]
+        if variable.kind == "control":
+            names[now(variable.name)] = _acting(world, inputs, variable, at.u)
     arguments, parts = at.arguments(), []
     for part in formula.parts:
         size = compile_formula(problem, world, inputs, parameters, memory, part.formula).size1_out(0)
@@ -148,6 +150,17 @@ def compile_formula(
         parts.append(names[part.name])
     value = formula.evaluate({name: names[name] for name in formula.names})
     return ca.Function("formula", [*arguments, *([ca.vertcat(*parts)] if parts else [])], [ca.SX(value)])
+
+
+def now(name: str) -> str:
+    """The name of what a control variable is at one instant; its own name is all of its knots."""
+    return f"{name} now"
+
+
+def _acting(world: World, inputs: Sequence[str], variable: Variable, u: Expr) -> Expr:
+    """(components,) what a control variable is at an instant whose inputs are ``u``."""
+    slot = variable.slots[0]
+    return u[input_columns(world, inputs)[slot.name]][list(slot.components)]
 
 
 def namespace(

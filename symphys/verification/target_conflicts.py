@@ -1,4 +1,7 @@
-"""Targets that cannot be met together: counted against the unknowns, contradicting near z, or opposed at z."""
+"""Targets that cannot be met together: counted against the unknowns, contradicting near z, or opposed at z.
+
+A target is a penalty beside the costs: those that the costs hold back are found too.
+"""
 
 from __future__ import annotations
 
@@ -32,6 +35,10 @@ STILL = 1e-9
 """A component that changes by less, relative to 1 + its size, does not change."""
 OPPOSED = 1e-2
 """Gradients whose sum is below this share of the sum of their lengths hold each other."""
+BALANCED = 0.05
+"""The gradients of targets and of all else cancel where their sum is below this share of the sum of their lengths."""
+NEARER = 0.5
+"""A step towards targets that can be met leaves less than this share of what is missed; a linear one leaves 0.25."""
 SHARE = 0.05
 """Who takes part in less than this share of the largest part is not named."""
 
@@ -59,25 +66,29 @@ def target_conflicts(transcription: Transcription, record: Record) -> dict[str, 
         "equations", the number of components of all targets, and "unknowns", that of the components of z that may vary;
         0 equations where everything is met. "contradicting": names of targets that cannot all be met as long as the
         motion changes with z as it does nearby, since some combination of their values stays the same, and too large.
-        "opposed": names of targets whose gradients cancel at z: what brings one nearer takes another away. Both are
-        empty where none was found, or for problems with large nets.
+        "opposed": names of targets whose gradients cancel at z: what brings one nearer takes another away.
+        "outweighed": names of missed targets whose gradients the costs' gradient cancels, though a step would bring
+        them nearer. All are empty where none was found, or for problems with large nets.
     """
     shooting = transcription.shooting
+    nothing: dict[str, Any] = {"contradicting": [], "opposed": [], "outweighed": []}
     functions = [transcription.rollout.compiled(target.formula) for target in transcription.problem.targets]
     samples = target_samples(transcription.rollout, record, functions)
     if not any(sample.missed for sample in samples):
-        return {"equations": 0, "unknowns": 0, "contradicting": [], "opposed": []}
+        return {"equations": 0, "unknowns": 0, **nothing}
     free = shooting.stacked("lower") < shooting.stacked("upper")
     found = {"equations": sum(sample.value.size for sample in samples), "unknowns": int(free.sum())}
-    slopes = target_slopes(transcription, record, samples) if len(samples) > 1 else None
+    rivals = len(samples) > 1 or bool(transcription.problem.costs)
+    slopes = target_slopes(transcription, record, samples) if rivals else None
     if slopes is None or not np.isfinite(slopes).all():
-        return found | {"contradicting": [], "opposed": []}
+        return found | nothing
     names = [sample.target.name for sample in samples]
     held = opposed(slopes * shooting.stacked("scale"), pushed(shooting, record.z, slopes.sum(axis=0)) | ~free)
     missed = any(samples[i].missed for i in held)
     return found | {
         "contradicting": [names[i] for i in contradicting(transcription, samples, record.z, free)],
         "opposed": [names[i] for i in held if missed],
+        "outweighed": [names[i] for i in outweighed(transcription, record, samples, slopes)],
     }
 
 
@@ -147,6 +158,40 @@ def opposed(slopes: Array, fixed: NDArray[np.bool_]) -> list[int]:
         return []
     parts = np.flatnonzero(lengths > max(SHARE * float(lengths.max(initial=0.0)), STILL))
     return parts.tolist() if parts.size > 1 else []
+
+
+def outweighed(
+    transcription: Transcription, record: Record, samples: Sequence[TargetSample], slopes: Array
+) -> list[int]:
+    """Which missed targets the costs hold back at z: their gradients (T, n) cancel that of all else.
+
+    Where no point nearby meets the targets better, the costs are not to blame: this is tried with one step down the
+    targets' gradient, to where it would be halfway to 0 if it were linear.
+    """
+    shooting, missed = transcription.shooting, [i for i, sample in enumerate(samples) if sample.missed]
+    values = shooting.evaluator.gradient(record.z[None], 0.0) if transcription.problem.costs else None
+    if values is None or values.gradient is None or shooting.violation(values.errors[0]) > 0:
+        return []
+    scale, whole = shooting.stacked("scale"), values.gradient[0]
+    fixed = pushed(shooting, record.z, whole) | (shooting.stacked("lower") == shooting.stacked("upper"))
+    own, total = (np.where(fixed, 0.0, slope * scale) for slope in (slopes[missed].sum(axis=0), whole))
+    sizes = float(np.linalg.norm(own)) + float(np.linalg.norm(total - own))
+    if not (own.any() and float(np.linalg.norm(total)) <= BALANCED * sizes):
+        return []
+    height = penalty([samples[i] for i in missed])
+    step = height / float(own @ own) * own * scale
+    z = np.clip(record.z - step, shooting.stacked("lower"), shooting.stacked("upper"))
+    try:
+        beside = transcription.record(z)
+    except NotFinite:
+        return []
+    nearer = target_samples(transcription.rollout, beside, [sample.function for sample in samples])
+    return missed if penalty([nearer[i] for i in missed]) < NEARER * height else []
+
+
+def penalty(samples: Sequence[TargetSample]) -> float:
+    """The sum of weight * |value|^2 of targets, as the objective has it."""
+    return float(sum(each.target.weight * float(each.value @ each.value) for each in samples))
 
 
 def contradicting(

@@ -38,6 +38,14 @@ def test_opposed_targets_are_named_unless_they_contradict_each_other_anyway() ->
     assert obstacles(trust, MET) == ()
 
 
+def test_targets_that_costs_hold_back_are_said_to_be_penalties() -> None:
+    trust = Examination(outweighed=("there",))
+    (clause,) = obstacles(trust, MISSED)
+    assert '"there" back' in clause and "[[constraint]]" in clause and "`weight`" in clause
+    assert [line.what for line in obstacle_findings(trust, MISSED)] == ["Targets that costs hold back"]
+    assert obstacles(trust, MET) == ()
+
+
 @pytest.mark.parametrize(("equations", "unknowns", "said"), [(8, 3, True), (3, 3, False), (math.nan, math.nan, False)])
 def test_more_equations_than_unknowns_are_a_note_with_both_numbers(
     equations: float, unknowns: float, said: bool

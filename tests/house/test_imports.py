@@ -23,6 +23,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "interrupts": ("", "", "Ctrl-C"),
     "threads": ("", "", "one thread for linear algebra"),
     "files": ("errors", "numpy", "files appear at once and whole, or not at all"),
+    "archives": ("suggest", "numpy", "archives of arrays, whose sizes are known before they are unpacked"),
     "json_values": ("", "numpy", "tolerant readings of JSON"),
     "trajectory": ("errors suggest", "numpy", "a simulated motion as arrays"),
     "shooting": ("", "numpy", "what solvers see: the shooting problem, whole or step by step"),
@@ -37,7 +38,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "other programs' models of robots as tables",
     ),
     "problem": (
-        "dynamics errors expression files importing later maths model problems suggest",
+        "archives dynamics errors expression files importing later maths model problems suggest",
         "casadi numpy pydantic pydantic_core scipy tomli_w",
         "problem file to problem; of the dynamics only what is observed",
     ),
@@ -60,7 +61,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "solvers": ("errors shooting", "casadi cma numpy scipy", "optimisation methods"),
     "findings": ("json_values", "numpy", "what the numbers of an examination mean"),
     "results": (
-        "errors files findings json_values model problem shooting suggest trajectory verbs",
+        "archives errors files findings json_values model problem shooting suggest trajectory verbs",
         "casadi numpy pandas pyarrow scipy",
         "what a run folder holds",
     ),

@@ -146,9 +146,32 @@ def test_a_cost_in_time_sees_the_time_of_the_tick() -> None:
         assert cost == pytest.approx(0.08 * np.sum(squares[1:] + squares[:-1]) / 2, rel=1e-9)
 
 
+def with_cost(**cost: str) -> dict[str, object]:
+    return {"cost": [*TABLES["cost"][::2], {"name": "effort", "weight": 0.03, **cost}]}
+
+
+def test_a_control_may_be_named_by_its_variable() -> None:
+    """``twist`` is what it sets, ``pivot.command``, at the step that is looked at: plans cost the same."""
+    made = Planner(problem_of_tables({**TABLES, **with_cost(at="always", squares="twist")}, "pendulum"), threads=1)
+    assert made.first(made.start, 0.0).cost == pytest.approx(planner().first(planner().start, 0.0).cost, rel=1e-12)
+
+
+def test_the_part_of_a_driven_input_that_a_variable_sets_goes_by_its_name() -> None:
+    """The sum of both is not known at the end of a step, and the message says what to write."""
+    brake = {"name": "brake", "on": "bob.torque", "value": "-brake.c * bob.angular_velocity", "numbers": {"c": 0.1}}
+    push = {"name": "push", "sets": "bob.torque[1]", "knots": 20}
+    tables = {**TABLES, "force": [brake], "variable": [*TABLES["variable"], push]}
+    Planner(problem_of_tables({**tables, **with_cost(at="always", squares="bob.position[2] * push")}, "p"), threads=1)
+    driven = {**tables, **with_cost(at="always", squares="bob.position[2] * bob.torque[1]")}
+    with pytest.raises(ProblemError, match=r"effort: names an input that .* force law adds to.*name the variable"):
+        Planner(problem_of_tables(driven, "p"), threads=1)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
+        (with_cost(at="end", squares="twist"), 'cost "effort".at: names twist at the end.*"always"'),
+        (with_cost(at="always", squares="twist[3]"), "the name of a variable is its value at one instant"),
         ({"mpc": None}, "there is no such table"),
         ({"variable": [{"name": "push", "sets": "bob.velocity[0]"}]}, "decides forces, torques and commands only"),
         ({"cost": [{"name": "then", "at": 0.5, "squares": "pivot.angle"}]}, "a horizon moves on"),

@@ -153,8 +153,8 @@ def test_fatrop_takes_no_constraint_across_intervals() -> None:
     ("bad", "message"),
     [
         ({"backend": "snopt"}, "backend must be ipopt or fatrop"),
-        ({"hessian": "none"}, "hessian must be gauss-newton, exact or limited-memory"),
-        ({"hessian": "limited-memory", "backend": "fatrop"}, "hessian must be gauss-newton or exact with"),
+        ({"hessian": "none"}, "hessian must be auto, gauss-newton, exact or limited-memory"),
+        ({"hessian": "limited-memory", "backend": "fatrop"}, "hessian must be auto, gauss-newton or exact with"),
         ({"steps_between_nodes": -1}, "steps_between_nodes must be at least 0"),
         ({"tolerance": 0.0}, "tolerance must be above 0"),
     ],

@@ -68,7 +68,26 @@ def test_three_targets_may_contradict_each_other_where_no_two_do(make: Make) -> 
 
 def test_nothing_is_said_where_everything_is_met(make: Make) -> None:
     found = conflicts(make, problem(NEAR, ("again", "ball.position[0] - 0.3")), [1.5, 0.0])
-    assert found == {"equations": 0, "unknowns": 0, "contradicting": [], "opposed": []}
+    assert found == {"equations": 0, "unknowns": 0, "contradicting": [], "opposed": [], "outweighed": []}
+
+
+@pytest.mark.parametrize(
+    ("target", "cost", "speed", "named"),
+    [
+        ("ball.position[0] - 0.3", "ball.velocity[0]**2", 0.06 / 1.04, True),  # least v^2 + (0.2 v - 0.3)^2
+        ("ball.position[0] - 0.3", "0.05 * ball.velocity[0]", 0.875, True),  # least 0.05 v + (0.2 v - 0.3)^2
+        ("ball.position[0] - 0.3", "ball.velocity[0]**2", 0.5, False),  # on the way to it
+        ("cos(ball.position[0]) - 3", "1e-3 * (ball.velocity[0] - 1)**2", 1 / 81, False),  # no speed meets it
+        ("ball.position[0] - 0.3", "1e-6 * ball.velocity[0]**2", 1.5, False),  # met
+    ],
+)
+def test_targets_that_costs_hold_back_are_named_where_the_sum_is_least(
+    make: Make, target: str, cost: str, speed: float, named: bool
+) -> None:
+    """A target is a penalty: the minimum of the sum misses it, and more weight would bring it nearer."""
+    costs = f'[[cost]]\nname = "slow"\nvalue = "{cost}"\nat = "end"\n'
+    found = conflicts(make, problem(("near", target), more=costs), [speed, 0.0])
+    assert found["outweighed"] == (["near"] if named else [])
 
 
 def test_equations_and_unknowns_are_counted(make: Make) -> None:

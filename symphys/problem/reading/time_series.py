@@ -5,15 +5,16 @@ from __future__ import annotations
 import csv
 import io
 import re
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.archives import ArchiveError, read_arrays
 from symphys.errors import ProblemError
 from symphys.files import check_regular
+from symphys.problem.reading.range_of_numbers import LARGEST, TOO_LARGE
 from symphys.problem.reading.source import read_source
 from symphys.problem.schema.checks import IDENTIFIER
 from symphys.suggest import quote
@@ -22,6 +23,8 @@ Array = NDArray[np.float64]
 TIME = "time"
 LEAST_ROWS, MOST_ROWS = 2, 1000
 """Each row is looked at in every evaluation of a formula."""
+MOST_BYTES = 10**7
+"""Of the arrays of an NPZ file; a thousand rows of a thousand columns."""
 
 
 class SeriesError(ValueError):
@@ -34,16 +37,18 @@ def series_text(path: Path) -> str:
         if path.suffix.lower() != ".npz":
             return read_source(path)
         check_regular(path)
-        with np.load(path, allow_pickle=False) as file:
-            columns = {name: np.asarray(file[name]) for name in file.files}
+        with path.open("rb") as file:
+            _, columns = read_arrays(file, most=MOST_BYTES)
     except ProblemError as error:
         raise SeriesError(f"{path}: {error.issues[0].message}") from None
-    except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
-        reason = getattr(error, "strerror", None) or "it is no .npz file of numbers"
+    except (OSError, ArchiveError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
         raise SeriesError(f"{path} cannot be read: {reason}") from None
     for name, column in columns.items():
         if column.dtype.kind not in "fiu" or column.ndim != 1:
             raise SeriesError(f"{path}, array {quote(name)}: must be numbers, one for each time, not {column.shape}")
+        if column.size > MOST_ROWS:
+            raise SeriesError(f"{path} has {column.size} rows of numbers; {LEAST_ROWS} to {MOST_ROWS} are allowed")
     return written({name: column.tolist() for name, column in columns.items()}, str(path))
 
 
@@ -87,4 +92,6 @@ def number(cell: str, where: str) -> float:
         raise SeriesError(f"{where}: {quote(cell.strip())} is no number") from None
     if not np.isfinite(value):
         raise SeriesError(f"{where}: {quote(cell.strip())} is not finite")
+    if abs(value) > LARGEST:
+        raise SeriesError(f"{where}: {quote(cell.strip())} {TOO_LARGE}")
     return value

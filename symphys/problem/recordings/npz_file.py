@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.archives import ArchiveError, read_arrays
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.suggest import quote
 
 Array = NDArray[np.float64]
+MOST_BYTES = 2**29
+"""That the arrays of one recording may take: some 67 million numbers."""
 
 
 def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -> tuple[RecordedColumns, Array | None]:
@@ -28,29 +29,14 @@ def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -
         RecordingFault: names the array.
     """
     try:
-        file = np.load(stream, allow_pickle=False)
-        if not isinstance(file, np.lib.npyio.NpzFile):
-            raise RecordingFault("files", f"{label} holds one array; an NPZ file of arrays by name is wanted")
-        with file:
-            names = tuple(file.files)
-            found = {name: numbers(file[name], name, label) for name in names if name in wanted}
-            starts = None if rows is None or rows not in names else numbers(file[rows], rows, label)
-    except RecordingFault:
-        raise
-    except (
-        OSError,
-        ValueError,
-        EOFError,
-        KeyError,
-        MemoryError,
-        RuntimeError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
-        reason = (
-            "its arrays do not fit into memory" if isinstance(error, MemoryError) else "it is no NPZ file of numbers"
-        )
-        raise RecordingFault("files", f"{label} cannot be read: {reason}") from None
+        names, arrays = read_arrays(stream, wanted if rows is None else {*wanted, rows}, MOST_BYTES)
+    except OSError as error:
+        raise RecordingFault("files", f"{label} cannot be read: {error.strerror or 'it is no NPZ file'}") from None
+    except ArchiveError as error:
+        raise RecordingFault("files", f"{label} cannot be read: {error}") from None
+    checked = {name: numbers(array, name, label) for name, array in arrays.items()}
+    found = {name: values for name, values in checked.items() if name in wanted}
+    starts = None if rows is None else checked.get(rows)
     counts = {name: len(values) for name, values in found.items()}
     if len(set(counts.values())) > 1:
         sizes = ", ".join(f"{name} {count}" for name, count in counts.items())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.archives import ArchiveError, OtherShape, read_array
 from symphys.expression import Formula, FormulaError, parse
 from symphys.files import check_regular
 from symphys.model.controllers import ControlLaw, Custom, Linear, Net, Periodic
@@ -231,17 +231,20 @@ def read_weights(faults: Faults, place: Place, name: str, net: Net) -> Array:
     try:
         check_regular(path)
         with path.open("rb") as file:
-            array = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError, MemoryError, zipfile.BadZipFile) as error:
-        reason = getattr(error, "strerror", None) or "it is no .npy file of numbers"
-        faults.add(place, f"{path} cannot be read: {reason}")
+            array = read_array(file, (count,))
+    except OSError as error:
+        faults.add(place, f"{path} cannot be read: {error.strerror or error}")
         return np.zeros(count)
-    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
-        faults.add(place, f"{path} does not hold one array of numbers")
-    elif array.size != count or array.ndim != 1:
+    except OtherShape as error:
         layers = ", ".join(f"{layer.outputs} x {layer.inputs}" for layer in net.layers())
-        text = f"has the shape {array.shape}; the net has {count} weights, so ({count},) is needed: matrices {layers}"
+        text = f"has the shape {error}; the net has {count} weights, so ({count},) is needed: matrices {layers}"
         faults.add(place, f"{path} {text}{' with biases' if net.biases else ''}")
+        return np.zeros(count)
+    except ArchiveError:
+        faults.add(place, f"{path} cannot be read: it is no .npy file of numbers")
+        return np.zeros(count)
+    if array.dtype.kind not in "fiu":
+        faults.add(place, f"{path} does not hold one array of numbers")
     elif not np.isfinite(array).all():
         k = int(np.argmax(~np.isfinite(array)))
         faults.add(place, f"{path} holds numbers that are not finite; the first is number {k}")

@@ -166,7 +166,10 @@ def test_other_units_are_told(factor: float, unit: str) -> None:
         ({"time": [0, 0.1], "z": [1.0, 1.0, 1.0]}, "a.npz: all arrays need as many rows; there are: time 2, z 3"),
         ({"time": [0, 0.1], "z": ["a", "b"]}, 'a.npz, array "z": must be numbers, a row for each time, not <U1'),
         ({"time": [0, 0.1], "z": np.ones((2, 1, 1))}, 'array "z": must be numbers, a row for each time'),
-        ({"time": [0, 0.1], "z": np.array([1.0, None])}, "a.npz cannot be read: it is no NPZ file of numbers"),
+        (
+            {"time": [0, 0.1], "z": np.array([1.0, None])},
+            'a.npz cannot be read: "z" holds objects of Python, not numbers',
+        ),
         ({"time": [0, 0.1], "z": [1.0, np.inf]}, 'array "z", row 1 (from 0): is not finite'),
         ({"time": [], "z": []}, "a.npz has no row of numbers"),
         ({"time": [0, 0.1], "height": [1.0, 1.0]}, 'a.npz has no column "z"'),
@@ -191,8 +194,8 @@ def test_npz_files_that_are_cut_pickled_or_empty(tmp_path: Path) -> None:
     contents["array"] = (lambda out: (np.save(out, [1.0, 2.0]), out.getvalue())[1])(io.BytesIO())
     for name, content in contents.items():
         (tmp_path / f"{name}.npz").write_bytes(content)
-        expected = "holds one array" if name == "array" else "cannot be read: it is no NPZ file of numbers"
-        with pytest.raises(ProblemError, match=f"{name}.npz {expected}"):
+        expected = "it holds one array" if name == "array" else "it is no NPZ file of numbers"
+        with pytest.raises(ProblemError, match=f"{name}.npz cannot be read: {expected}"):
             beside(tmp_path, {"files": f"{name}.npz"})
     np.savez(tmp_path / "objects.npz", time=[0, 0.1], z=np.array([Touches(run), 1.0], object))
     with pytest.raises(ProblemError, match=r"objects\.npz cannot be read"):
