@@ -101,12 +101,16 @@ class Corrected:
         arrived: of each body of a tree where it comes to.
         made: of each body of a tree what joints did to its displacement. Velocities are not touched.
         turned: of each tree, by its root, what joints did to the displacements of its rotors.
+        along: of each joint of a tree by how much its coordinates went on (count,) [rad] or [m].
+        turning: (3,) [rad] of each body on other joints its rotation.
     """
 
     shifts: Mapping[int, Displacement]
     arrived: Mapping[int, FinalPose]
     made: Mapping[int, JointCorrection]
     turned: Mapping[int, RotorCorrection]
+    along: Mapping[int, Expr]
+    turning: Mapping[int, Expr]
 
 
 def close_gaps(
@@ -144,17 +148,20 @@ def _closed(
 ) -> Corrected:
     shifts = {i: each for i, each in enumerate(along) if isinstance(each, Displacement)}
     arrived, made, joints = dict[int, FinalPose](), dict[int, JointCorrection](), context.world.joints
-    turned = dict[int, RotorCorrection]()
+    turned, moved = dict[int, RotorCorrection](), dict[int, Expr]()
     for tree, coordinates in zip(kinematic_trees(joints), trees.coordinates, strict=True):
         ended = along[tree.root]
         assert isinstance(ended, GeneralizedVelocities)
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         motions = [trees.motions[i] for i in tree.bodies]
         corrected = update_configuration(tree, own, coordinates, motions, ended, by_loops[tree.root])
-        places, gained, turned[tree.root] = corrected
+        places, gained, turned[tree.root], rates = corrected
+        moved |= {link.joint: rate for link, rate in zip(tree.links, rates, strict=True) if link.joint is not None}
         arrived |= zip(tree.bodies, places, strict=True)
         made |= zip(tree.bodies, gained, strict=True)
-    return Corrected(shifts, arrived, made, turned)
+    loose = {i for k, joint in enumerate(joints) if k not in moved for i in joint.bodies}
+    turning = {i: displaced(trees.motions[i].jacobian, along[trees.carriers[i]]).angular for i in sorted(loose)}
+    return Corrected(shifts, arrived, made, turned, moved, turning)
 
 
 Pushed = tuple[tuple[TreeDisplacement, ...], tuple[Expr, ...]]

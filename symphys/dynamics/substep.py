@@ -19,11 +19,13 @@ from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.free_rotation import turned
 from symphys.dynamics.joints.assembly import (
     joint_constraints,
+    joint_paths,
     momenta_of,
     prepare_trees,
     warm_started,
 )
 from symphys.dynamics.joints.loop_closure import TreeDisplacement
+from symphys.dynamics.joints.unwrapping import unwrapped_angles
 from symphys.dynamics.joints.warm_start import (
     Rotors,
     add_joint_forces,
@@ -104,7 +106,8 @@ def advance(
         conditions = Conditions(off, plastic, force, trees.same(bodies), coupled, near)
         constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
         constraints.append(trees.placed(bodies, constraint))
-    joints, fitted = joint_constraints(context, x, trees, paths, duration, kick)
+    jointed = joint_paths(context, x, paths)
+    joints, fitted = joint_constraints(context, x, trees, jointed, duration, kick)
 
     # 5-6. velocities: warm start (16), then projections (14, 15, 17)
     given = distribute_loads(context, constraints, _warm_start(context, constraints, x, kick))
@@ -125,11 +128,12 @@ def advance(
     reactions, rotors = _store_forces(context, constraints, impulses, kick, values), Rotors()
     if world.joints:
         struck, forces = lasting_forces(context, constraints, joints, by_joints, x, kick)
-        add_joint_forces(context, forces, poses, reactions)
+        angles = unwrapped_angles(context, jointed, closed, duration)
+        add_joint_forces(context, forces | angles, poses, reactions)
         momenta = keep_momentum(context, momenta, closed.made, struck, duration)
         rotors = keep_rotors(context, trees.coordinates, solved.momenta, closed.turned, struck, duration)
         values |= forces if scheme.warm_start else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
-        values |= commanded(context, joints, forces)
+        values |= commanded(context, joints, forces) | angles
     values |= _moving_bodies(context, motions, momenta, reactions, poses, rotors)
     changes = tuple(zip(solved.impulses, solved.last, strict=True))
     return Substep(values, tuple(constraints), tuple(contacts), impulses, changes)

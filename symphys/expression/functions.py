@@ -10,7 +10,7 @@ import casadi as ca
 
 from symphys.expression.columns import Expr, length, require_fit, require_length, require_same
 from symphys.expression.errors import UnfitError
-from symphys.maths import rotation
+from symphys.maths import angles, rotation
 
 NORM_WIDTH = 1e-12
 """norm(v) is sqrt(v . v + NORM_WIDTH^2), and hypot likewise: finite derivatives at 0, where the value is 1e-12."""
@@ -144,6 +144,9 @@ FUNCTIONS: dict[str, Function] = {
     "acos": Function("acos(x)", "arc cosine [rad]", ca.acos),
     "atan": Function("atan(x)", "arc tangent [rad]", ca.atan),
     "atan2": Function("atan2(y, x)", "angle [rad] of the point (x, y)", elementwise(ca.atan2), 2, 2),
+    "wrap_to_pi": Function(
+        "wrap_to_pi(x)", "an angle less whole turns, between -pi and pi; its slope is 1 everywhere", angles.wrap_to_pi
+    ),
     "sinh": Function("sinh(x)", "hyperbolic sine", ca.sinh),
     "cosh": Function("cosh(x)", "hyperbolic cosine", ca.cosh),
     "tanh": Function("tanh(x)", "hyperbolic tangent", ca.tanh),

@@ -160,7 +160,7 @@ def giving(result: Powers, *allowed: Powers) -> Callable[[Apply, list[Powers]], 
     return lambda node, parts: result if parts[0] in allowed else None
 
 
-KEEPING = ("abs", "min", "max", "smooth_max", "smooth_min", "clip", "hypot", "norm", "sum", "mean")
+KEEPING = ("abs", "wrap_to_pi", "min", "max", "smooth_max", "smooth_min", "clip", "hypot", "norm", "sum", "mean")
 """Functions that keep the unit of their arguments."""
 RULES: dict[Callable[..., Any], Callable[[Apply, list[Powers]], Found]] = {
     **dict.fromkeys((OPERATORS[ast.Add], OPERATORS[ast.Sub], neg, pos), alike),

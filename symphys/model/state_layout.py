@@ -3,7 +3,8 @@
 For each body: position (3) [m], orientation (4) [-] quaternion w x y z, velocity (3) [m/s] and angular_velocity (3)
 [rad/s] at t_k, world frame, and the force (3) [N] and torque (3) [N m] with which constraints act on it persistently.
 For each pair: force (3) [N] on its first body, and torque (3) [N m] if its law resists spinning. For each joint: if
-it closes a loop or is soft lock, the forces and torques of what it locks; and a number per coordinate for its motor,
+it closes a loop or is soft lock, the forces and torques of what it locks; if it turns unwrapped [rad], its angles to
+within half a turn, which say which of the angles that poses allow is meant; and a number per coordinate for its motor,
 lower and upper limit, spring and dry friction; also what the last command gave, where the motor gives more than that.
 For each coupling what it gives. Last ``lag`` [s].
 
@@ -55,6 +56,8 @@ class Layout:
         for k, joint in enumerate(world.joints):
             if k not in exact:
                 self._add(f"{joint.name}.lock", joint.locked)
+            if joint.unwrapped is not None:
+                self._add(joint.unwrapped, len(joint.kind.coordinates))
             for part in joint.acting:
                 self._add(f"{joint.name}.{part}", len(joint.kind.coordinates))
             if joint.drive == DRIVE:
@@ -97,7 +100,8 @@ def initial_state(world: World, values: Mapping[str, Any] = NOTHING) -> Any:
     """x at t = 0 (a casadi column) from positions, orientations and velocities by name.
 
     ``values`` maps names such as ``ball.velocity`` to numbers or casadi expressions; velocities are the true ones. What
-    is not named is as the bodies' own ``start`` has it, else zero.
+    is not named is as the bodies' own ``start`` has it, else zero. Angles of joints are those nearest to
+    ``hinge.unwrapped`` [rad] that fit the poses; by itself that is the joint's ``start``.
 
     Example:
         >>> from symphys import Body, Layout, initial_state, make_world
@@ -107,11 +111,16 @@ def initial_state(world: World, values: Mapping[str, Any] = NOTHING) -> Any:
         DM([3, 0, 2])
     """
     layout = Layout(world)
-    given = {f"{body.name}.{field}" for body in world.bodies for field in GIVEN}
+    near = {
+        joint.unwrapped: joint.start or [0.0] * len(joint.kind.coordinates)
+        for joint in world.joints
+        if joint.unwrapped is not None
+    }
+    given = near.keys() | {f"{body.name}.{field}" for body in world.bodies for field in GIVEN}
     for name in values:
         if name not in given:
             raise KeyError(f"an initial state cannot set {name!r}; it can set {', '.join(sorted(given))}")
-    values = {**world.start, **values}
+    values = {**world.start, **near, **values}
     filled: dict[str, Any] = {}
     for name in layout.names():
         part = layout[name]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.expression import parse
+from symphys.model.joints.joint import UNWRAPPED
 from symphys.prediction.impacts import impact_times
 from symphys.prediction.parameters import number_blocks
 from symphys.prediction.recorded_inputs import delays, input_variables, step_means
@@ -78,8 +79,6 @@ class Predictor:
             symbolic_rollout(whole), formulas, threads=threads, by_step=driven, watched=watched
         )
         self.sizes = {text: self._motion.sizes[text] for text in formulas}
-        angles = {m.value.text for r in self.recordings for m in r.measured if m.angle}
-        self._angles = np.concatenate([np.full(size, text in angles) for text, size in self.sizes.items()])
         self._velocities, self._gravity = tuple(velocities), np.asarray(problem.world().gravity, float)
         guess = np.concatenate([variable.guess for variable in whole.variables])
         self._nominal = problem.parametric.starts()
@@ -91,7 +90,7 @@ class Predictor:
         set_ = [self._set(shared, own[k], k) for k in which]
         lasts = [each.last(self._motion.steps) for each in set_]
         for each, samples in zip(set_, self._motion.values(np.array([e.z for e in set_]), lasts), strict=True):
-            yield PredictedSamples(interpolated(self._whole(samples), each.at)[0], None, each.scale, each.by_scale)
+            yield PredictedSamples(interpolated(samples, each.at)[0], None, each.scale, each.by_scale)
 
     def slopes(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[PredictedSamples]:
         """The same with derivatives."""
@@ -99,16 +98,9 @@ class Predictor:
         lasts = [each.last(self._motion.steps) for each in set_]
         z, along = np.array([each.z for each in set_]), np.array([each.along for each in set_])
         for each, (samples, slopes) in zip(set_, self._motion.slopes(z, along, lasts), strict=True):
-            values, rates = interpolated(self._whole(samples), each.at)
+            values, rates = interpolated(samples, each.at)
             by = interpolated(slopes, each.at)[0] + rates[:, :, None] * (each.by_offset / self.dt)
             yield PredictedSamples(values, by, each.scale, each.by_scale)
-
-    def _whole(self, samples: Array) -> Array:
-        """(n, m) quantities with angles of joints that do not jump by a turn from step to step."""
-        if not self._angles.any():
-            return samples
-        with np.errstate(invalid="ignore"):  # of what is not finite
-            return np.where(self._angles, np.unwrap(samples, axis=0), samples)
 
     def impacts(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[Array]:
         """(i,) [s] when the recordings have impacts, on their clocks; see ``impact_times``."""
@@ -216,7 +208,12 @@ class _Set:
 def given_variables(problem: Problem, recordings: Sequence[Recording]) -> tuple[Variable, ...]:
     """What recordings set at the start, as variables that nobody chooses."""
     names = dict.fromkeys(name for recording in recordings for name in recording.start)
-    return tuple(_given(name, problem.initial[name]) for name in names)
+    nominal = problem.initial | {
+        f"{joint.name}.{UNWRAPPED}": problem.parametric.starts()[f"{joint.name}.start"]
+        for joint in problem.parametric.joints
+        if joint.kind.winds
+    }
+    return tuple(_given(name, nominal[name]) for name in names)
 
 
 def _given(name: str, nominal: Array) -> Variable:

@@ -152,13 +152,24 @@ def present(measured: Measured) -> Bools:
 def difference(measured: Measured, predicted: Array) -> Array:
     """(n, m) predicted less measured; of orientations (n, 3) the rotation vector [rad] from measured to predicted.
 
-    Angles of joints are known up to whole turns.
+    Angles of joints are known up to whole turns, see ``without_turns``.
     """
     if measured.orientation:
         return rotation_vectors(measured.values, predicted)
-    off = predicted - measured.values
-    with np.errstate(invalid="ignore"):  # of what is not finite
-        return off - WHOLE_TURN * np.round(off / WHOLE_TURN) if measured.angle else off
+    off: Array = predicted - measured.values
+    return np.stack([without_turns(column) for column in off.T], axis=1) if measured.angle else off
+
+
+def without_turns(off: Array) -> Array:
+    """(n,) [rad]: differences of angles from an encoder that counts from anywhere, is cut, or is set back on the way.
+
+    The first is the nearest of those that differ by whole turns, and none jumps by more than half a turn to the next.
+    """
+    found, known = off.copy(), np.isfinite(off)
+    if known.any():
+        turned = np.unwrap(off[known])
+        found[known] = turned - WHOLE_TURN * np.round(turned[0] / WHOLE_TURN)
+    return found
 
 
 def quantity_names(keys: Sequence[tuple[str, str]]) -> tuple[str, ...]:

@@ -15,7 +15,6 @@ from symphys.model.joints import AffineMotor, Joint, Motor, Servo, VelocityMotor
 from symphys.model.joints.frames import MEET
 from symphys.model.joints.placing import PlacedJoint
 from symphys.model.joints.start import State, moved_to_zero, placed_frames, spanning_tree, unmoved
-from symphys.model.joints.turn import natural_centre
 from symphys.model.scalar import is_zero
 from symphys.model.world import World
 from symphys.problem.plain import floats, numbers
@@ -83,7 +82,8 @@ def placed_joint(world: World, joint: Joint, state: State) -> PlacedJoint:
     second = None if joint.second is None else world.bodies[joint.second].name
     still = PlacedJoint(joint.name, joint.kind, world.bodies[joint.first].name, second, joint.frames)
     placed, _ = placed_frames(still, state)
-    values = tuple(float(joint.value(k, placed)) for k in range(len(joint.kind.coordinates)))
+    count = len(joint.kind.coordinates)
+    values = tuple(float(joint.value(k, placed, joint.start or (0.0,) * count)) for k in range(count))
     bent = any(abs(value) > ZERO for value in values)
     return PlacedJoint(
         still.name, still.kind, still.first, second, joint.frames, floats(joint.frequency), values if bent else ()
@@ -132,8 +132,6 @@ def joint_table(world: World, joint: Joint, named: PlacedJoint, axes: Array) -> 
     limits = (joint.limits.lower, joint.limits.upper)
     if limits != (None, None):
         table["limits"] = ends(limits)
-    if joint.kind.coordinates and joint.kind.coordinates[0].turns and joint.centre != natural_centre(*limits):
-        table["centre"] = joint.centre
     return table
 
 

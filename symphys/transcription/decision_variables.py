@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.model.joints.joint import UNWRAPPED
 from symphys.model.state_layout import initial_state, input_columns, inputs_size
 from symphys.model.world import World
 from symphys.problem import Problem, Variable, begin, carried, placing, reposition
@@ -41,7 +42,9 @@ def start_of(
 ) -> RolloutStart:
     """The rollout's start as a function of z, without the variables ``beside``, inputs that are added elsewhere."""
     starts = problem.parametric.starts()
-    initial = {name: ca.MX(ca.DM(value)) for name, value in (problem.initial | starts).items()}
+    winding = [joint.name for joint in problem.parametric.joints if joint.kind.winds]
+    near = {f"{name}.{UNWRAPPED}": starts[f"{name}.start"] for name in winding}
+    initial = {name: ca.MX(ca.DM(value)) for name, value in (problem.initial | starts | near).items()}
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
     steps, scheduled = problem.simulation.steps, parameters.phases.at(ca.DM(np.arange(problem.simulation.steps)).T)
     u = ca.vertcat(ca.MX.zeros(inputs_size(world, inputs) - scheduled.shape[0], steps), scheduled)
@@ -65,6 +68,9 @@ def start_of(
         initial = carried(problem.parametric, own_bodies(problem), measured, initial)
     begun = {name: initial.pop(name) for name in starts}
     initial = begin(problem.parametric, {name: begun[name] for name in starts if name in varied}, initial)
+    for name in winding:
+        if (start := f"{name}.start") in varied:
+            initial[f"{name}.{UNWRAPPED}"] += begun[start] - ca.DM(starts[start])
     placed = {name: physical[name] for name in placing(sorted(varied & physical.keys()))}
     initial = reposition(problem.parametric, placed, initial)
     return RolloutStart(initial_state(world, initial), u, ca.vertcat(ca.MX(0, 1), *physical.values()))

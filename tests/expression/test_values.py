@@ -28,6 +28,7 @@ CASES = [
     ("+1e-3", [1e-3]),
     ("0x10 + 1_000", [1016]),
     ("pi", [math.pi]),
+    ("wrap_to_pi([3, 4, -4, 20 * pi + 1, -pi / 2])", [3, 4 - 2 * math.pi, 2 * math.pi - 4, 1, -math.pi / 2]),
     ("time / 4", [0.5]),
     ("ball.position[0:2] - [10, 0]", [-9, -2]),
     ("ball.position[-1]", [3]),

@@ -112,6 +112,26 @@ def test_one_motor_of_several_actuators() -> None:
     assert "activation of actuator sum: the command is what the actuator would integrate it to" in near
 
 
+WINCH = """<option gravity="0 0 0"/><worldbody><body><joint name="drum" axis="0 1 0" ref="1" range="-20 30"
+limited="true" stiffness="2" springref="15"/><inertial pos="0 0 0" mass="1" diaginertia="0.5 0.5 0.5"/></body></worldbody>
+<actuator><position name="p" joint="drum" kp="2"/></actuator><keyframe><key name="wound" qpos="9"/></keyframe>"""
+
+
+def test_angles_of_many_turns_are_as_mujoco_has_them() -> None:
+    """A range, a spring's reference, a start and a command turns away from 0."""
+    tables, findings = read(WINCH, keyframe="wound")
+    joint = tables["joint"][0]
+    assert joint["limits"] == [-21, 29]
+    assert joint["spring"]["rest"] == 14
+    assert joint["start"] == 8
+    assert "drum" not in texts(findings, "left out")
+    variable = {"name": "aim", "sets": "drum.command", "guess": 20.0}
+    motion = symphys.simulate(problem_of(tables, 1.0, 0.01, variable=[variable]))
+    data = mujoco_motion(model_of(WINCH), 1.0, ctrl=20.0, qpos=np.array([9.0]))
+    assert data.qpos[0] > 20
+    assert motion["drum.angle"][-1] == pytest.approx(data.qpos[0] - 1, abs=2e-3)
+
+
 def test_switches_of_the_model() -> None:
     xml = """<option><flag gravity="disable" spring="disable" damper="disable" limit="disable" frictionloss="disable"
     actuation="disable" contact="disable"/></option><worldbody><geom type="plane" size="1 1 1"/>

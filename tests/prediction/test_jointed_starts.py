@@ -120,3 +120,30 @@ def test_start_and_friction_are_found(problem: symphys.Problem, residuals: Recor
     assert found.status == "converged"
     assert found.own[0] == pytest.approx(true_numbers(residuals)[0], abs=1e-3)
     assert found["friction"].value == pytest.approx(0.002, abs=1e-4)
+
+
+def test_recorded_angles_count_turns() -> None:
+    """A wheel on a spiral spring from 9 rad swings through turns: its recording is met, and fits its stiffness."""
+    time = np.arange(101) * 0.01
+    angle, rate = 9.0 * np.cos(2 * time), -18.0 * np.sin(2 * time)
+    wheel = {"name": "wheel", "shape": {"sphere": {"radius": 0.1}}, "mass": 1.0, "inertia": 0.01}
+    hinge = {"name": "axle", "between": ["world", "wheel"], "hinge": {"axis": [0, 1, 0]}, "point": [0, 0, 0]}
+    measured = [{"value": "axle.angle", "columns": "angle", "noise": 1e-3}]
+    recording = {"name": "swing", "rate": 100.0, "measured": measured, "start": {"axle.angle": "angle"}}
+    recording["table"] = {"angle": angle.tolist(), "rate": rate.tolist()}
+    recording["start"] |= {"axle.rate": "rate"}  # type: ignore[operator]
+    problem = symphys.load(
+        {
+            "simulation": {"duration": 1.0, "dt": 0.01},
+            "world": {"gravity": [0, 0, 0]},
+            "body": [wheel],
+            "joint": [hinge | {"spring": {"stiffness": 0.05}}],
+            "variable": [{"name": "stiffness", "sets": "axle.stiffness", "guess": 0.05}],
+            "recording": [recording],
+        }
+    )
+    found = residuals_of(problem, threads=1)
+    off = found.residuals(np.array([0.04]), np.zeros((1, 0)), np.array([0]))[0]
+    assert np.abs(off).max() * 1e-3 < 1e-4 * 9  # of second order in the step
+    assert found.residuals(np.array([0.4]), np.zeros((1, 0)), np.array([0]))[0].max() * 1e-3 > 2 * np.pi
+    assert symphys.identify(problem).parameters[0].value == pytest.approx(0.04, rel=1e-4)

@@ -20,7 +20,7 @@ from symphys.dynamics.articulated.forward_kinematics import FinalPose, final_pos
 from symphys.dynamics.articulated.generalized_coordinates import GeneralizedCoordinates, apart
 from symphys.dynamics.articulated.impulse_response import BodyPlace, numbering
 from symphys.dynamics.articulated.rotors import Rates, chosen
-from symphys.dynamics.articulated.schur_complement import SpatialVector
+from symphys.dynamics.articulated.schur_complement import Columns, SpatialVector
 from symphys.dynamics.motion import PredictedMotion
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import GeneralizedVelocities, Momentum
@@ -94,8 +94,10 @@ def update_configuration(
     motions: Sequence[PredictedMotion],
     along: GeneralizedVelocities,
     by_loops: GeneralizedVelocities | None,
-) -> tuple[tuple[FinalPose, ...], tuple[JointCorrection, ...], RotorCorrection]:
+) -> tuple[tuple[FinalPose, ...], tuple[JointCorrection, ...], RotorCorrection, Columns]:
     """Where the bodies of a tree come to, and what joints did to their displacements and to those of rotors.
+
+    Last by how much the coordinates of each link went on (count,) [rad] or [m].
 
     ``along``: displacements along the tree's numbers; ``by_loops``: what of them joints that close loops did.
     """
@@ -119,13 +121,13 @@ def update_configuration(
             moved = tree_motion(tree, matrix, numbers)
     arrived, beside = _kept(coordinates, joints[0] is None, bodies, arrived, beside, turned[0])
     if by_loops is None:
-        return arrived, tuple(JointCorrection(each.made) for each in beside), RotorCorrection(turned)
+        return arrived, tuple(JointCorrection(each.made) for each in beside), RotorCorrection(turned), moved.rates
     loops = tree_motion(tree, matrix, apart(numbering(tree), by_loops.numbers))
     made = tuple(
         JointCorrection(each.made, STILL.made) if frame else _made(each, placed, screw)
         for frame, each, placed, screw in zip(frames, beside, coordinates.bodies, loops.screws, strict=True)
     )
-    return arrived, made, RotorCorrection(turned, chosen(tree, loops.rates))
+    return arrived, made, RotorCorrection(turned, chosen(tree, loops.rates)), moved.rates
 
 
 def _differences(after: Rates, before: Rates) -> Rates:

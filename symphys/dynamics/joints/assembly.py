@@ -21,11 +21,12 @@ from symphys.dynamics.joints.joint_constraints import (
     CoordinateTerms,
     SubstepTimes,
     coordinate_terms,
+    coordinate_value,
     coupling_constraint,
     lock_at_impact,
     lock_constraint,
 )
-from symphys.dynamics.joints.joint_frames import joint_frames
+from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames
 from symphys.dynamics.joints.joint_impulse import JointImpulse
 from symphys.dynamics.joints.locked_directions import LockConstraint
 from symphys.dynamics.motion import PredictedMotion
@@ -126,8 +127,32 @@ class JointConstraint:
     k: int | None = None
 
 
+@dataclass(frozen=True)
+class JointPath:
+    """A joint over a substep: its frames on the predicted paths of its bodies, and its coordinates at the start."""
+
+    frames: JointFrames
+    values: tuple[Expr, ...]
+
+
+def joint_paths(context: StepContext, x: State, paths: Sequence[PredictedMotion]) -> list[JointPath]:
+    """Of all joints, in a substep from x."""
+    found = []
+    for joint in context.world.joints:
+        frames = joint_frames(joint, tuple(paths[i] for i in joint.bodies))
+        near = ca.SX(0, 1) if joint.unwrapped is None else x[joint.unwrapped]
+        values = (coordinate_value(frames, k, near) for k in range(len(joint.kind.coordinates)))
+        found.append(JointPath(frames, tuple(values)))
+    return found
+
+
 def joint_constraints(
-    context: StepContext, x: State, trees: KinematicTrees, paths: Sequence[PredictedMotion], duration: Expr, kick: Expr
+    context: StepContext,
+    x: State,
+    trees: KinematicTrees,
+    paths: Sequence[JointPath],
+    duration: Expr,
+    kick: Expr,
 ) -> tuple[list[JointConstraint], list[PlacedConstraint]]:
     """(what the sweeps project, what the position pass closes) of all joints over a substep from x."""
     settings, substep = context.settings, SubstepTimes(duration, kick)
@@ -135,15 +160,15 @@ def joint_constraints(
     places = _places(context.world, trees)
     for index, joint in enumerate(context.world.joints):
         moving = tuple(trees.motions[i] for i in joint.bodies)
-        bare = tuple(paths[i] for i in joint.bodies)
-        frames, same = joint_frames(joint, bare), trees.same(joint.bodies)
+        frames, same = paths[index].frames, trees.same(joint.bodies)
         if index not in places:
             lock = trees.placed(joint.bodies, lock_constraint(settings, frames, moving, substep, same))
             projected.append(JointConstraint(lock, f"{joint.name}.lock"))
             fitted += [] if joint.soft else [lock]
         for k in range(len(joint.kind.coordinates)) if joint.acting else ():
             states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
-            at = coordinate_terms(frames, k, moving, states, duration, places.get(index, same))
+            value = paths[index].values[k]
+            at = coordinate_terms(frames, k, moving, states, duration, places.get(index, same), value)
             command = _command(context, joint, k, x)
             for part in joint.acting:
                 constraint = trees.placed(joint.bodies, CONSTRAINTS[part](settings, joint, at, command, substep))
@@ -166,7 +191,7 @@ def _command(context: StepContext, joint: Joint, k: int, x: State) -> Command:
 def _coupled(
     context: StepContext,
     trees: KinematicTrees,
-    paths: Sequence[PredictedMotion],
+    paths: Sequence[JointPath],
     duration: Expr,
     coupling: JointCoupling,
     places: Mapping[int, tuple[int, Expr]],
@@ -177,10 +202,10 @@ def _coupled(
         if index is None:
             terms.append(None)
             continue
-        joint = context.world.joints[index]
-        moving, bare = (tuple(motions[i] for i in joint.bodies) for motions in (trees.motions, paths))
+        joint, path = context.world.joints[index], paths[index]
+        moving = tuple(trees.motions[i] for i in joint.bodies)
         states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
-        terms.append(coordinate_terms(joint_frames(joint, bare), 0, moving, states, duration, places[index]))
+        terms.append(coordinate_terms(path.frames, 0, moving, states, duration, places[index], path.values[0]))
     assert terms[0] is not None
     bodies = context.world.joints[coupling.first].bodies
     return trees.placed(bodies, coupling_constraint(coupling, terms[0], terms[1], duration))

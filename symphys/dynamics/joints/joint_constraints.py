@@ -142,6 +142,12 @@ def _softness(joint: Joint, mobilities: Expr, dt: Expr) -> tuple[Expr, Expr]:
 
 
 @traced
+def coordinate_value(frames: JointFrames, k: int, near: Expr) -> Expr:
+    """Coordinate ``k`` of a joint at the start of a substep [rad] or [m]; see ``Joint.value``."""
+    return frames.joint.value(k, frames.placed(ca.SX(0)), near)
+
+
+@traced
 def coordinate_terms(
     frames: JointFrames,
     k: int,
@@ -149,6 +155,7 @@ def coordinate_terms(
     momenta: tuple[Any, ...],
     duration: Expr,
     place: tuple[int, Any] | bool,
+    value: Expr,
 ) -> CoordinateTerms:
     """Coordinate ``k`` of a joint over a substep.
 
@@ -160,6 +167,7 @@ def coordinate_terms(
         duration: of the substep [s].
         place: of a joint of a tree: the index of its first coordinate, and the responses of the tree's coordinates;
             else whether both bodies are of one tree.
+        value: of the coordinate at the start, see ``coordinate_value``.
     """
     start, middle, coordinate = ca.SX(0), duration / 2, frames.joint.kind.coordinates[k]
     now, terms = frames.placed(start), frames.terms(motions, middle, start)
@@ -170,7 +178,6 @@ def coordinate_terms(
         tuple(replace(term, jacobian=None) for term in frames.terms(motions, start, start)), given, before
     )
     rate_due = speeds(tuple(replace(term, jacobian=None) for term in terms), seen, due)
-    value = frames.joint.value(k, now)
     if isinstance(place, bool):
         rate, k_of = speeds(terms, seen, momenta), mobility(terms, seen, place)
         return CoordinateTerms(terms, seen, given, value, rate, rate_now, rate_due, k_of, place, None)

@@ -152,6 +152,7 @@ def _stacked(parts: tuple[Expr, ...]) -> Expr:
 def add_joint_forces(context: StepContext, forces: State, poses: Poses, total: Total) -> None:
     """Adds to ``total`` what joint forces do to bodies at these poses: those at which the next step begins.
 
+    ``forces`` has what a state keeps of joints, its ``unwrapped`` angles too.
     What the joints of trees lock is left out: it does nothing along the free motions of the tree.
     """
     exact = tree_joints(context.world.joints)
@@ -166,22 +167,26 @@ def add_joint_forces(context: StepContext, forces: State, poses: Poses, total: T
             total[body] = _added(total[body], wrench)
 
     for coupling in context.world.couplings:
-        _add_coupling(context, coupling, forces[f"{coupling.name}.{COUPLED}"], poses, total)
+        _add_coupling(context, coupling, forces, poses, total)
 
 
-def _add_coupling(context: StepContext, coupling: JointCoupling, force: Expr, poses: Poses, total: Total) -> None:
+def _add_coupling(context: StepContext, coupling: JointCoupling, forces: State, poses: Poses, total: Total) -> None:
     """Adds what a coupling does: its force along the coordinate that follows, and against it along the other."""
+    force = forces[f"{coupling.name}.{COUPLED}"]
     joints = [context.world.joints[k] for k in (coupling.first, coupling.second) if k is not None]
     held = [tuple(poses[i] for i in joint.bodies) for joint in joints]
-    along = [force] if len(joints) == 1 else [force, _against(coupling, joints[1], held[1], force)]
+    near = [ca.SX(0, 1) if joint.unwrapped is None else forces[joint.unwrapped] for joint in joints]
+    along = [force] if len(joints) == 1 else [force, _against(coupling, joints[1], held[1], near[1], force)]
     for joint, sides, numbers in zip(joints, held, along, strict=True):
         for body, wrench in zip(joint.bodies, _on_bodies(joint, sides, (("motor", numbers),)), strict=True):
             total[body] = _added(total[body], wrench)
 
 
 @traced
-def _against(coupling: JointCoupling, joint: Joint, poses: tuple[tuple[Expr, Expr], ...], force: Expr) -> Expr:
-    value = joint.value(0, joint_frames_at(joint, poses).placed(ca.SX(0)))
+def _against(
+    coupling: JointCoupling, joint: Joint, poses: tuple[tuple[Expr, Expr], ...], near: Expr, force: Expr
+) -> Expr:
+    value = joint.value(0, joint_frames_at(joint, poses).placed(ca.SX(0)), near)
     return -coupling.slope(value) * force
 
 

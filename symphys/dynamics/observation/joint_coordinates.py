@@ -21,7 +21,7 @@ Motion = tuple[Expr, Expr]
 
 @dataclass(frozen=True)
 class Reading:
-    """A joint in a state; k coordinates, in rad where they turn and in m where they slide.
+    """A joint in a state; k coordinates, in rad where they turn, through whole turns, and in m where they slide.
 
     Attributes:
         value, rate: (k,).
@@ -88,8 +88,9 @@ def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
     off = errors(joint, placed)
     rates = [_rate(frames, placed, coordinate, motions) for coordinate in coordinates]
     torque = x[layout[f"{joint.name}.motor"]] if joint.driven else ca.SX.zeros(len(coordinates))
+    near = ca.SX(0, 1) if joint.unwrapped is None else x[layout[joint.unwrapped]]
     return Reading(
-        value=ca.vertcat(ca.SX(0, 1), *(joint.value(k, placed) for k in range(len(coordinates)))),
+        value=ca.vertcat(ca.SX(0, 1), *(joint.value(k, placed, near) for k in range(len(coordinates)))),
         rate=ca.vertcat(ca.SX(0, 1), *rates),
         torque=torque,
         separation=ca.norm_2(off[:held]),

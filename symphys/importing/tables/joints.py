@@ -131,13 +131,6 @@ def spring_of(reading: ModelReading, joint: int, dof: int) -> dict[str, float]:
 
 
 def limits_of(reading: ModelReading, joint: int) -> list[float] | None:
-    """The range from the reference pose; one of a whole turn is no bound here."""
-    model = reading.model
+    """The range from the reference pose; None where nothing holds it."""
     low, high = range_of(reading, joint)
-    if model.jnt_limited[joint] and not reading.off("LIMIT"):
-        ends = [float(end) - reading.reference(joint) for end in model.jnt_range[joint]]
-        if not isfinite(low):
-            text = "angles are told within one turn here, so its range holds nothing"
-            wide = " to ".join(f"{end:.4g}" for end in ends)
-            reading.note("left out", f"limit of {reading.called('joint', joint)}", text, f"{wide} rad")
     return numbers([low, high]) if isfinite(low) or isfinite(high) else None

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from math import pi
 from typing import Any
 
 import numpy as np
 
 from symphys.importing.problem import ImportProblem
 from symphys.importing.tables.reading import BALL, FREE, HINGE, SLIDE, ModelReading, numbers
-from symphys.model.joints.turn import natural_centre
 from symphys.suggest import hint
 
 PLANE = 0
@@ -18,8 +16,6 @@ LIFTS = 3
 """How often a robot is lifted out of the ground; the first is enough unless contacts were too many to list."""
 SUNK = 1e-4
 """[m]: overlap with the ground that stays."""
-WIDEST = 2 * pi - 0.2
-"""[rad]: a wider range would leave no room for what passes its ends."""
 
 
 def keyframe(library: Any, model: Any, name: str | None, file: str) -> int | None:
@@ -52,17 +48,12 @@ def place(library: Any, model: Any, data: Any) -> None:
 
 
 def range_of(reading: ModelReading, joint: int) -> tuple[float, float]:
-    """The range of a hinge or slider from the reference pose; infinite where nothing holds it.
-
-    An angle is told within one turn here, so a wider range holds nothing.
-    """
+    """The range of a hinge or slider from the reference pose; infinite where nothing holds it."""
     model = reading.model
     if not model.jnt_limited[joint] or reading.off("LIMIT"):
         return -np.inf, np.inf
     low, high = (float(end) - reading.reference(joint) for end in model.jnt_range[joint])
-    if model.jnt_type[joint] != HINGE:
-        return low, high
-    return (low, high) if high - low < WIDEST else (-np.inf, np.inf)
+    return low, high
 
 
 def starts(reading: ModelReading) -> dict[int, float]:
@@ -149,12 +140,8 @@ def begin(reading: ModelReading, joints: list[dict[str, Any]]) -> None:
 
 
 def wanted(reading: ModelReading, joint: int) -> float:
-    """Where the model itself begins, from the reference pose; an angle within the turn that is told."""
+    """Where the model itself begins, from the reference pose."""
     if reading.key is None:
         return 0.0
     at = int(reading.model.jnt_qposadr[joint])
-    value = float(reading.model.key_qpos[reading.key][at]) - reading.reference(joint)
-    if reading.model.jnt_type[joint] != HINGE:
-        return value
-    low = natural_centre(*range_of(reading, joint)) - pi
-    return value if low <= value <= low + 2 * pi else float(np.remainder(value - low, 2 * pi) + low)
+    return float(reading.model.key_qpos[reading.key][at]) - reading.reference(joint)

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from symphys.maths.angles import nearest
 from symphys.model.joints.kind import Kind, PlacedFrames
 from symphys.model.joints.motor import AffineMotor, Motor, given_torque
-from symphys.model.joints.turn import told
 from symphys.model.scalar import Scalar, is_zero
 
 PARTS = ("motor", "lower", "upper", "spring", "friction")
+UNWRAPPED = "unwrapped"
+"""Angles to within half a turn [rad]; see ``Joint.unwrapped``."""
 DRIVE = "drive"
 """What a command alone gives, where the state's ``motor`` does not tell it; see ``Joint.drive``."""
 Vector = Sequence[Any]
@@ -60,7 +62,8 @@ class Joint:
         motor, limits, spring: along every coordinate.
         armature: inertia of what turns with each coordinate, seen through its gear [kg m^2] or [kg].
         friction: dry friction along every coordinate [N m] or [N].
-        centre: angles are told from half a turn below it to half a turn above it [rad].
+        start: coordinates where a motion begins [rad] or [m]; empty: all 0. Of an initial pose, which says nothing of
+            whole turns, angles are those nearest to these.
         frequency, damping: [Hz] and damping ratio of a joint that is soft (Catto, GDC 2011); 0 is a rigid one.
     """
 
@@ -76,13 +79,21 @@ class Joint:
     damping: Scalar = 1.0
     armature: Scalar = 0.0
     friction: Scalar = 0.0
-    centre: float = 0.0
+    start: tuple[float, ...] = ()
 
-    def value(self, k: int, placed: PlacedFrames) -> Any:
-        """Its coordinate k [rad] or [m], of frames in the world."""
+    def value(self, k: int, placed: PlacedFrames, near: Any) -> Any:
+        """Its coordinate k [rad] or [m], of frames in the world.
+
+        Frames tell an angle but for whole turns: it is the one nearest to ``near`` (k,), see ``unwrapped``.
+        """
         coordinate = self.kind.coordinates[k]
         value = coordinate.value(placed)
-        return told(value, self.centre) if coordinate.turns else value
+        return nearest(value, near[k]) if coordinate.turns else value
+
+    @property
+    def unwrapped(self) -> str | None:
+        """Where the state keeps its angles to within half a turn: poses tell the rest. None where nothing turns."""
+        return f"{self.name}.{UNWRAPPED}" if self.kind.winds else None
 
     @property
     def bodies(self) -> tuple[int, ...]:

@@ -35,7 +35,7 @@ class Coordinate:
     Attributes:
         name: ``angle`` or ``position``; with a number where there are two.
         turns: whether it is a rotation [rad], else a displacement [m].
-        value: of the placed frames.
+        value: of the placed frames; an angle but for whole turns.
         axis: (3,) unit vector, world frame: about which, or along which, the first side moves as the value grows.
         fixed_in_first: whether the axis moves with the first side, else with the second.
     """
@@ -63,3 +63,8 @@ class Kind:
     slides: tuple[int, ...] | None = None
     turns: tuple[tuple[int, int], ...] = ()
     coordinates: tuple[Coordinate, ...] = ()
+
+    @property
+    def winds(self) -> bool:
+        """Whether its coordinates are angles, which count whole turns."""
+        return any(coordinate.turns for coordinate in self.coordinates)

@@ -89,7 +89,7 @@ def _joint(spec: JointSpec, placed: PlacedJoint, places: Mapping[str, int]) -> J
     if not isinstance(spec, MovingJoint):
         return Joint(spec.name, spec.kind, *sides, placed.frames, **soft)
     found = Joint(spec.name, spec.kind, *sides, placed.frames, spec.motor, spec.bounds, spec.spring, **soft)
-    return replace(found, armature=spec.armature, friction=spec.friction, centre=spec.told_about)
+    return replace(found, armature=spec.armature, friction=spec.friction, start=placed.start)
 
 
 def _check_between(spec: JointSpec, names: Sequence[str]) -> None:

@@ -21,7 +21,6 @@ from symphys.model.joints.joint import Limits, Spring
 from symphys.model.joints.kind import Kind
 from symphys.model.joints.motor import Motor
 from symphys.model.joints.slider import SLIDER
-from symphys.model.joints.turn import natural_centre, outside
 from symphys.model.joints.universal import UNIVERSAL
 from symphys.model.scalar import Scalar
 
@@ -80,7 +79,7 @@ class FixedJoint(JointSpec):
 
 @dataclass(frozen=True)
 class MovingJoint(JointSpec):
-    """A joint with coordinates, which are 0 as the bodies lie.
+    """A joint with coordinates, which are 0 as the bodies lie. Angles count whole turns.
 
     Attributes:
         motor: drives every coordinate.
@@ -88,8 +87,6 @@ class MovingJoint(JointSpec):
         spring: along every coordinate.
         armature: inertia of what turns with each coordinate, seen through its gear [kg m^2] or [kg].
         friction: dry friction along every coordinate [N m] or [N].
-        centre: angles are told from half a turn below it to half a turn above it [rad]; None: the middle of limits that
-            come near to half a turn, else 0.
         start: the coordinate at the start [rad] or [m], or a sequence of all; None: 0. ``make_world`` carries the
             second body, and all that hangs on it, there; if the world holds these, the first, the other way.
     """
@@ -99,7 +96,6 @@ class MovingJoint(JointSpec):
     spring: Spring | None = field(default=None, kw_only=True)
     armature: Scalar = field(default=0.0, kw_only=True)
     friction: Scalar = field(default=0.0, kw_only=True)
-    centre: float | None = field(default=None, kw_only=True)
     start: float | Sequence[float] | None = field(default=None, kw_only=True)
 
     def check_acting(self) -> None:
@@ -124,17 +120,7 @@ class MovingJoint(JointSpec):
         lower, upper = -inf if low is None else low, inf if high is None else high
         if not lower < upper:
             raise ValueError(f"limits: the lower, {lower:g}, must be below the upper, {upper:g}")
-        faults = [outside(end, self.told_about) for end in (lower, upper) if isfinite(end)]
-        if self.kind.coordinates[0].turns and any(faults):
-            raise ValueError(f"limits: {max(faults)}; None is no bound")
         return Limits(lower if isfinite(lower) else None, upper if isfinite(upper) else None)
-
-    @property
-    def told_about(self) -> float:
-        """The centre of angles [rad]; 0 of a slider."""
-        if not self.kind.coordinates[0].turns:
-            return 0.0
-        return natural_centre(*(self.limits or (None, None))) if self.centre is None else self.centre
 
     @property
     def start_coordinates(self) -> tuple[float, ...]:
@@ -153,8 +139,6 @@ class MovingJoint(JointSpec):
         for value in values:
             if (lower is not None and value < lower) or (upper is not None and value > upper):
                 raise ValueError(f"start: {value:g} is beyond the limits of this joint")
-            if self.kind.coordinates[0].turns and outside(value, self.told_about):
-                raise ValueError(f"start: {outside(value, self.told_about)}")
         return values if any(values) else ()
 
 

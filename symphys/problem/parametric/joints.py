@@ -29,7 +29,6 @@ class ParametricJoint:
         damping: its damping ratio.
         collide: whether the two bodies may touch each other.
         start: the coordinates at the start; empty: all 0, as the bodies lie in the file.
-        centre: see ``Joint``.
     """
 
     name: str
@@ -46,7 +45,6 @@ class ParametricJoint:
     start: tuple[float, ...] = ()
     armature: float = 0.0
     friction: float = 0.0
-    centre: float = 0.0
 
     @property
     def apart(self) -> PairRule | None:
@@ -80,7 +78,7 @@ class ParametricJoint:
             spring=None if self.spring is None else self._valued(self.spring, value),
             frequency=self.frequency,
             damping=self.damping,
-            centre=self.centre,
+            start=self.start,
             **{key: value(f"{self.name}.{key}") for key in OWN if getattr(self, key)},
         )
 

@@ -45,6 +45,13 @@ MESSAGES: dict[str, Callable[[Finding], str]] = {
 }
 
 
+REMOVED: dict[tuple[str, str], str] = {
+    ("joint", "centre"): "leave it out: angles of joints count whole turns; where a formula needs one between -pi and "
+    "pi, wrap_to_pi(knee.angle) gives it",
+}
+"""Keys that there were, by table and name, and what is there instead."""
+
+
 def report(error: ValidationError, model: type[BaseModel], faults: Faults, prefix: Place = ()) -> None:
     """Note every finding of a validation, at its place below ``prefix``."""
     merged: dict[tuple[str | int, ...], list[str]] = {}
@@ -60,6 +67,8 @@ def message(finding: Finding, model: type[BaseModel]) -> str:
     kind = finding["type"]
     if kind == "extra_forbidden":
         key = str(finding["loc"][-1])
+        if removed := REMOVED.get((str(finding["loc"][0]), key)):
+            return removed
         return f"unknown key; {hint(key, keys_at(model, finding['loc'][:-1]))}"
     return MESSAGES[kind](finding) if kind in MESSAGES else str(finding["msg"])
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.model.joints.frames import WORLD
+from symphys.model.joints.joint import UNWRAPPED
 from symphys.model.joints.start import moved_to_start, moved_to_zero, placed_frames, spanning_tree
 from symphys.problem.parametric.carried import follow
 from symphys.problem.parametric.joints import ParametricJoint
@@ -52,7 +53,7 @@ class Starts:
         """What a recording sets, and the states of all bodies that joints carry with these, by names of ``initial``.
 
         A joint has the coordinate and the rate that are given, else those of the file. A body that is given itself is
-        not carried by others.
+        not carried by others. Poses say nothing of whole turns: ``hinge.unwrapped`` is an angle that is given.
         """
         plain = {name: value.copy() for name, value in given.items() if name not in self.of_joints}
         bent = {name: float(value[0]) for name, value in given.items() if name in self.of_joints}
@@ -60,8 +61,10 @@ class Starts:
         own = {name.rpartition(".")[0]: None for name in plain}
         ends = {end: None for joint in touched for end in (joint.first, joint.second) if end is not None}
         group = self._connected([*own, *ends])
+        angles = {self.of_joints[name].joint: value for name, value in bent.items() if not self.of_joints[name].rate}
+        near = {f"{joint.name}.{UNWRAPPED}": np.array([value]) for joint, value in angles.items() if joint.kind.winds}
         if len(group) == len(own):
-            return plain
+            return plain | near
         before = self._bent(bent)
         state = {name: value.copy() for name, value in before.items()} | plain
         rates = {self.of_joints[name].joint.name: value for name, value in bent.items() if self.of_joints[name].rate}
@@ -71,7 +74,7 @@ class Starts:
                 state |= {name: np.array(value).ravel() for name, value in moved.items()}
             if joint.name in rates:
                 turn_on(joint, body, rates[joint.name], state)
-        return {f"{body}.{field}": state[f"{body}.{field}"] for body in group for field in FIELDS}
+        return {f"{body}.{field}": state[f"{body}.{field}"] for body in group for field in FIELDS} | near
 
     def coordinates(self, given: Mapping[str, Array]) -> dict[str, Array]:
         """Of joints what a recording sets, by the names with which variables set it: ``hinge.start`` [rad] or [m]."""

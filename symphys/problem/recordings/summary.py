@@ -47,7 +47,7 @@ def table_lines(problem: ProblemData, table: str, own: Sequence[Recording]) -> l
         between = "held" if driven.interpolation == "constant" else "linear"
         lines.append(f"  driven by {name}, {between} between samples{lacks}")
     if own[0].start:
-        lines.append(f"  starts with {', '.join(own[0].start)}")
+        lines.append(f"  starts with {', '.join(name for name in own[0].start if name in problem.initial)}")
         depth, which = deepest_start(problem, own)
         if depth > OVERLAP:
             text = f"surfaces overlap by {depth:.3g} m at the start of {which.name}, more than elsewhere"

@@ -25,7 +25,7 @@ class Measured:
         noise: standard deviations of the residuals, (m,), of an orientation (3,) [rad]; None: to be estimated.
         orientation: whether the value is a unit quaternion w x y z (m = 4), whose residual is the rotation vector (3,)
             [rad] between measured and simulated.
-        angle: whether it is the angle of a joint: residuals are the nearest of those that differ by whole turns.
+        angle: whether it is the angle of a joint, which counts turns from anywhere.
     """
 
     name: str
@@ -71,7 +71,8 @@ class Recording:
         time: (n,) [s] from the start of the simulation, increasing, from 0 to its duration.
         measured: what was measured, each at all n times.
         start: numbers that the recording sets at the start, by the names of ``Problem.initial``, (3,) or (4,); where a
-            variable sets the same quantity, they are its guess for this recording.
+            variable sets the same quantity, they are its guess for this recording. ``hinge.unwrapped`` (1,) [rad] says
+            which of the angles that differ by whole turns is meant.
         coordinates: what it sets of joints, which is in ``start`` too, by names such as ``hinge.start`` [rad] or [m],
             ``hinge.start_rate``, (1,) each; where a variable sets the same, they are its guess for this recording.
         inputs: what drives the simulation, by names such as ``knee.command``.

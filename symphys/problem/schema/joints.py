@@ -42,7 +42,10 @@ class UniversalTable(SchemaTable):
 
 
 class ServoTable(SchemaTable):
-    """A motor whose command is an angle, or a position: the target velocity is gain (command - angle)."""
+    """A motor whose command is an angle, or a position: the target velocity is gain (command - angle).
+
+    Angles count whole turns: a command of 18.85 rad is three turns.
+    """
 
     gain: Positive = Field(description="target velocity per difference of angle or position [1/s]")
     torque: Positive = Field(description="the most that it gives [N m], or [N] where the joint slides")
@@ -97,7 +100,7 @@ class SpringTable(SchemaTable):
 
     stiffness: NonNegative = Field(default=0.0, description="torque per angle [N m/rad], or force per length [N/m]")
     damping: NonNegative = Field(default=0.0, description="torque per rate [N m s/rad], or force per velocity [N s/m]")
-    rest: Finite = Field(default=0.0, description="where it gives nothing [rad], or [m]")
+    rest: Finite = Field(default=0.0, description="where it gives nothing [rad], through any number of turns, or [m]")
 
 
 class CouplingTable(SchemaTable):
@@ -110,7 +113,8 @@ class CouplingTable(SchemaTable):
     )
     polynomial: Annotated[list[Finite], Field(min_length=1, max_length=5)] = Field(
         default=[0.0, 1.0],
-        description="[c0, c1, c2, c3, c4]: the first coordinate is c0 + c1 q + c2 q^2 + ... of the second's q",
+        description="[c0, c1, c2, c3, c4]: the first coordinate is c0 + c1 q + c2 q^2 + ... of the second's q, an "
+        "angle that counts whole turns: a screw of lead h has [0, h / 6.2832]",
     )
 
 
@@ -128,7 +132,8 @@ class SiteTable(SchemaTable):
 class JointTable(SchemaTable):
     """What holds two bodies together, or a body to the world; coordinates are 0 as the bodies lie in the file.
 
-    With ``start`` they begin elsewhere. One of ball, hinge, slider, universal and fixed says how.
+    With ``start`` they begin elsewhere. Angles count whole turns: a hinge that has gone round twice is at 12.57 rad.
+    One of ball, hinge, slider, universal and fixed says how.
     """
 
     name: Identifier = Field(description="how formulas, variables and settings refer to it")
@@ -152,7 +157,9 @@ class JointTable(SchemaTable):
         default=None, description="drives every coordinate: { servo = { gain = 20, torque = 30, velocity = 8 } }"
     )
     limits: Ends | None = Field(
-        default=None, description="[lower, upper] of every coordinate [rad], or [m]; -inf and inf are none"
+        default=None,
+        description="[lower, upper] of every coordinate [rad], through any number of turns, or [m]; -inf and inf are "
+        "none",
     )
     limits_deg: Ends | None = Field(default=None, description="the same in degrees, where the joint turns")
     start: Coordinates | None = Field(
@@ -161,11 +168,6 @@ class JointTable(SchemaTable):
         "that hangs on it, is carried there from where it lies in the file",
     )
     start_deg: Coordinates | None = Field(default=None, description="the same in degrees, where the joint turns")
-    centre: float | None = Field(
-        default=None,
-        description="angles are told from half a turn below it to half a turn above it [rad]; default: the middle of "
-        "limits that come near to half a turn, else 0",
-    )
     spring: SpringTable | None = Field(default=None, description="{ stiffness = 5, damping = 0.1, rest = 0 }")
     armature: NonNegative = Field(
         default=0.0,

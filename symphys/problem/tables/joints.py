@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from symphys.model.joints import KINDS, AffineMotor, Kind, Limits, Motor, Servo, Spring, TorqueMotor, VelocityMotor
 from symphys.model.joints.frames import WORLD
-from symphys.model.joints.turn import natural_centre, outside
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.joints import JointTable, MotorTable, SpringTable
@@ -107,7 +106,6 @@ class JointReader:
         second, first = (None if name == WORLD else name for name in table.between)
         assert first is not None
         limits = self.limits(kind)
-        centre = self.centre(kind, limits)
         return ParametricJoint(
             name=table.name,
             kind=kind,
@@ -120,10 +118,9 @@ class JointReader:
             frequency=table.frequency,
             damping=1.0 if table.damping is None else table.damping,
             collide=table.collide,
-            start=self.start(kind, limits, centre),
+            start=self.start(kind, limits),
             armature=table.armature,
             friction=table.friction,
-            centre=centre,
         )
 
     def check_between(self) -> None:
@@ -198,23 +195,7 @@ class JointReader:
         low, high = (end if isfinite(end) else None for end in ends or (np.inf, np.inf))
         return Limits(low, high)
 
-    def centre(self, kind: Kind, limits: Limits) -> float:
-        """About which angles are told; limits must be among these."""
-        given, slides = self.table.centre, any(not coordinate.turns for coordinate in kind.coordinates)
-        if not kind.coordinates or slides:
-            if given is not None:
-                self.add("centre", f"a {kind.name} has no angle; leave it out")
-            return 0.0
-        centre = natural_centre(limits.lower, limits.upper) if given is None else given
-        for end in (limits.lower, limits.upper):
-            fault = "" if end is None else outside(end, centre)
-            if fault:
-                key = "limits" if self.table.limits is not None else "limits_deg"
-                self.add(key, f"{fault}; -inf and inf are no bounds")
-                break
-        return centre
-
-    def start(self, kind: Kind, limits: Limits, centre: float) -> tuple[float, ...]:
+    def start(self, kind: Kind, limits: Limits) -> tuple[float, ...]:
         """In rad or m, within the limits; empty if none is given."""
         table = self.table
         key, given = ("start", table.start) if table.start_deg is None else ("start_deg", table.start_deg)
@@ -233,8 +214,6 @@ class JointReader:
                 limits.upper is not None and value > limits.upper
             ):
                 self.add(key, f"{written:g} is beyond the limits of this joint")
-            elif turns and outside(value, centre):
-                self.add(key, outside(value, centre))
         return values
 
 

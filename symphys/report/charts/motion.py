@@ -28,7 +28,6 @@ from symphys.report.robots.joint_figures import (
     least_range,
     make_grid,
     shown,
-    unwound,
 )
 from symphys.report.robots.joint_use import Channel, channels
 from symphys.report.scene.views import NAMES
@@ -128,7 +127,7 @@ def value_panel(channel: Channel, trajectory: Trajectory, colour: str) -> Panel:
     target = [] if channel.target is None else [np.append(channel.target, channel.target[-1])]
     limits = [channel.joint.lower, channel.joint.upper]
     low, high = axis_range(np.concatenate([channel.value, *target]), limits, least_range(channel))
-    value = unwound(channel.value) if channel.turns else channel.value
+    value = channel.value
     drawn = lines(trajectory.time, value[:, None], [channel.quantity], [colour])
     if target:
         drawn += lines(trajectory.time, target[0][:, None], ["command"], [TARGET], width=1.0, look="dashed")

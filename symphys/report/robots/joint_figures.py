@@ -98,7 +98,7 @@ def draw_value(axes: Axes, time: Array, channel: Channel, colour: str) -> None:
         if low <= edge <= high:
             axes.axhspan(min(edge, beyond), max(edge, beyond), color=BEYOND, linewidth=0, zorder=0.5)
             axes.axhline(edge, color=style.GROUND_EDGE, linewidth=0.8, zorder=1.5)
-    axes.plot(time, unwound(channel.value) if channel.turns else channel.value, color=colour, linewidth=1.5, zorder=3)
+    axes.plot(time, channel.value, color=colour, linewidth=1.5, zorder=3)
     if channel.target is not None:
         target = np.append(channel.target, channel.target[-1])
         axes.plot(time, target, color=TARGET, linestyle=DASHES, linewidth=1.0, drawstyle="steps-post", zorder=3.5)
@@ -163,12 +163,6 @@ def axis_range(values: Array, edges: list[float], least: float) -> tuple[float, 
         low, high = min(low, edge), max(high, edge)
     margin = 0.1 * (high - low)
     return low - margin, high + margin
-
-
-def unwound(angle: Array) -> Array:
-    """The angle with a gap where it goes on at the other end of the circle."""
-    jumps = np.append(np.abs(np.diff(angle)) > np.pi, False)
-    return np.where(jumps, np.nan, angle)
 
 
 def dress(axes: Axes, title: str, low: float, high: float) -> None:

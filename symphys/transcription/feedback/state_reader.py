@@ -27,7 +27,7 @@ class StateReader:
     Attributes:
         sizes: what a state by name must have, and how many numbers each is: ``shoulder.angle`` and ``shoulder.rate``,
             ``rail.position``; of a body that floats ``torso.position`` [m], ``torso.orientation`` (w, x, y, z),
-            ``torso.velocity`` [m/s], ``torso.angular_velocity`` [rad/s], world frame.
+            ``torso.velocity`` [m/s], ``torso.angular_velocity`` [rad/s], world frame. Angles count whole turns.
         floating: names of the bodies that float.
     """
 

@@ -2,9 +2,10 @@
 
 Of each kinematic tree its coordinates and then their rates (``tree_chart``); of each other body its position, a
 rotation vector (world frame), velocity and angular velocity; then what carries on as it is: forces of pairs, joints and
-couplings, the torque (3) with which contacts act on each body that has pairs, ``lag`` if impacts cut steps or the time
-step varies, and what sensors remember. All reactions of bodies follow from these. A step leaves its trees' joints
-closed to rounding, so that nothing of its state is lost; what an initial state is off them is kept.
+couplings, the whole turns of joints that close loops or are soft, the torque (3) with which contacts act on each body
+that has pairs, ``lag`` if impacts cut steps or the time step varies, and what sensors remember. All reactions of bodies
+follow from these. A step leaves its trees' joints closed to rounding, so that nothing of its state is lost; what an
+initial state is off them is kept.
 """
 
 from __future__ import annotations
@@ -19,11 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symphys.dynamics.context import make_context
+from symphys.dynamics.joints.joint_frames import joint_frames_at
 from symphys.dynamics.joints.warm_start import add_joint_forces
 from symphys.dynamics.prediction import bodies_of, jointed_bodies
 from symphys.dynamics.step import splits_of
 from symphys.maths import rotation
-from symphys.model.joints import kinematic_trees
+from symphys.model.joints import Joint, kinematic_trees, tree_joints
 from symphys.model.state_layout import BODY_FIELDS, Layout
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.columns import ByColumns
@@ -171,11 +173,32 @@ class Tangent:
         """Parts of the world's state that carry on as they are, and how many numbers each has."""
         world, scheme = self.rollout.world, self.rollout.problem.simulation.scheme()
         of_bodies = {f"{body.name}.{field}" for body in world.bodies for field, _ in BODY_FIELDS}
-        names = [name for name in self._layout.names() if name not in of_bodies and name != "lag"]
+        in_trees = {joint.unwrapped for joint in self._in_trees}
+        names = [name for name in self._layout.names() if name not in of_bodies | in_trees and name != "lag"]
         if splits_of(world, scheme) or self.rollout.problem.free_duration:  # half a step, without impacts
             names.append("lag")
         parts = [(name, self._layout[name]) for name in names]
         return tuple((name, part.stop - part.start) for name, part in parts)
+
+    @cached_property
+    def _in_trees(self) -> tuple[Joint, ...]:
+        """The joints whose coordinates are numbers of the tangent."""
+        joints = self.rollout.world.joints
+        return tuple(joints[k] for k in sorted(tree_joints(joints)))
+
+    def _turned(self, old: Parts, new: Parts) -> dict[str, Expr]:
+        """Of other joints that turn: by how much they did from one pose to the other, by half a turn at most."""
+        found, world = dict[str, Expr](), self.rollout.world
+        for joint in world.joints:
+            if joint.unwrapped is None or joint in self._in_trees:
+                continue
+            near, angles = old[joint.unwrapped], list[Expr]()
+            for state in (old, new):
+                poses = tuple(self._pair(state, i, POSES) for i in joint.bodies)
+                placed = joint_frames_at(joint, poses).placed(ca.SX(0))
+                angles.append(ca.vertcat(*(joint.value(k, placed, near) for k in range(near.numel()))))
+            found[joint.unwrapped] = angles[1] - angles[0]
+        return found
 
     @cached_property
     def _acted(self) -> tuple[str, ...]:
@@ -206,13 +229,16 @@ class Tangent:
                 moved = {index: (place + more[0], rotation.multiply(rotation.exponential(more[1]), turned))}
                 after = {index: (velocity + more[2], spin + more[3])}
             else:
-                moved = chart.moved(poses, cursor.take(chart.tree.size))
+                along = cursor.take(chart.tree.size)
+                moved = chart.moved(poses, along)
+                new |= chart.turned(old, along)
                 after = _carried_on(chart, poses, moving, moved, cursor.take(chart.tree.size))
             for i in bodies:
                 self._put(new, i, POSES, moved[i])
                 self._put(new, i, VELOCITIES, after[i])
+        turned = self._turned(old, new)
         for name, size in self._raw:
-            new[name] = old[name] + cursor.take(size)
+            new[name] = old[name] + cursor.take(size) + turned.get(name, 0)
         others = {name: cursor.take(3) for name in self._acted}
         for body, first, second in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
             for (field, _), a, b in zip(REACTIONS, first, second, strict=True):
@@ -234,8 +260,9 @@ class Tangent:
                 found += [b - a for a, b in zip(moving[0][index], moving[1][index], strict=True)]
             else:
                 rates = [chart.rates(*each) for each in zip(places, moving, strict=True)]
-                found += [chart.apart(*places), rates[1] - rates[0]]
-        found += [new[name] - old[name] for name, _ in self._raw]
+                found += [chart.apart(places[0], places[1], (old, new)), rates[1] - rates[0]]
+        turned = self._turned(old, new)
+        found += [new[name] - old[name] - turned.get(name, 0) for name, _ in self._raw]
         for body, first, second in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
             for k, (field, _) in enumerate(REACTIONS):
                 if (name := f"{body.name}.{field}") in self._acted:

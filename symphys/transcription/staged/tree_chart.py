@@ -49,22 +49,42 @@ class TreeChart:
             for link, each in zip(self.tree.links, arrived, strict=True)
         }
 
-    def apart(self, before: Mapping[int, Pose], after: Mapping[int, Pose]) -> Expr:
-        """(size,) coordinates that lead from one to the other; turns of joints within half a turn."""
+    def apart(
+        self,
+        before: Mapping[int, Pose],
+        after: Mapping[int, Pose],
+        angles: tuple[Mapping[str, Expr], Mapping[str, Expr]],
+    ) -> Expr:
+        """(size,) coordinates that lead from one to the other, through whole turns.
+
+        ``angles``: of both, ``Joint.unwrapped`` by its name.
+        """
         found = []
         for link, joint in self._links():
             if joint is None:
                 (p, q), (r, s) = before[link.body], after[link.body]
                 found += [r - p, rotation.between(q, s)]
             elif joint.kind.coordinates:
-                old, new = (self._frames(joint, poses).placed(NOW) for poses in (before, after))
-                for each in joint.kind.coordinates:
-                    step = each.value(new) - each.value(old)
-                    found.append(ca.atan2(ca.sin(step), ca.cos(step)) if each.turns else step)
+                old, new = (self.coordinates(joint, *each) for each in zip((before, after), angles, strict=True))
+                found.append(new - old)
             elif link.count:
                 placed = self._frames(joint, before).placed(NOW)
                 found.append(ca.mtimes(placed.b[:, : link.count].T, self._turned(link, before, after)))
         return ca.vertcat(ca.SX(0, 1), *found)
+
+    def turned(self, angles: Mapping[str, Expr], along: Expr) -> dict[str, Expr]:
+        """``Joint.unwrapped`` by its name, after coordinates went on by ``along`` (size,)."""
+        return {
+            joint.unwrapped: angles[joint.unwrapped] + along[list(link.coordinates)]
+            for link, joint in self._links()
+            if joint is not None and joint.unwrapped is not None
+        }
+
+    def coordinates(self, joint: Joint, poses: Mapping[int, Pose], angles: Mapping[str, Expr]) -> Expr:
+        """(count,) of a joint; ``angles``: ``Joint.unwrapped`` by its name."""
+        placed = self._frames(joint, poses).placed(NOW)
+        near = ca.SX(0, 1) if joint.unwrapped is None else angles[joint.unwrapped]
+        return ca.vertcat(*(joint.value(k, placed, near) for k in range(len(joint.kind.coordinates))))
 
     def rates(self, poses: Mapping[int, Pose], moving: Mapping[int, Moving]) -> Expr:
         """(size,) of bodies at these poses with these velocities."""
