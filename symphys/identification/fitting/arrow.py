@@ -7,7 +7,8 @@ In scaled numbers y = x / scale, with H = J' C J and g = J' psi of the merit sum
     [ B_2'      D_2       ] [ own_2  ]     [ g_2]
 
 S = A - sum B_k D_k^-1 B_k' has the size of the shared numbers. Time and memory are linear in the recordings (Golub and
-Pereyra 1973; in bundle adjustment: Triggs et al. 2000, section 6.1).
+Pereyra 1973; in bundle adjustment: Triggs et al. 2000, section 6.1). Blocks are eliminated by their square roots
+(``square_root``): the own columns of each recording are projected out of its shared ones, and S is never formed.
 """
 
 from __future__ import annotations
@@ -18,11 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.fitting.square_root import EPS, eliminate, pseudo_root, stacked, triangle
 from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals, Rows
 
-EPS = float(np.finfo(float).eps)
-NO_INFORMATION = 1e-10
-"""Share of the largest eigenvalue below which an eigenvalue of a Schur complement is rounding."""
 Weighting = Callable[[Array], Array]
 """Of residuals (m,): (m,) weights of the rows of the Jacobian in a square matrix."""
 
@@ -33,12 +32,13 @@ class ArrowSystem:
 
     Attributes:
         costs: (K,) sum of rho of each recording, with the priors of its own numbers.
-        blocks: (K, n, n) J' C J of each recording.
+        roots: (K, n, n) rows F of each recording, F'F = J' C J; blocks: (K, n, n) these squares.
         gradients: (K, n) J' psi of each recording: half the derivative of its cost.
         prior_cost, prior_block, prior_gradient: of the priors of the shared numbers: a number, (s,) diagonal, (s,).
     """
 
     costs: Array
+    roots: Array
     blocks: Array
     gradients: Array
     prior_cost: float
@@ -75,39 +75,23 @@ class ArrowSystem:
         """(K, o) half the derivative by the own numbers."""
         return self.gradients[:, self.s :]
 
-    def reduced(self, damping: float, free_own: Bools) -> tuple[Array, Array, Array]:
-        """The own numbers eliminated, recording by recording.
-
-        Returns:
-            (K, s, s) share of each recording in S, (K, s) its share in the right side, and (K, o, s + 1) D^-1 [B', g],
-            from which own steps follow. Numbers that are not free have zeros there.
-        """
-        s, o = self.s, self.blocks.shape[1] - self.s
-        if not o:
-            return self.blocks, self.gradients, np.zeros((len(self.costs), 0, s + 1))
-        mask = free_own.astype(float)
-        square = self.blocks[:, s:, s:] * mask[:, :, None] * mask[:, None, :]
-        coupling = self.blocks[:, :s, s:] * mask[:, None, :]
-        floor = 4 * o * EPS * np.trace(square, axis1=1, axis2=2)
-        floor = np.where(floor > 0, floor, np.finfo(float).tiny)
-        added = np.where(free_own, np.maximum(damping, floor)[:, None], 1.0)
-        square = square + added[:, :, None] * np.eye(o)
-        sides = np.concatenate([coupling.transpose(0, 2, 1), (self.own_gradient * mask)[:, :, None]], axis=2)
-        solved = np.linalg.solve(square, sides)
-        across = coupling @ solved
-        return self.blocks[:, :s, :s] - across[:, :, :s], self.gradients[:, :s] - across[:, :, s], solved
-
     def step(self, damping: float, free_shared: Bools, free_own: Bools) -> tuple[Array, Array]:
         """-(H + damping I)^-1 g over the free numbers: (s,) and (K, o), zero where not free."""
-        shares, sides, solved = self.reduced(damping, free_own)
-        square = shares.sum(axis=0) + np.diag(self.prior_block)
-        side = sides.sum(axis=0) + self.prior_gradient
-        shared = np.zeros(self.s)
-        if free_shared.any():
-            square, side = square[np.ix_(free_shared, free_shared)], side[free_shared]
-            size = np.sqrt(self.reference[free_shared])
-            shared[free_shared] = -damped_solution(square, side, damping, np.ones_like(size) if damping else size)
-        return shared, -(solved[:, :, self.s] + solved[:, :, : self.s] @ shared)
+        s, count = self.s, self.roots.shape[2]
+        rows = self.roots * np.concatenate([np.ones((len(free_own), s)), free_own], axis=1)[:, None]
+        floor = (EPS * count) ** 2 * np.sum(rows[:, :, s:] ** 2, axis=(1, 2))
+        added = np.sqrt(np.maximum(damping, floor)[:, None] * free_own)
+        damper = np.zeros((len(rows), count - s, count))
+        damper[:, :, s:] = added[:, :, None] * np.eye(count - s)
+        found = eliminate(np.concatenate([rows, damper], axis=1), s)
+        own_side = self.own_gradient * free_own
+        side = self.shared_gradient + np.einsum("kos,ko->s", found.gain, own_side)
+        shared = np.zeros(s)
+        whole = np.concatenate([stacked(found.left), np.diag(np.sqrt(self.prior_block)), damping**0.5 * np.eye(s)])
+        root = pseudo_root(triangle(whole[:, free_shared]))
+        shared[free_shared] = -root.square @ side[free_shared]
+        own = found.gain @ shared - np.einsum("kij,kj->ki", found.own.square, own_side)
+        return shared, own * free_own
 
     def own_step(self, shared: Array, damping: Array, free_own: Bools) -> Array:
         """(K, o): the step of the own numbers beside a step (s,) of the shared ones, with a damping (K,) of each."""
@@ -130,19 +114,6 @@ class ArrowSystem:
         return float(self.expected_falls(shared, own).sum()) - priors
 
 
-def damped_solution(square: Array, side: Array, damping: float, size: Array) -> Array:
-    """(n,) (S + damping I)^-1 side of a symmetric S (n, n); directions without information have no part in it.
-
-    ``size``: (n,) units of rows and columns, in which an eigenvalue is rounding or not.
-    """
-    unit = np.where(size > 0, size, 1.0)
-    values, vectors = np.linalg.eigh(square / np.outer(unit, unit))
-    some = values > NO_INFORMATION * values[-1]
-    bent = np.where(some, values, 0.0) + damping
-    along = np.where(bent > 0, vectors.T @ (side / unit) / np.where(bent > 0, bent, 1.0), 0.0)
-    return np.asarray((vectors @ along) / unit)
-
-
 def assemble(
     problem: RecordedResiduals,
     evaluated: Rows,
@@ -158,8 +129,9 @@ def assemble(
     ``evaluated`` is their Jacobian there, ``curvature`` the weights C of its rows in the blocks, by default the loss's.
     """
     s, n = len(shared), len(shared) + own.shape[1]
-    costs, blocks, gradients = np.zeros(len(which)), np.zeros((len(which), n, n)), np.zeros((len(which), n))
-    plain = curvature is None and not loss.robust
+    costs, roots, gradients = np.zeros(len(which)), np.zeros((len(which), n, n)), np.zeros((len(which), n))
+    plain, prior = curvature is None and not loss.robust, np.zeros((n - s, n))
+    square, slope, cost = prior_terms(problem.own, own)
     weighting = curvature or loss.weight
     for k, (r, by_shared, by_own) in enumerate(evaluated):
         if not (np.isfinite(r).all() and np.isfinite(by_shared).all() and np.isfinite(by_own).all()):
@@ -168,15 +140,15 @@ def assemble(
         scale = np.concatenate([problem.shared.scale, problem.own.scale[which[k]]])
         rows = np.concatenate([by_shared, by_own], axis=1) * scale
         costs[k] = weights[k] * loss.value(r)
-        blocks[k] = weights[k] * (rows.T @ rows if plain else (rows.T * weighting(r)) @ rows)
+        weighted = rows if plain else rows * np.sqrt(weighting(r))[:, None]
+        prior[:, s:] = np.diag(np.sqrt(square[which[k]]))
+        roots[k] = triangle(np.concatenate([np.sqrt(weights[k]) * weighted, prior]))
         gradients[k] = weights[k] * (rows.T @ loss.influence(r))
-    square, slope, cost = prior_terms(problem.own, own)
-    inside = np.arange(s, n)
-    blocks[:, inside, inside] += square[which]
     gradients[:, s:] += slope[which]
     costs += cost[which].sum(axis=1)
     square, slope, cost = prior_terms(problem.shared, shared)
-    return ArrowSystem(costs, blocks, gradients, float(cost.sum()), square, slope)
+    blocks = roots.transpose(0, 2, 1) @ roots
+    return ArrowSystem(costs, roots, blocks, gradients, float(cost.sum()), square, slope)
 
 
 def prior_terms(parameters: FitParameters, values: Array) -> tuple[Array, Array, Array]:

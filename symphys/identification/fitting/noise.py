@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from symphys.identification.fitting.robust_loss import RobustLoss
-from symphys.identification.inference.uncertainty import Information, pseudo_inverse
+from symphys.identification.inference.uncertainty import Information
 from symphys.identification.interface import Array, Ints, RecordedResiduals, ResidualRows, Rows
 
 LEAST = 1e-12
@@ -63,14 +63,13 @@ def noise_factors(
 ) -> Array:
     """(q,) noise of each quantity by what its residuals are divided by; 1 where it is given."""
     count = len(problem.quantities)
-    inverse, _ = pseudo_inverse(information.shared, information.reference)
     quantities, leverages = [], []
     for at, (k, (_, by_shared, by_own)) in enumerate(zip(which, evaluated, strict=True)):
         quantities.append(problem.rows(int(k)).quantity)
         own_rows = by_own * problem.own.scale[k] * information.free_own[at]
         ahead = by_shared * problem.shared.scale * information.free_shared + own_rows @ information.gain[at]
-        alone = np.einsum("ma,ab,mb->m", own_rows, information.own_inverse[at], own_rows)
-        leverages.append(np.einsum("ma,ab,mb->m", ahead, inverse, ahead) + alone)
+        alone = own_rows @ information.own.whitener[at]
+        leverages.append(np.sum((ahead @ information.shared.whitener) ** 2, axis=1) + np.sum(alone**2, axis=1))
     r, quantity, leverage = (np.concatenate(each) for each in ([r for r, _, _ in evaluated], quantities, leverages))
     factors = np.ones(count)
     for _ in range(TURNS):

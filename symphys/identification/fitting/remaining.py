@@ -8,11 +8,13 @@ part in whether a fit has converged, and steps along it bring nothing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from symphys.identification.fitting.arrow import ArrowSystem
+from symphys.identification.fitting.square_root import stacked, triangle
 from symphys.identification.interface import Array, Bools, FitParameters, Ints
 
 VAGUE = 10.0
@@ -37,14 +39,17 @@ class DeterminedArrow:
         """``damping`` is added to the squares, as in a step of Levenberg-Marquardt."""
         s = system.s
         self.system, self.units = system, units
-        blocks = system.blocks * units[:, :, None] * units[:, None, :]
-        self.own_inverse, vague_own = determined_inverse(blocks[:, s:, s:], damping)
-        coupling = blocks[:, :s, s:]
-        self.gain = -self.own_inverse @ coupling.transpose(0, 2, 1)
-        shared = units[0, :s]
-        prior = np.diag(system.prior_block * shared**2)
-        whole = blocks[:, :s, :s].sum(axis=0) + prior + np.einsum("ksa,kat->st", coupling, self.gain)
-        self.shared_inverse, vague_shared = determined_inverse(whole, damping)
+        rows, shared = system.roots * units[:, None, :], units[0, :s]
+        own, vague_own = determined_root(rows[:, :, s:], damping)
+        self.own_inverse = own @ own.transpose(0, 2, 1)
+        below = np.zeros((len(rows), own.shape[1], rows.shape[2]))
+        below[:, :, s:] = math.sqrt(damping) * np.eye(own.shape[1])
+        damped = np.concatenate([rows, below], axis=1)
+        self.gain = -own @ damped[:, :, :s]
+        left = damped[:, :, :s] + damped[:, :, s:] @ self.gain
+        whole = np.concatenate([stacked(left), np.diag(np.sqrt(system.prior_block) * shared)])
+        root, vague_shared = determined_root(triangle(whole), damping)
+        self.shared_inverse = root @ root.T
         self.vague_shared, self.vague_own = vague_shared & (shared > 0), vague_own & (units[:, s:] > 0)
 
     @property
@@ -68,12 +73,18 @@ class DeterminedArrow:
         return shared * self.units[0, :s], own * self.units[:, s:]
 
 
-def determined_inverse(square: Array, damping: float) -> tuple[Array, Bools]:
-    """Inverses of damped symmetric (..., n, n) without what is vague, and (..., n) which numbers that concerns."""
-    values, vectors = np.linalg.eigh(square)
-    vague = values < 1 / VAGUE**2
-    inverse = np.where(vague, 0.0, 1 / (np.where(vague, 1.0, values) + damping))
-    found = (vectors * inverse[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+def determined_root(rows: Array, damping: float) -> tuple[Array, Bools]:
+    """Pseudo-inverses (..., n, m + n) of rows (..., m, n) over a damper sqrt(damping) I, without what is vague.
+
+    Also (..., n) which numbers take part in what is vague.
+    """
+    left, sizes, right = np.linalg.svd(rows, full_matrices=False)
+    vectors = np.swapaxes(right, -1, -2)
+    vague = sizes < 1 / VAGUE
+    inverse = np.where(vague, 0.0, 1 / (np.where(vague, 1.0, sizes) ** 2 + damping))
+    above = (vectors * (sizes * inverse)[..., None, :]) @ np.swapaxes(left, -1, -2)
+    below = (vectors * (math.sqrt(damping) * inverse)[..., None, :]) @ right
+    found = np.concatenate([above, below], axis=-1)
     return found, np.any((np.abs(vectors) > PART) & vague[..., None, :], axis=-1)
 
 

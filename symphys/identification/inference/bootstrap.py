@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from symphys.identification.fitting.arrow import NO_INFORMATION, ArrowSystem
+from symphys.identification.fitting.arrow import ArrowSystem
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.state import FitOptions, FitState, begin
 from symphys.identification.inference.uncertainty import LEVEL, Information
@@ -27,6 +27,8 @@ FEWEST = 5
 """Recordings that a bootstrap needs."""
 FEWEST_DRAWS = 100
 """Draws that an interval needs."""
+NO_INFORMATION = 1e-10
+"""Of the information of all recordings: what a draw has less of along a direction is none."""
 CHUNK = 256
 """Draws that are solved at once, so that memory does not grow with them."""
 
@@ -65,7 +67,7 @@ def bootstrap(
     """
     if draws < FEWEST_DRAWS:
         raise IdentificationError(f"{draws} draws of a bootstrap: at least {FEWEST_DRAWS} make an interval")
-    recordings, s = information.shares.shape[:2]
+    recordings, s = len(information.left), len(shared)
     if recordings < FEWEST:
         return no_bootstrap(s, f"a bootstrap over recordings needs at least {FEWEST}, there are {recordings}")
     weights = resampling_weights(recordings, draws, seed)
@@ -94,20 +96,19 @@ def steps(
     problem: RecordedResiduals, shared: Array, system: ArrowSystem, information: Information, weights: Array
 ) -> Array:
     """(b, s) where one Gauss-Newton step with the weights (b, K) leads, within the bounds."""
-    s, free = len(shared), np.flatnonzero(information.free_shared)
+    s, whitener = len(shared), information.shared.whitener
     sides = system.gradients[:, :s] + np.einsum("kos,ko->ks", information.gain, system.own_gradient)
-    prior, slope = np.diag(system.prior_block)[np.ix_(free, free)], system.prior_gradient[free]
-    unit = np.sqrt(np.maximum(information.reference[free], np.finfo(float).tiny))
-    shares, sides = information.shares[:, free][:, :, free], sides[:, free]
+    rows = information.left @ whitener
+    shares = rows.transpose(0, 2, 1) @ rows
+    prior = whitener.T @ (system.prior_block[:, None] * whitener)
     moved = np.zeros((len(weights), s))
     for start in range(0, len(weights), CHUNK):
         some = weights[start : start + CHUNK]
-        square = (np.tensordot(some, shares, 1) + prior) / np.outer(unit, unit)
-        values, vectors = np.linalg.eigh(square)
+        values, vectors = np.linalg.eigh(np.tensordot(some, shares, 1) + prior)
         known = values > NO_INFORMATION * np.max(values, axis=1, initial=0.0, keepdims=True)
-        along = np.einsum("bij,bi->bj", vectors, (some @ sides + slope) / unit)
+        along = np.einsum("bij,bi->bj", vectors, (some @ sides + system.prior_gradient) @ whitener)
         along = np.where(known, along / np.where(known, values, 1.0), 0.0)
-        moved[start : start + CHUNK, free] = -np.einsum("bij,bj->bi", vectors, along) / unit
+        moved[start : start + CHUNK] = -np.einsum("bij,bj->bi", vectors, along) @ whitener.T
     return np.clip(shared + moved * problem.shared.scale, problem.shared.lower, problem.shared.upper)
 
 

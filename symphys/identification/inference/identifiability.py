@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.fitting.square_root import ROUNDING, eliminate, triangle
 from symphys.identification.inference.advice import advice
 from symphys.identification.inference.uncertainty import Information
 from symphys.identification.interface import Array, Ints, RecordedResiduals, Rows
@@ -26,8 +27,6 @@ SMALL = 0.02
 """A component of a direction is none if it is smaller, relative to the largest."""
 EXPONENTS = (1, 2, 3)
 """Largest powers that are tried."""
-ROUNDING = 1e-10
-"""A singular value is none if it is smaller, relative to the largest: derivatives have rounding."""
 NOTHING = 1e3
 """Standard error, in units of the numbers, above which a direction has no information at all."""
 FAR = 0.1
@@ -85,12 +84,9 @@ def reduced_rows(
         free = information.free_own[at]
         own_rows = np.concatenate([weight * by_own, np.diag(prior[k])])[:, free] * problem.own.scale[k][free]
         shared_rows = np.concatenate([weight * by_shared, np.zeros((o, s))])
-        lengths = np.linalg.norm(own_rows, axis=0)
-        left, sizes, _ = np.linalg.svd(own_rows / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
-        range_of_own = left[:, sizes > ROUNDING * np.max(sizes, initial=0.0)]
-        left_over = shared_rows - range_of_own @ (range_of_own.T @ shared_rows)
-        stacked.append(np.asarray(np.linalg.qr(left_over, mode="r")))
-    return np.asarray(np.linalg.qr(np.concatenate(stacked), mode="r"))
+        both = np.concatenate([shared_rows, own_rows], axis=1)
+        stacked.append(triangle(eliminate(both[None], s).left[0]))
+    return triangle(np.concatenate(stacked))
 
 
 def direction_error(rows: Array, directions: Array, largest: float) -> float:

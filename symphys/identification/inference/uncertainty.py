@@ -5,9 +5,14 @@ squares M is H, and the covariance its inverse, which is the Cramer-Rao bound un
 has psi^2 and H psi': the sandwich (Huber 1967, White 1980). Residuals are in units of the noise, whether it is given or
 estimated (``noise``), so no factor is left.
 
-The own numbers are eliminated, recording by recording. Numbers at a bound are held: their intervals are nan, and those
-of the others hold under that condition. A direction without information has the standard error inf, and so has an own
-number that takes part in a vague one (``remaining``): that of the Jacobian is beyond where the Jacobian holds.
+The own numbers are eliminated, recording by recording, and all of it is done with square roots (``square_root``), so
+that a Jacobian of condition 1e12 has its errors. What has no information is what the rounding of the derivatives makes:
+where a singular value is small enough to ask, the Jacobian is evaluated once more, some units of the last digit away
+(``derivative_noise``). Numbers without effect have no part in the errors of the others.
+
+Numbers at a bound are held: their intervals are nan, and those of the others hold under that condition. A direction
+without information has the standard error inf, and so has an own number that takes part in a vague one (``remaining``):
+that of the Jacobian is beyond where the Jacobian holds.
 """
 
 from __future__ import annotations
@@ -17,15 +22,28 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from symphys.identification.fitting.arrow import NO_INFORMATION, ArrowSystem, assemble
+from symphys.identification.fitting.arrow import ArrowSystem, assemble
 from symphys.identification.fitting.levenberg_marquardt import movable
 from symphys.identification.fitting.remaining import DeterminedArrow, number_units
 from symphys.identification.fitting.robust_loss import RobustLoss
+from symphys.identification.fitting.square_root import (
+    EPS,
+    TOUCHED,
+    Root,
+    eliminate,
+    pseudo_root,
+    stacked,
+    triangle,
+)
 from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals, Rows
 
 LEVEL = 0.95
-TOUCHED = 1e-3
-"""A number takes part in a direction without information if its component is larger."""
+SUSPICIOUS = 1e-8
+"""Singular values below this share of the largest are compared with the rounding of the derivatives."""
+NUDGE = 8 * EPS
+"""Of numbers: how far away the Jacobian is evaluated once more to see its rounding."""
+MOST_NOISE = 1e-9
+"""Of the longest column: rounding is no larger. A larger change is the other side of a kink."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,23 +51,31 @@ class Information:
     """The arrow at an estimate with the own numbers eliminated, in scaled numbers; k recordings that were fitted.
 
     Attributes:
-        shared: (s, s) the Schur complement S.
-        reference: (s,) the diagonal before the elimination.
-        shares: (k, s, s) what each recording adds to it.
-        own_inverse: (k, o, o) D^-1, without the directions that have no information.
-        own_open: (k, o) numbers that take part in such a direction.
+        shared: the root of the Schur complement S, priors included.
+        left: (k, n, s) what each recording adds to it, as rows: S is the sum of left' left.
+        own: roots of the own blocks D.
         gain: (k, o, s) -D^-1 B', how the own estimates follow the shared ones.
         free_shared, free_own: (s,), (k, o) False for what a bound holds.
     """
 
-    shared: Array
-    reference: Array
-    shares: Array
-    own_inverse: Array
-    own_open: Bools
+    shared: Root
+    left: Array
+    own: Root
     gain: Array
     free_shared: Bools
     free_own: Bools
+
+    @property
+    def own_open(self) -> Bools:
+        """(k, o) numbers that take part in a direction without information."""
+        return self.own.touched & self.free_own
+
+    @property
+    def suspicious(self) -> bool:
+        """Whether something may be rounding."""
+        own = np.min(self.own.weakest, initial=1.0)
+        lost = self.shared.touched[self.free_shared].any() or self.own_open.any()
+        return bool(lost or min(float(own), float(self.shared.weakest)) < SUSPICIOUS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,50 +108,62 @@ class Uncertainty:
         return np.stack([value - half, value + half], axis=1)
 
 
-def pseudo_inverse(matrices: Array, size: Array) -> tuple[Array, Bools]:
-    """Inverses of symmetric (..., n, n) without what has no information, and (..., n) which numbers that concerns.
+def make_information(
+    system: ArrowSystem, free_shared: Bools, free_own: Bools, noise: tuple[Array, Array] | None = None
+) -> Information:
+    """Eliminate the own numbers from an arrow, (s,) and (k, o) of whose numbers are free.
 
-    ``size``: (..., n) what rounding of the diagonal is small against.
+    ``noise``: (k, n, n) rows of the rounding of the roots, and (k, o) the lengths of its own columns.
     """
-    unit = np.where(size > 0, np.sqrt(size), 1.0)
-    values, vectors = np.linalg.eigh(matrices / unit[..., :, None] / unit[..., None, :])
-    none = values <= NO_INFORMATION * np.max(values, axis=-1, initial=0.0, keepdims=True)
-    inverse = np.where(none, 0.0, 1 / np.where(none, 1.0, values))
-    found = (vectors * inverse[..., None, :]) @ np.swapaxes(vectors, -1, -2)
-    touched = np.any((np.abs(vectors) > TOUCHED) & none[..., None, :], axis=-1)
-    return found / unit[..., :, None] / unit[..., None, :], touched
-
-
-def make_information(system: ArrowSystem, free_shared: Bools, free_own: Bools) -> Information:
-    """Eliminate the own numbers from an arrow, (s,) and (k, o) of whose numbers are free."""
     s = system.s
-    masked = (
-        system.blocks * np.concatenate([np.broadcast_to(free_shared, (len(free_own), s)), free_own], axis=1)[:, None]
-    )
-    masked = masked * np.concatenate([np.broadcast_to(free_shared, (len(free_own), s)), free_own], axis=1)[:, :, None]
-    inverse, touched = pseudo_inverse(masked[:, s:, s:], np.diagonal(masked[:, s:, s:], axis1=1, axis2=2))
-    coupling = masked[:, :s, s:]
-    gain = -inverse @ coupling.transpose(0, 2, 1)
-    shares = masked[:, :s, :s] + coupling @ gain
-    whole = shares.sum(axis=0) + np.diag(system.prior_block * free_shared)
-    return Information(
-        whole, system.reference * free_shared, shares, inverse, touched & free_own, gain, free_shared, free_own
-    )
+    free = np.concatenate([np.broadcast_to(free_shared, (len(free_own), s)), free_own], axis=1)
+    rounding, own_noise = (np.zeros_like(system.roots), np.zeros(free_own.shape)) if noise is None else noise
+    found = eliminate(system.roots * free[:, None], s, own_noise)
+    rows = np.concatenate([stacked(found.left), np.diag(np.sqrt(system.prior_block) * free_shared)])
+    moved = rounding[:, :, :s] + rounding[:, :, s:] @ found.gain
+    lengths = np.linalg.norm(stacked(moved), axis=0)
+    longest = float(np.max(np.linalg.norm(rows, axis=0), initial=0.0))
+    shared = pseudo_root(triangle(rows), np.minimum(lengths, MOST_NOISE * longest) * free_shared)
+    return Information(shared, found.left, found.own, found.gain, free_shared, free_own)
 
 
 def covariances(bread: Information, meat: ArrowSystem) -> tuple[Array, Array, Bools]:
     """Scaled covariances H^-1 M H^-1: (s, s), and (k, o) variances of own numbers; (s,) shared ones left open."""
-    inverse, open_shared = pseudo_inverse(bread.shared, bread.reference)
-    s = len(inverse)
-    scores = meat.blocks
-    ahead = np.concatenate([np.broadcast_to(np.eye(s), (len(scores), s, s)), bread.gain.transpose(0, 2, 1)], axis=2)
-    filling = np.einsum("kai,kij,kbj->ab", ahead, scores, ahead) + np.diag(meat.prior_block)
-    shared = inverse @ filling @ inverse
-    moved = bread.gain @ shared @ bread.gain.transpose(0, 2, 1)
-    alone = bread.own_inverse @ scores[:, s:, s:] @ bread.own_inverse
-    both = bread.gain @ inverse @ (ahead @ scores[:, :, s:]) @ bread.own_inverse
-    own = np.diagonal(moved + alone + both + both.transpose(0, 2, 1), axis1=1, axis2=2)
-    return shared, own, open_shared & bread.free_shared
+    s, inverse = meat.s, bread.shared.square
+    ahead = meat.roots[:, :, :s] + meat.roots[:, :, s:] @ bread.gain
+    moves = ahead @ bread.shared.whitener @ bread.shared.whitener.T
+    prior = np.sqrt(meat.prior_block)[:, None] * inverse
+    shared = np.einsum("kna,knb->ab", moves, moves) + prior.T @ prior
+    followed = moves @ bread.gain.transpose(0, 2, 1)
+    alone = meat.roots[:, :, s:] @ bread.own.whitener @ bread.own.whitener.transpose(0, 2, 1)
+    by_shared = np.einsum("kos,st,kot->ko", bread.gain, shared, bread.gain)
+    own = by_shared + np.sum(alone * (alone + 2 * followed), axis=1)
+    return shared, own, bread.shared.touched & bread.free_shared
+
+
+def derivative_noise(
+    problem: RecordedResiduals, evaluated: Rows, shared: Array, own: Array, which: Ints, loss: RobustLoss
+) -> tuple[Array, Array]:
+    """Rounding of the Jacobian: how it changes where all numbers change by units of their last digit.
+
+    Returns:
+        (k, n, n) roots of the changes of each recording, and (k, o) lengths of those of its own columns, in scales.
+    """
+    nudged = [
+        np.clip(values + NUDGE * np.maximum(np.abs(values), parameters.scale), parameters.lower, parameters.upper)
+        for parameters, values in ((problem.shared, shared), (problem.own, own))
+    ]
+    again, s, n = problem.jacobian(nudged[0], nudged[1], which), len(shared), len(shared) + own.shape[1]
+    found, longest = np.zeros((len(which), n, n)), np.zeros(len(which))
+    for k, (first, second) in enumerate(zip(evaluated, again, strict=True)):
+        scale = np.concatenate([problem.shared.scale, problem.own.scale[which[k]]])
+        weight = np.sqrt(loss.weight(first[0]))[:, None] * scale
+        changed = np.concatenate([second[1] - first[1], second[2] - first[2]], axis=1) * weight
+        if np.isfinite(changed).all():
+            found[k] = triangle(changed)
+        longest[k] = np.max(np.linalg.norm(first[2] * weight[:, s:], axis=0), initial=0.0)
+    own_lengths = np.linalg.norm(found[:, :, s:], axis=1)
+    return found, np.minimum(own_lengths, MOST_NOISE * longest[:, None])
 
 
 def uncertainty(
@@ -151,6 +189,9 @@ def uncertainty(
         system = assemble(*given, lambda r: np.full(r.shape, share))
         squares = assemble(*given, lambda r: loss.influence(r) ** 2)
     bread = make_information(system, free_shared, free_own)
+    if bread.suspicious:
+        noise = derivative_noise(problem, evaluated, shared, own, which, loss)
+        bread = make_information(system, free_shared, free_own, noise)
     covariance, own_variance, open_shared = covariances(bread, squares)
     size = sum(len(r) for r, _, _ in evaluated)
     freedom = size - int(free_shared.sum()) - int(free_own.sum())
