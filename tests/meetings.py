@@ -48,7 +48,7 @@ def shape(kind: str, size: Any, place: Any) -> Any:
 def course(motion: Any, dt: Any) -> PredictedPath:
     """A body's course from position, orientation, velocity, acceleration and the same of its turning."""
     p, q, v, a, w, alpha = (motion[i:j] for i, j in ((0, 3), (3, 7), (7, 10), (10, 13), (13, 16), (16, 19)))
-    return PredictedPath(p, rotation.matrix(q), v, a, w, alpha, dt)
+    return PredictedPath(p, rotation.matrix(q), v, a, w, alpha, dt, None, None)
 
 
 @dataclass(frozen=True)

@@ -190,6 +190,8 @@ def motion_from(
         angular_velocity=w,
         angular_acceleration=(apply(inverse_mid, mid_momentum) - w) * (2 / dt),
         dt=dt,
+        true_velocity=None,
+        gravity=gravity,
         mass=mass,
         inertia=inertia,
         orientation=state.orientation,

@@ -128,7 +128,8 @@ def _motion(
         force=push[0] + share * part["reaction_force"],
         torque=push[1] + share * part["reaction_torque"],
     )
-    return free_motion(mass, inertia, state, gravity, duration, jointed)
+    found = free_motion(mass, inertia, state, gravity, duration, jointed)
+    return replace(found, true_velocity=part["velocity"])
 
 
 def _index(body: int | None) -> int:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.export.mjcf_bodies import StartState
-from symphys.model.heightfield import Heightfield, weights
+from symphys.model.height_limits import off_triangles
+from symphys.model.heightfield import FINER, Heightfield
 from symphys.model.shapes import Terrain
 
 Array = NDArray[np.float64]
@@ -18,8 +19,6 @@ AROUND = 10.0
 """[m] on every side of the bodies at the start, where terrain without a grid is sampled."""
 STEP = 0.2
 """[m] between its samples."""
-FINER = 4
-"""Parts of a spacing at which a surface is compared with its triangles."""
 THICKNESS = 1.0
 """[m] of what is solid below the lowest height."""
 
@@ -55,11 +54,7 @@ def sampled(terrain: Terrain, grid: Grid, finer: int = 1) -> Array:
     columns, rows = (finer * (n - 1) + 1 for n in grid.count)
     height = terrain.height
     if isinstance(height, Heightfield):
-        across, along = (
-            np.array(ca.horzcat(*weights(ca.DM(np.arange(n) / finer), size)))
-            for n, size in zip((columns, rows), reversed(height.coefficients.shape), strict=True)
-        )
-        return np.asarray(along @ height.coefficients @ across.T)
+        return height.on_grid(np.arange(rows) / finer, np.arange(columns) / finer)
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     function = ca.Function("height", [x, y], [ca.densify(ca.SX(height(x, y)))])
     xs, ys = (
@@ -73,18 +68,7 @@ def sampled(terrain: Terrain, grid: Grid, finer: int = 1) -> Array:
 def deviation(terrain: Terrain, grid: Grid) -> float:
     """[m]: the farthest that a surface is from the triangles on its grid, whichever way the squares are cut."""
     fine = sampled(terrain, grid, FINER)
-    corners = fine[::FINER, ::FINER]
-    z00, z10, z01, z11 = corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:]
-    most = 0.0
-    for row in range(FINER + 1):
-        for column in range(FINER + 1):
-            u, v = column / FINER, row / FINER
-            there = fine[row : fine.shape[0] - FINER + row : FINER, column : fine.shape[1] - FINER + column : FINER]
-            near, far = z00 + u * (z10 - z00) + v * (z01 - z00), z11 + (1 - u) * (z01 - z11) + (1 - v) * (z10 - z11)
-            rising = z00 + (u * (z10 - z00) + v * (z11 - z10) if u >= v else v * (z01 - z00) + u * (z11 - z01))
-            falling = near if u + v <= 1 else far
-            most = max(most, float(np.abs(there - rising).max()), float(np.abs(there - falling).max()))
-    return most
+    return off_triangles(fine, fine[::FINER, ::FINER], FINER)
 
 
 def height_field(start: StartState, terrain: Terrain) -> Element:

@@ -1,4 +1,8 @@
-"""A surface through heights on a grid: cubic B-splines in x times cubic B-splines in y, twice differentiable."""
+"""A surface through heights on a grid that nowhere leaves the range of the four heights around a place.
+
+It is the natural cubic spline, twice differentiable, where that keeps the range. Elsewhere its slopes at the heights
+are lowered (``height_limits``): there it is differentiable once, with finite second derivatives.
+"""
 
 from __future__ import annotations
 
@@ -11,20 +15,51 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.model.height_limits import Slopes, limited, off_triangles
+
 Array = NDArray[np.float64]
 Expr = Any
 """casadi SX, MX or DM, or float"""
 
 PIECES = (1, -4, 6, -4)
 """A cubic B-spline on the knots -2, -1, 0, 1, 2 is the sum of these times max(t - knot, 0)^3 / 6, up to t = 2."""
+VALUE, SLOPE = (1 / 6, 4 / 6, 1 / 6), (-1 / 2, 0, 1 / 2)
+"""Of a cubic B-spline at the heights before, at and after its middle."""
+ROUNDING = 1e-12
+"""Times the largest height: where less would be taken off a slope the spline stays as it is."""
+FINER = 4
+"""Parts of a spacing at which a surface is compared with triangles."""
+MOST_COMPARED = 1_000_000
+"""Places at which it is at most, about."""
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Functions of a place along one side of the grid, on the grid's scale, where heights are 1 apart.
+
+    Attributes:
+        splines: cubic B-splines, with middles at the heights and one step beyond both ends.
+        values: for each height the cubic that is 1 there and 0 at all others, level at all.
+        slopes: for each height the cubic that is 0 at all and level at all others, and has slope 1 there.
+    """
+
+    splines: list[Expr]
+    values: list[Expr]
+    slopes: list[Expr]
+
+
+Term = tuple[list[Expr], Array, list[Expr]]
+"""Functions of y, coefficients (rows, columns) [m], functions of x: a part of the surface is the sum of products."""
 
 
 @dataclass(frozen=True)
 class Heightfield:
-    """z = height(x, y), the natural cubic spline through a grid of heights.
+    """z = height(x, y), a smooth surface through a grid of heights.
 
-    Beyond the edges of the grid it goes straight on: with the height and slope of the edge, and no curvature across it,
-    so that value, slope and curvature are continuous and finite everywhere.
+    Between four neighbours it stays within the range of their heights, so a kerb has no ditch before it, and along the
+    grid's lines it rises and falls as the heights do. It is the natural cubic spline where that does so. Beyond the
+    edges of the grid it goes straight on, with the height and slope of the edge, so that value and slope are continuous
+    and finite everywhere.
 
     Attributes:
         heights: rows along y, columns along x [m]; two or more of each.
@@ -44,16 +79,60 @@ class Heightfield:
 
     def __call__(self, x: Expr, y: Expr) -> Expr:
         """The height at a place [m]; casadi scalars or numbers in, a casadi scalar out."""
-        rows, columns = self.coefficients.shape
-        across = weights((x - self.origin[0]) / self.spacing[0], columns)
-        along = weights((y - self.origin[1]) / self.spacing[1], rows)
-        return total(along, [total(across, row) for row in self.coefficients.tolist()])
+        parts = self._terms((y - self.origin[1]) / self.spacing[1], (x - self.origin[0]) / self.spacing[0])
+        found = [combined(*part) for part in parts]
+        return total([1.0] * len(found), found)
+
+    def on_grid(self, rows: Array, columns: Array) -> Array:
+        """(m, n) [m]: the heights at m places along y and n along x, on the grid's scale."""
+        parts = self._terms(ca.DM(rows), ca.DM(columns))
+        sides = [[np.array(ca.horzcat(*each)) for each in (along, across)] for along, _, across in parts]
+        return np.asarray(sum(along @ part[1] @ across.T for (along, across), part in zip(sides, parts, strict=True)))
+
+    def off_triangles(self, heights: Array | None = None) -> float:
+        """How far it is from the triangles between heights over the same area, whichever way squares are cut [m].
+
+        ``heights``: (m, n) [m], rows along y; None: its own.
+        """
+        corners = self._values if heights is None else heights
+        finer = max(1, min(FINER, int(np.sqrt(MOST_COMPARED / corners.size))))
+        sizes = zip(corners.shape, self._values.shape, strict=True)
+        rows, columns = (np.linspace(0, own - 1, finer * (count - 1) + 1) for count, own in sizes)
+        return off_triangles(self.on_grid(rows, columns), corners, finer)
+
+    def _terms(self, along: Expr, across: Expr) -> list[Term]:
+        """The spline, and what is added to its slopes along x, along y, and to its twist."""
+        (rows, columns), added = self._values.shape, self._added
+        v, u = basis(along, rows), basis(across, columns)
+        terms = [(v.splines, self._coefficients, u.splines)]
+        terms += [(v.values, added.x, u.slopes), (v.slopes, added.y, u.values), (v.slopes, added.twist, u.slopes)]
+        return [term for term in terms if term[1].any()]
 
     @cached_property
-    def coefficients(self) -> Array:
-        """(rows + 2, columns + 2): of the splines, whose middles lie on the grid and one step around it [m]."""
-        heights = np.array(self.heights, float)
-        return natural(natural(heights).T).T
+    def _values(self) -> Array:
+        return np.array(self.heights, float)
+
+    @cached_property
+    def _coefficients(self) -> Array:
+        """(rows + 2, columns + 2): of the splines [m]."""
+        return natural(natural(self._values).T).T
+
+    @cached_property
+    def _added(self) -> Slopes:
+        """What makes the slopes of the spline those that keep the range of the heights; exactly 0 where it does."""
+        (rows, columns), spline = self._values.shape, self._coefficients
+        y, x = ({kind: banded(count, kind) for kind in (VALUE, SLOPE)} for count in (rows, columns))
+        x_slope, y_slope, twist = ((VALUE, SLOPE), (SLOPE, VALUE), (SLOPE, SLOPE))
+        own = Slopes(*(y[one] @ spline @ x[other].T for one, other in (x_slope, y_slope, twist)))
+        kept, least = limited(self._values, own), ROUNDING * float(np.abs(self._values).max())
+        changes = [kept.x - own.x, kept.y - own.y, kept.twist - own.twist]
+        return Slopes(*(np.where(np.abs(change) > least, change, 0.0) for change in changes))
+
+
+def combined(along: Sequence[Expr], coefficients: Array, across: Sequence[Expr]) -> Expr:
+    """The sum of all products of a function of y, a coefficient and a function of x; those of 0 are left out."""
+    pairs = [(weight, row.tolist()) for weight, row in zip(along, coefficients, strict=True) if row.any()]
+    return total([weight for weight, _ in pairs], [total(across, row) for _, row in pairs])
 
 
 def total(weights: Sequence[Expr], values: Sequence[Expr]) -> Expr:
@@ -64,31 +143,48 @@ def total(weights: Sequence[Expr], values: Sequence[Expr]) -> Expr:
     return result
 
 
+def banded(count: int, band: tuple[float, ...]) -> Array:
+    """(count, count + 2): from spline coefficients to values or slopes at the heights."""
+    return np.asarray(sum(share * np.eye(count, count + 2, offset) for offset, share in enumerate(band)))
+
+
 def natural(values: Array) -> Array:
     """(n + 2, m): spline coefficients whose splines pass through (n, m) values, without curvature at both ends."""
     count = len(values)
-    system = np.zeros((count + 2, count + 2))
-    inner = np.arange(count)
-    for offset, share in enumerate((1 / 6, 4 / 6, 1 / 6)):
-        system[inner + 1, inner + offset] = share
-    system[0, :3] = system[-1, -3:] = (1, -2, 1)
+    ends = np.zeros((2, count + 2))
+    ends[0, :3] = ends[1, -3:] = (1, -2, 1)
+    system = np.vstack([ends[:1], banded(count, VALUE), ends[1:]])
     none = np.zeros((1, values.shape[1]))
     return np.asarray(np.linalg.solve(system, np.vstack([none, values, none])))
 
 
-def weights(place: Expr, count: int) -> list[Expr]:
-    """How much each of ``count`` splines, with middles at -1, 0, 1, ..., counts at a place on the grid's scale.
+def basis(place: Expr, count: int) -> Basis:
+    """The functions of a place among ``count`` heights, at 0, 1, ... on the grid's scale.
 
-    Between the edges, at 0 and ``count - 3``, that is the spline's value; beyond, its value and slope at the edge
-    continued. Only the three splines next to an edge have a slope there.
+    Beyond the ends they go on with their value and slope there.
     """
-    inside = ca.fmin(ca.fmax(place, 0.0), count - 3.0)
+    inside = ca.fmin(ca.fmax(place, 0.0), count - 1.0)
     beyond = place - inside
-    found = []
-    for k in range(count):
+    splines, values, slopes = [], [], []
+    for k in range(count + 2):
         value, slope = spline(inside - k + 1)
-        found.append(value + beyond * slope if k < 3 or k >= count - 3 else value)
-    return found
+        splines.append(value + beyond * slope if k < 3 or k >= count - 1 else value)
+    for k in range(count):
+        value, slope = hermite(inside - k)
+        values.append(value)
+        slopes.append(slope)
+    first_half = 2 * place < count - 1
+    slopes[0] = slopes[0] + first_half * beyond
+    slopes[-1] = slopes[-1] + (1 - first_half) * beyond
+    return Basis(splines, values, slopes)
+
+
+def hermite(t: Expr) -> tuple[Expr, Expr]:
+    """The cubics about 0 of ``Basis.values`` and ``Basis.slopes``; 0 beyond -1 and 1."""
+    near = ca.fmin(t, 1.0)
+    rest, after = ca.fmax(near + 1, 0.0), ca.fmax(near, 0.0)
+    square, cube, after_square = rest * rest, rest * rest * rest, after * after
+    return 3 * square - 2 * cube + 4 * after * after_square, cube - square - 4 * after_square
 
 
 def spline(t: Expr) -> tuple[Expr, Expr]:

@@ -84,4 +84,4 @@ def surface_pairs(rollout: Rollout) -> list[SurfacePair]:
 
 def _resting(pose: Expr, dt: float) -> PredictedPath:
     zero = ca.SX.zeros(3)
-    return PredictedPath(pose[:3], rotation.matrix(pose[3:]), zero, zero, zero, zero, ca.SX(dt))
+    return PredictedPath(pose[:3], rotation.matrix(pose[3:]), zero, zero, zero, zero, ca.SX(dt), None, None)

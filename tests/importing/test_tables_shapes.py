@@ -111,6 +111,16 @@ def test_a_large_height_field_is_thinned_and_a_flat_one_a_plane() -> None:
     assert "all its heights are the same" in texts(findings, "approximated")
 
 
+def test_how_far_a_height_field_is_from_its_triangles_is_said() -> None:
+    """A step of 0.5 m between two columns: the cubic leaves the straight line by 0.5 / (6 sqrt(3)) m at most."""
+    steps = field(3, 6, 'elevation="' + "0 0 0 1 1 1 " * 3 + '"')
+    tables, findings = read(steps)
+    heights = np.array(tables["terrain"][0]["heights"])
+    assert (heights.min(), heights.max()) == (0.2, 0.7)
+    told = float(texts(findings, "approximated").split("differ by at most ")[1].split(" mm")[0])
+    assert told == pytest.approx(1000 * 0.5 / (6 * np.sqrt(3)), rel=0.05)
+
+
 def test_a_mesh_is_its_hull() -> None:
     """A cube of 8 corners with a dent, and a ball of 400 points that is thinned to 64."""
     cube = "0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1 0.5 0.5 0.9"

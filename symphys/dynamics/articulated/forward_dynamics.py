@@ -75,7 +75,8 @@ def consistent(
     """
     zero, origin = ca.SX.zeros(3), poses[0][0]
     turned = [_rotation(q) for _, q in poses]
-    body_paths = [PredictedPath(p, r, zero, zero, zero, zero, NOW) for (p, _), r in zip(poses, turned, strict=True)]
+    still = (zero, zero, zero, zero, NOW, None, None)
+    body_paths = [PredictedPath(p, r, *still) for (p, _), r in zip(poses, turned, strict=True)]
     axes = axes_at(kinematic_tree, joints, body_paths, NOW, origin)
     tree = Tree(kinematic_tree, axes, armature=armatures(kinematic_tree, joints))
     parts = list(zip(inertials, poses, turned, momenta, strict=True))

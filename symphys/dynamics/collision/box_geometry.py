@@ -10,7 +10,9 @@ import casadi as ca
 from symphys.dynamics.collision.body_points import axes
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, chosen
 from symphys.dynamics.collision.witness_points import steady
-from symphys.model.shapes import Box
+from symphys.maths.smoothing import TINY_SQUARE
+from symphys.model.scalar import is_zero
+from symphys.model.shapes import Box, Capsule
 
 Expr = Any
 """casadi SX"""
@@ -21,15 +23,32 @@ FACES_FIRST = 1e-6
 """Of the boxes' size: how much farther apart than faces edges must be for a contact of edges."""
 TINY_CHANGE = 1e-15
 """[m] a distance that changes less than this over the step does not change."""
+STEP_UP = 0.0015
+"""[m] the highest step onto which a box slides: less of an overlap with a top does not count as one with its side."""
+THIN = 0.1
+"""Of the shortest edge of both boxes: the same, for small ones."""
+FLUSH = 1e-6
+"""[m] the same in directions that are not upright: less of an overlap is the tolerance of a contact."""
+UPRIGHT = 0.7
+"""Cosine of the angle from the vertical within which a direction of separation belongs to a top."""
 
 
 @dataclass(frozen=True)
 class MovingBox:
-    """A box over the step: paths of its centre and its three axes, half sizes (3,) [m]."""
+    """A box over the step.
+
+    Attributes:
+        centre, axes: paths of its centre and its three axes.
+        halves: (3,) half sizes [m].
+        velocity: (3,) true velocity of its centre at the start [m/s].
+        gravity: (3,) [m/s^2]; None: there is no up and down.
+    """
 
     centre: Parabola
     axes: tuple[Parabola, Parabola, Parabola]
     halves: tuple[Expr, ...]
+    velocity: Expr
+    gravity: Expr | None
 
     def reach(self, direction: Expr, t: Expr) -> Expr:
         """How far it extends from its centre along a vector, times the vector's length."""
@@ -61,9 +80,11 @@ class Face:
         return [self.point(su * self.half_u, sv * self.half_v) for su, sv in signs]
 
 
-def moving_box(box: Box, body_path: PredictedPath) -> MovingBox:
-    """A box that is carried along a path."""
-    return MovingBox(body_path.path(box.centre), axes(body_path, box), box.half_sizes)
+def moving_box(shape: Box | Capsule, body_path: PredictedPath) -> MovingBox:
+    """A box, or the axis of a capsule as one without width, that is carried along a path."""
+    halves = shape.half_sizes if isinstance(shape, Box) else (0.0, 0.0, shape.half_length)
+    velocity = body_path.true_velocity_of(shape.centre)
+    return MovingBox(body_path.path(shape.centre), axes(body_path, shape), halves, velocity, body_path.gravity)
 
 
 def facing(box: MovingBox, direction: Expr, t: Expr) -> Face:
@@ -102,7 +123,8 @@ class Nearing:
 
     Attributes:
         direction: its path, from the second to the first.
-        time: when they begin to overlap along it; 0 if they overlap from the start, the end of the step if never.
+        time: when they begin to overlap along all directions; 0 if they do from the start, the end of the step if
+            never.
         distance: along it, at the start [m].
         apart: 1 if they never overlap along all directions at once.
     """
@@ -116,21 +138,59 @@ class Nearing:
 def nearing(
     a: MovingBox, b: MovingBox, faces: list[Parabola], edges: list[Parabola], dt: Expr, radius: Expr = 0.0
 ) -> Nearing:
-    """How two boxes, the first of them grown by ``radius``, come to overlap; the first of equal directions."""
-    ends = [places(a, b, faces, edges, t, radius) for t in (ca.SX(0), dt)]
-    best, last, largest, first_exit = faces[0], ca.SX(-1), ca.SX(0), ca.SX(1)
-    for direction, (before, reach), (after, reach_after) in zip([*faces, *edges], *ends, strict=True):
+    """How two boxes, the first of them grown by ``radius``, come to overlap; the first of equal directions.
+
+    Which direction is the last is decided on the way that the true velocities lead, without weight, which what carries
+    a box cancels. An overlap that is smaller than a tolerance does not count. So a box that slides on a top meets no
+    side of a block whose top is as high, lower, or higher by up to ``STEP_UP``: there it comes onto the top.
+    """
+    directions, still = [*faces, *edges], (a.centre - b.centre).start
+    starts = places(a, b, faces, edges, ca.SX(0), still, radius)
+    ends = places(a, b, faces, edges, dt, (a.centre - b.centre).at(dt), radius)
+    ways = places(a, b, faces, edges, dt, still + dt * (a.velocity - b.velocity), radius)
+    allowed = tolerances(a, b, directions)
+    best, last, largest, first_exit, met = directions[0], ca.SX(-1), ca.SX(0), ca.SX(1), ca.SX(0)
+    for direction, tolerance, (before, reach), (after, reach_after), (led, _) in zip(
+        directions, allowed, starts, ends, ways, strict=True
+    ):
         side = ca.if_else(before >= 0, 1, -1)
         start, end = side * before - reach, side * after - reach_after
-        enters = ca.if_else(start > 0, crossed(start, end), 0)
+        met = ca.fmax(met, overlaps_from(start, end))
         leaves = ca.if_else(start > 0, 1, crossed(start, end))
         passes = crossed(-side * before - reach, -side * after - reach_after)
         first_exit = ca.fmin(first_exit, ca.fmin(leaves, passes))
+        enters = overlaps_from(start + tolerance, side * led - reach_after + tolerance)
         later = ca.logic_or(enters > last, ca.logic_and(enters == last, start > largest))
         best, last = chosen(later, side * direction, best), ca.if_else(later, enters, last)
         largest = ca.if_else(later, start, largest)
-    apart = ca.logic_or(last > first_exit, last >= 1)
-    return Nearing(steady(best, last * dt, dt), last * dt, largest, apart)
+    apart = ca.logic_or(met > first_exit, met >= 1)
+    return Nearing(steady(best, met * dt, dt), met * dt, largest, apart)
+
+
+def tolerances(a: MovingBox, b: MovingBox, directions: list[Parabola]) -> list[Expr]:
+    """For each direction the overlap [m] up to which boxes do not count as overlapping along it."""
+    gravity = a.gravity if a.gravity is not None else b.gravity
+    if gravity is None:
+        return [ca.SX(FLUSH)] * len(directions)
+    step = ca.fmin(STEP_UP, THIN * 2 * shortest([*a.halves, *b.halves]))
+    up = gravity / ca.sqrt(ca.fmax(ca.dot(gravity, gravity), TINY_SQUARE))
+    found = []
+    for direction in directions:
+        along, lean = direction.start, ca.dot(direction.start, up)
+        upright = lean * lean > UPRIGHT * UPRIGHT * ca.dot(along, along)
+        found.append(ca.if_else(upright, step, FLUSH))
+    return found
+
+
+def shortest(halves: list[Expr]) -> Expr:
+    """The least of half sizes, but for those of a line, which are 0."""
+    wide = [ca.SX(half) for half in halves if not is_zero(half)]
+    return ca.mmin(ca.vertcat(*wide))
+
+
+def overlaps_from(start: Expr, end: Expr) -> Expr:
+    """The share of the step after which a distance that changes evenly is negative: 0 if it is from the start."""
+    return ca.if_else(start > 0, crossed(start, end), 0)
 
 
 def crossed(start: Expr, end: Expr) -> Expr:
@@ -140,10 +200,19 @@ def crossed(start: Expr, end: Expr) -> Expr:
 
 
 def places(
-    a: MovingBox, b: MovingBox, faces: list[Parabola], edges: list[Parabola], t: Expr, radius: Expr
+    a: MovingBox,
+    b: MovingBox,
+    faces: list[Parabola],
+    edges: list[Parabola],
+    t: Expr,
+    apart: Expr,
+    radius: Expr,
 ) -> list[tuple[Expr, Expr]]:
-    """Along each direction at time t: how far the first box is from the second, and how near is overlapping [m]."""
-    apart, found = (a.centre - b.centre).at(t), []
+    """Along each direction at time t: how far the first box is from the second, and how near is overlapping [m].
+
+    ``apart``: (3,) from the second centre to the first then [m].
+    """
+    found = []
     size = sum(a.halves) + sum(b.halves)
     for k, direction in enumerate([*faces, *edges]):
         along = direction.at(t)

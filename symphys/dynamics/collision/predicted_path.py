@@ -83,6 +83,9 @@ class PredictedPath:
         velocity, acceleration: (3,) [m/s], [m/s^2] at t_k.
         angular_velocity, angular_acceleration: (3,) [rad/s], [rad/s^2] at t_k.
         dt: length of the step [s].
+        true_velocity: (3,) at t_k, of which ``velocity`` may lack what persistent forces gave it in the last half
+            step [m/s]; None: it lacks nothing.
+        gravity: (3,) [m/s^2]; None: there is no up and down.
     """
 
     position: Expr
@@ -92,6 +95,8 @@ class PredictedPath:
     angular_velocity: Expr
     angular_acceleration: Expr
     dt: Expr
+    true_velocity: Expr | None
+    gravity: Expr | None
 
     def arm(self, offset: Sequence[Any]) -> Parabola:
         """The path of the body-frame vector ``offset``, in world coordinates."""
@@ -105,6 +110,10 @@ class PredictedPath:
     def centre(self) -> Parabola:
         """The path of the centre of mass."""
         return Parabola(self.position, self.velocity, self.acceleration)
+
+    def true_velocity_of(self, offset: Sequence[Any]) -> Expr:
+        """(3,): the true velocity at t_k of the body's point at body-frame ``offset`` [m/s]."""
+        return (self.velocity if self.true_velocity is None else self.true_velocity) + self.arm(offset).velocity
 
     def path(self, offset: Sequence[Any]) -> Parabola:
         """The path of the body's point at body-frame ``offset`` from the centre of mass."""
@@ -124,4 +133,4 @@ class StillPath(PredictedPath):
 def at_rest(dt: Expr) -> PredictedPath:
     """The path of what is static: its frame is the world's."""
     zero = ca.SX.zeros(3)
-    return PredictedPath(zero, ca.SX.eye(3), zero, zero, zero, zero, dt)
+    return PredictedPath(zero, ca.SX.eye(3), zero, zero, zero, zero, dt, None, None)

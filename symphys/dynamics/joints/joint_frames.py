@@ -87,7 +87,7 @@ def joint_frames_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> Joint
     """The frames of a joint whose bodies are at these positions and orientations."""
     zero = ca.SX.zeros(3)
     return joint_frames_on(
-        joint, [StillPath(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses]
+        joint, [StillPath(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0), None, None) for p, q in poses]
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from symphys.importing.tables.reading import Array, ModelReading, numbers
+from symphys.model.heightfield import Heightfield
 
 MOST_HEIGHTS = 1024
 """That a terrain may have: each is in every contact with it, in every step."""
@@ -35,26 +36,27 @@ def terrain(reading: ModelReading, geom: int, place: Array, axes: Array, found: 
         return
     name = reading.names.give("terrain", reading.name("geom", geom), "terrain")
     reading.static_names[geom] = name
-    kept, off = thinned(heights)
+    kept = thinned(heights)
     text = "a smooth surface through its heights, which goes straight on; MuJoCo's is made of triangles, and ends"
-    if off:
+    if kept.shape != heights.shape:
         text = f"{rows} x {columns} heights are thinned to {kept.shape[0]} x {kept.shape[1]}; {text}"
-    reading.note("approximated", what, text, f"{1e3 * off:.3g} mm" if off else "")
     spacing = [2 * x / (kept.shape[1] - 1), 2 * y / (kept.shape[0] - 1)]
     origin = [place[0] - x, place[1] - y]
+    surface = Heightfield(tuple(map(tuple, kept.tolist())), (spacing[0], spacing[1]), (origin[0], origin[1]))
+    off = f"the surfaces differ by at most {1e3 * surface.off_triangles(heights):.3g} mm"
+    reading.note("approximated", what, text, off)
     table = {"name": name, "heights": numbers(kept), "spacing": numbers(spacing), "origin": numbers(origin)}
     found["terrain"].append(table)
 
 
-def thinned(heights: Array) -> tuple[Array, float]:
-    """At most ``MOST_HEIGHTS`` heights over the same area, and how far straight lines between them are off [m]."""
+def thinned(heights: Array) -> Array:
+    """At most ``MOST_HEIGHTS`` heights over the same area."""
     rows, columns = heights.shape
     if rows * columns <= MOST_HEIGHTS:
-        return heights, 0.0
+        return heights
     shrink = sqrt(MOST_HEIGHTS / (rows * columns))
     few = min(max(2, int(rows * shrink)), MOST_HEIGHTS // 2)
-    kept = resampled(heights, few, min(columns, MOST_HEIGHTS // few))
-    return kept, float(np.abs(resampled(kept, rows, columns) - heights).max())
+    return resampled(heights, few, min(columns, MOST_HEIGHTS // few))
 
 
 def resampled(heights: Array, rows: int, columns: int) -> Array:

@@ -168,8 +168,8 @@ class TerrainTable(MemberTable):
     )
     heights: Grid | None = Field(
         default=None,
-        description="z [m] on a grid, rows along y, columns along x; a smooth surface through them, that goes straight "
-        "on beyond the edges",
+        description="z [m] on a grid, rows along y, columns along x; a smooth surface through them, within the range "
+        "of the four around a place, that goes straight on beyond the edges",
     )
     spacing: Spacing | None = Field(default=None, description="of the grid [m]: a number, or [along x, along y]")
     origin: Pair | None = Field(default=None, description="x and y of the first height [m]; default [0, 0]")

@@ -25,7 +25,7 @@ def test_joints_fit_where_the_coordinates_lead() -> None:
     ]
     (tree,) = kinematic_trees(world.joints)
     joints = [world.joints[link.joint] for link in tree.links if link.joint is not None]
-    paths = [PredictedPath(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0)) for p, q in poses]
+    paths = [PredictedPath(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0), None, None) for p, q in poses]
     starts = joint_starts(tree, joints, paths)
     found = final_poses(tree, joints, starts, [p for p, _ in poses], [ca.SX([turn]) for turn in TURNS])
     after = [(each.position, rotation.multiply(each.turn, q)) for each, (_, q) in zip(found, poses, strict=True)]

@@ -6,8 +6,8 @@ the capsule.
 
 from __future__ import annotations
 
-from symphys.dynamics.collision.body_points import axes, ends
-from symphys.dynamics.collision.box_geometry import MovingBox, facing, moving_box, nearing
+from symphys.dynamics.collision.body_points import ends
+from symphys.dynamics.collision.box_geometry import facing, moving_box, nearing
 from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.pairs.box_box import approach_of, edges_across
 from symphys.dynamics.collision.pairs.sphere_box import BoxField
@@ -21,10 +21,7 @@ def capsule_box(capsule: Capsule, box: Box, a: PredictedPath, b: PredictedPath) 
     """Eight points: the round ends, the side across the box's face, the corners of that face."""
     field, tips = BoxField(box.half_sizes), ends(capsule)
     found = [ball_in_field(a.path(end), a.arm(end), capsule.radius, box, field, b) for end in tips]
-    rod, other = (
-        MovingBox(a.path(capsule.centre), axes(a, capsule), (0.0, 0.0, capsule.half_length)),
-        moving_box(box, b),
-    )
+    rod, other = moving_box(capsule, a), moving_box(box, b)
     edges = [rod.axes[2].cross(edge) for edge in other.axes]
     near = nearing(rod, other, list(other.axes), edges, a.dt, capsule.radius)
     approach = approach_of(near, (a, b), capsule.half_length + sum(box.half_sizes))
