@@ -27,6 +27,8 @@ SMOOTHED = (
     "such as smoothing = [0.1, 0.01, 0]"
 )
 
+DIFFERENTIATING = ("gradient", "least_squares", "ipopt", "stochastic")
+"""Solvers whose gradients are those of the backend: the staged ones have theirs in double precision always."""
 JUDGING = "rolling it out exactly"
 """What announces the judging of a solution."""
 
@@ -58,7 +60,11 @@ def solve(
     at_once = found.result is not None  # else nothing counts before the result is written
     files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays(), at_once)
     if solved is None:
-        outcome, spent = alone(job, shooting, start, monitor, log, keep, found.checkpoint)
+        outcome, spent = alone(
+            job, shooting, start, monitor, log, keep, found.checkpoint, transcription.backend.precision == "single"
+        )
+        if doubt := transcription.backend.later():
+            log(doubt)
     else:
         log("solved side by side with other seeds: the seconds are those of all")
         outcome, spent = solved, solved.trace[-1].seconds if solved.trace else 0.0
@@ -78,15 +84,24 @@ def alone(
     log: Callable[[str], None],
     keep: Keep,
     checkpoint: dict[str, Any] | None,
+    single: bool = False,
 ) -> tuple[Outcome, float]:
-    """Solve; the outcome and the seconds that it took."""
+    """Solve; the outcome and the seconds that it took; ``single``: whether gradients are in single precision."""
     chosen = solver(job.config.solver)
     chosen.prepare()
     began = time.perf_counter()
+    if single and job.config.solver in DIFFERENTIATING:
+        compare_precision(shooting, start, getattr(job.options, "smoothing", (0.0,))[0], log)
     outcome = chosen.solve(
         shooting, start, job.options, job.config.seed, monitor=monitor, checkpoint=checkpoint, log=log, keep=keep
     )
     return outcome, time.perf_counter() - began
+
+
+def compare_precision(shooting: ShootingProblem, start: Array, smoothing: float, log: Callable[[str], None]) -> None:
+    """Evaluate the first gradient, which the kernel compares with double precision; see ``backends.precision``."""
+    log("comparing the first gradient with double precision")
+    shooting.evaluator.gradient(start[None], smoothing)
 
 
 def spent_before(found: Standing) -> float:
