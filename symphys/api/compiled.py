@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -77,6 +78,7 @@ class CompiledRollout:
         """Both, at the cost of the gradient."""
         batch, single = rows(Z, self.n)
         found = self._evaluator.gradient(batch, self.smoothing)
+        self._warn()
         return np.asarray(first(found.merit, single)), np.asarray(first(found.gradient, single))
 
     def residuals(self, Z: ArrayLike) -> Array:
@@ -89,7 +91,9 @@ class CompiledRollout:
         """(B, m, n), or (m, n): of the residuals; SymphysError where there are none."""
         self._require_squares()
         batch, single = rows(Z, self.n)
-        return np.asarray(first(self._evaluator.jacobian(batch, self.smoothing).jacobian, single))
+        jacobian = self._evaluator.jacobian(batch, self.smoothing).jacobian
+        self._warn()
+        return np.asarray(first(jacobian, single))
 
     def evaluate(self, Z: ArrayLike) -> Values:
         """All that a rollout gives: ``objective`` (B,), ``errors`` (B, k) as error / tolerance, ``outputs`` (B, o)."""
@@ -134,6 +138,12 @@ class CompiledRollout:
     def trajectory(self, z: ArrayLike) -> Trajectory:
         """The motion of one z (n,); NotFinite if there is none."""
         return self._made.simulate(np.asarray(z, float), self.smoothing)
+
+    def _warn(self) -> None:
+        """RuntimeWarning where gradients in single precision were found to be far off."""
+        told = self._made.backend
+        if told.precision == "single" and (doubt := told.later()):
+            warnings.warn(f"{self.problem.name}: {doubt}", RuntimeWarning, stacklevel=3)
 
     def _require_squares(self) -> None:
         if not self._made.shooting.squares:

@@ -28,6 +28,8 @@ SMOOTHED = (
     "such as smoothing = [0.1, 0.01, 0]"
 )
 
+DIFFERENTIATING = ("gradient", "least_squares", "ipopt", "stochastic")
+"""Solvers whose gradients are those of the backend: the staged ones have theirs in double precision always."""
 JUDGING = "rolling it out exactly"
 """What announces the judging of a solution."""
 
@@ -63,7 +65,11 @@ def solve(
     claim.check()
     files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays(), at_once)
     if solved is None:
-        outcome, spent = alone(job, shooting, start, monitor, log, keep, found.checkpoint)
+        outcome, spent = alone(
+            job, shooting, start, monitor, log, keep, found.checkpoint, transcription.backend.precision == "single"
+        )
+        if doubt := transcription.backend.later():
+            log(doubt)
         keep_outcome(job, claim, outcome, spent + spent_before(found), bounded)
     else:
         log("solved side by side with other seeds: the seconds are those of all")
@@ -85,14 +91,20 @@ def alone(
     log: Callable[[str], None],
     keep: Keep,
     checkpoint: dict[str, Any] | None,
+    single: bool = False,
 ) -> tuple[Outcome, float]:
-    """Solve; the outcome and the seconds that it took. One that was found already waits in the checkpoint."""
+    """Solve; the outcome and the seconds that it took. One that was found already waits in the checkpoint.
+
+    ``single``: whether gradients are in single precision.
+    """
     if checkpoint and OUTCOME in checkpoint:
         log("solved before; what it found is judged")
         return revived_outcome(checkpoint, job.config.solver), 0.0
     chosen = solver(job.config.solver)
     chosen.prepare()
     began = time.perf_counter()
+    if single and job.config.solver in DIFFERENTIATING:
+        compare_precision(shooting, start, getattr(job.options, "smoothing", (0.0,))[0], log)
     outcome = chosen.solve(
         shooting, start, job.options, job.config.seed, monitor=monitor, checkpoint=checkpoint, log=log, keep=keep
     )
@@ -106,6 +118,12 @@ def keep_outcome(job: Job, claim: Claim, outcome: Outcome, seconds: float, bound
     elif bounded:
         kept = plain_outcome(outcome, job.config.solver, seconds)
         claim.publish(CHECKPOINT, files.json_text(kept).encode())
+
+
+def compare_precision(shooting: ShootingProblem, start: Array, smoothing: float, log: Callable[[str], None]) -> None:
+    """Evaluate the first gradient, which the kernel compares with double precision; see ``backends.precision``."""
+    log("comparing the first gradient with double precision")
+    shooting.evaluator.gradient(start[None], smoothing)
 
 
 def spent_before(found: Standing) -> float:

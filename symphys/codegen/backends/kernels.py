@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from symphys.codegen import Kernel, KernelUnavailable, ProcessorKernel, Program, compile_program
 from symphys.codegen.backends.fastest import FastestKernel
 from symphys.codegen.backends.interface import Description, joined, nothing
+from symphys.codegen.backends.precision import PrecisionCheck
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
 
@@ -35,7 +36,15 @@ def build_kernel(
     Where there is no GPU for it, it is one for the processor, and the note of its report says why. ``threads`` share
     the blocks of a batch there. Of a source those of ``seeded`` that it has. "auto" is the processor's, which takes
     large batches to a GPU where that is faster. ``wait``: for the compiler of a source too; else see ``compiled``.
+    The first gradients in single precision are compared with those in double; see ``precision``.
     """
+    kernel = _built(name, program, seeded, threads, wait)
+    if kernel.report.precision == "single" and kernel.seeded:
+        kernel.check = PrecisionCheck(program, kernel.seeded)
+    return kernel
+
+
+def _built(name: str, program: Program | ProgramSource, seeded: Sequence[str], threads: int, wait: bool) -> Kernel:
     note, precision = "", PRECISIONS[name]
     if name in ON_DEVICE:
         try:
@@ -99,6 +108,6 @@ def described(kernel: Kernel, seconds: float, precision: str | None = None, note
         cached=report.cached,
         seconds=seconds,
         note=joined(report.note, note),
-        later=(lambda: kernel.chosen) if isinstance(kernel, ProcessorKernel) else nothing,
+        later=lambda: kernel.chosen,
         finish=kernel.widths.finish if isinstance(kernel, ProcessorKernel) else nothing,
     )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,12 +20,18 @@ from symphys.codegen.toolchain.report import BuildReport
 
 Outputs = dict[str, NDArray[np.float64]]
 """name -> (batch, size)"""
+GradientCheck = Callable[[Array, tuple[Any, ...]], str]
+"""Of gradients (batch, n) and the arguments of the call that gave them: what the user should know, or empty."""
 
 
 class Kernel(ABC):
     """A compiled program. A row's result does not depend on the other rows."""
 
     threads = 1
+    check: GradientCheck | None = None
+    """Called with the first gradients; what it says is the kernel's ``doubt``."""
+    doubt = ""
+    """What the user should know of the gradients, or empty."""
 
     def __init__(self, program: Program, report: BuildReport, seeded: Sequence[str]) -> None:
         """``seeded``: names of the outputs that are differentiated."""
@@ -63,7 +70,15 @@ class Kernel(ABC):
         batch.discount, batch.skipped = discount, self._checked(skipped)
         outputs, gradient = batch.outputs(self._width()), batch.gradient(self.program.z.size)
         self._run(batch)
+        if self.check is not None and len(gradient):
+            check, self.check = self.check, None
+            self.doubt = check(gradient, (Z, seed, parameters, discount, skipped))
         return self._named(outputs), gradient
+
+    @property
+    def chosen(self) -> str:
+        """What was found out since it was made, in a line, or empty."""
+        return self.doubt
 
     def jacobian(self, z: ArrayLike, name: str, parameters: ArrayLike = ()) -> Array:
         """(size, n) the derivative of an output at one z: a lane for each of its words."""
@@ -124,7 +139,7 @@ class ProcessorKernel(Kernel):
     @property
     def chosen(self) -> str:
         """What was decided since it was made, in a line, or empty."""
-        return self.widths.note
+        return "; ".join(filter(None, (self.widths.note, self.doubt)))
 
     def fixed(self, seed: ArrayLike = ()) -> Fixed:
         """An evaluation of one z at fixed addresses, with a row for each seed (rows, s), or one row without any."""

@@ -128,6 +128,25 @@ def compiled(
         return kernel_of(first, libraries, threads, started, built.cached, built.note), kept
 
 
+def double_reference(program: Program, names: tuple[str, ...]) -> ProcessorKernel:
+    """A kernel in double precision for a few rows, by an interpreter where compiling would take long.
+
+    Raises:
+        KernelUnavailable: there is no compiler, or no cache for the interpreter.
+    """
+    from symphys.codegen.emit.plan import plan
+
+    started, cache, width = time.perf_counter(), default_cache(), BlockWidth(width_of("auto", False), False, False)
+    with uncollected():
+        planned = plan(program, names, width.lanes * width.real)
+    operations = sum(len(graph.nodes) for graph, _ in planned.functions)
+    if operations < WORTH:
+        return compiled(program, names, width, cache, 1)[0]
+    kept = KeptPlan(program, planned, names, "", len(planned.functions), operations, None)
+    libraries = KeptLibraries(kept, width, cache)
+    return kernel_of((width.lanes, libraries.interpreter(planned)), libraries, 1, started, cached=False)
+
+
 def kernel_of(
     first: tuple[int, Loaded],
     libraries: KeptLibraries,
