@@ -18,8 +18,8 @@ from symphys.dynamics.contact.preparation import Conditions, prepare
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.free_rotation import turned
 from symphys.dynamics.joints.assembly import (
+    JointConstraint,
     joint_constraints,
-    joint_paths,
     momenta_of,
     prepare_trees,
     warm_started,
@@ -106,8 +106,7 @@ def advance(
         conditions = Conditions(off, plastic, force, trees.same(bodies), coupled, near)
         constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
         constraints.append(trees.placed(bodies, constraint))
-    jointed = joint_paths(context, x, paths)
-    joints, fitted = joint_constraints(context, x, trees, jointed, duration, kick)
+    jointed, joints, fitted = joint_constraints(context, x, trees, paths, duration, kick)
 
     # 5-6. velocities: warm start (16), then projections (14, 15, 17)
     given = distribute_loads(context, constraints, _warm_start(context, constraints, x, kick))
@@ -132,8 +131,7 @@ def advance(
         add_joint_forces(context, forces | angles, poses, reactions)
         momenta = keep_momentum(context, momenta, closed.made, struck, duration)
         rotors = keep_rotors(context, trees.coordinates, solved.momenta, closed.turned, struck, duration)
-        values |= forces if scheme.warm_start else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
-        values |= commanded(context, joints, forces) | angles
+        values |= _kept(context, joints, forces) | angles
     values |= _moving_bodies(context, motions, momenta, reactions, poses, rotors)
     changes = tuple(zip(solved.impulses, solved.last, strict=True))
     return Substep(values, tuple(constraints), tuple(contacts), impulses, changes)
@@ -180,6 +178,13 @@ def _moving_bodies(
         stored = (*pose, *velocities, *reaction)
         values |= {f"{body.name}.{field}": value for (field, _), value in zip(BODY_FIELDS, stored, strict=True)}
     return values
+
+
+def _kept(context: StepContext, joints: Sequence[JointConstraint], forces: State) -> State:
+    """What is stored of the forces of joints."""
+    warm = context.settings.scheme.warm_start
+    kept = forces if warm else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
+    return kept | commanded(context, joints, forces)
 
 
 @traced

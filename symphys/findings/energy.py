@@ -10,7 +10,7 @@ from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, graded, worst_of
 from symphys.findings.writing import listed, percent, show
 
-ENERGY = "energy"
+ENERGY, JOINTS = "energy", "joints"
 
 AT_REST = 1e-6
 """Of the potential energy: kinetic energy below that is of what hardly moves, and no measure of anything."""
@@ -22,6 +22,10 @@ DRIFT_LIMITS = (1e-6, 1e-2)
 """Energy that nothing accounts for, in one step, as a share of the largest kinetic energy."""
 DRIFTED_LIMITS = (1e-3, 5e-2)
 """The same, added up over the motion."""
+
+
+JUMP_LIMITS = (0.2, 1.0)
+"""Of a joint that jumps, as a share of the most that it moves in a step."""
 
 
 def largest_energy(trust: Examination) -> float:
@@ -68,3 +72,15 @@ def balance_finding(trust: Examination) -> Finding:
     when = f", most in the step from t = {show(trust.drift_at)} s" * math.isfinite(trust.drift_at)
     doubt = total + when if by_energy == BAD else f"{percent(trust.momentum)} of the momentum comes from nowhere"
     return Finding(ENERGY, level, "Left unexplained in a step", number, meaning, doubt * (level == BAD))
+
+
+def jump_findings(trust: Examination) -> list[Finding]:
+    """A joint that jumps, if one does."""
+    level = graded(trust.jump, JUMP_LIMITS)
+    if level in (GOOD, UNKNOWN):
+        return []
+    moved = f"{trust.jump_joint} moves by {show(abs(trust.jump_moved), 2)} {trust.jump_unit}"
+    where = f"{moved} in the step from t = {show(trust.jump_time)} s, which its rate does not account for"
+    meaning = f"The joint {where}: a coupling, a limit or a loop put it there, as where one does not hold at the start."
+    number = f"{percent(trust.jump)} of a step"
+    return [Finding(JOINTS, level, "Joint that jumps", number, meaning, where * (level == BAD))]

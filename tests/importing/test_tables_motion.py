@@ -113,7 +113,8 @@ def test_one_motor_of_several_actuators() -> None:
 
 
 WINCH = """<option gravity="0 0 0"/><worldbody><body><joint name="drum" axis="0 1 0" ref="1" range="-20 30"
-limited="true" stiffness="2" springref="15"/><inertial pos="0 0 0" mass="1" diaginertia="0.5 0.5 0.5"/></body></worldbody>
+limited="true" stiffness="2" springref="15"/>
+<inertial pos="0 0 0" mass="1" diaginertia="0.5 0.5 0.5"/></body></worldbody>
 <actuator><position name="p" joint="drum" kp="2"/></actuator><keyframe><key name="wound" qpos="9"/></keyframe>"""
 
 

@@ -18,7 +18,7 @@ from walker import DT, SCENE, STEPS, hinge, motion, write_walker
 from symphys.report import write_motion, write_run_report
 from symphys.report.figures import style
 from symphys.report.pages.joints import limits_sentence, motors_sentence, separation_sentence
-from symphys.report.robots.joint_figures import BEYOND, FULL, TARGET, axis_range, draw_joints, make_grid, shown, unwound
+from symphys.report.robots.joint_figures import BEYOND, FULL, TARGET, axis_range, draw_joints, make_grid, shown
 from symphys.report.robots.joint_use import channels, separation
 from symphys.results.scene import Scene
 from symphys.trajectory import Trajectory
@@ -144,12 +144,6 @@ def test_limits_that_are_reached_are_named(load: Load) -> None:
     arrays["joint_value"][7, [0, KNEE], 0] = [-1.0, 1.9995]
     arrays["joint_value"][8, 1, 0] = 1.99
     assert limits_sentence(channels(*load(arrays))) == "fl_hip and fr_knee come to a limit."
-
-
-def test_an_angle_that_goes_round_has_a_gap() -> None:
-    line = unwound(np.array([3.0, 3.1, -3.1, -3.0]))
-    assert np.isnan(line).tolist() == [False, True, False, False]
-    assert not np.isnan(unwound(np.array([0.0, 3.0, 0.0]))).any()
 
 
 def test_an_axis_shows_limits_that_are_near_and_no_noise_at_large() -> None:

@@ -147,27 +147,22 @@ def joint_paths(context: StepContext, x: State, paths: Sequence[PredictedMotion]
 
 
 def joint_constraints(
-    context: StepContext,
-    x: State,
-    trees: KinematicTrees,
-    paths: Sequence[JointPath],
-    duration: Expr,
-    kick: Expr,
-) -> tuple[list[JointConstraint], list[PlacedConstraint]]:
-    """(what the sweeps project, what the position pass closes) of all joints over a substep from x."""
+    context: StepContext, x: State, trees: KinematicTrees, paths: Sequence[PredictedMotion], duration: Expr, kick: Expr
+) -> tuple[list[JointPath], list[JointConstraint], list[PlacedConstraint]]:
+    """(their paths, what the sweeps project, what the position pass closes) of all joints over a substep from x."""
     settings, substep = context.settings, SubstepTimes(duration, kick)
     projected, fitted = list[JointConstraint](), list[PlacedConstraint]()
-    places = _places(context.world, trees)
+    places, along = _places(context.world, trees), joint_paths(context, x, paths)
     for index, joint in enumerate(context.world.joints):
         moving = tuple(trees.motions[i] for i in joint.bodies)
-        frames, same = paths[index].frames, trees.same(joint.bodies)
+        frames, same = along[index].frames, trees.same(joint.bodies)
         if index not in places:
             lock = trees.placed(joint.bodies, lock_constraint(settings, frames, moving, substep, same))
             projected.append(JointConstraint(lock, f"{joint.name}.lock"))
             fitted += [] if joint.soft else [lock]
         for k in range(len(joint.kind.coordinates)) if joint.acting else ():
             states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
-            value = paths[index].values[k]
+            value = along[index].values[k]
             at = coordinate_terms(frames, k, moving, states, duration, places.get(index, same), value)
             command = _command(context, joint, k, x)
             for part in joint.acting:
@@ -175,10 +170,10 @@ def joint_constraints(
                 projected.append(JointConstraint(constraint, f"{joint.name}.{part}", k))
                 fitted += [constraint] if part in LIMITS else []
     for coupling in context.world.couplings:
-        constraint = _coupled(context, trees, paths, duration, coupling, places)
+        constraint = _coupled(context, trees, along, duration, coupling, places)
         projected.append(JointConstraint(constraint, f"{coupling.name}.{COUPLED}", 0))
         fitted.append(constraint)
-    return projected, fitted
+    return along, projected, fitted
 
 
 def _command(context: StepContext, joint: Joint, k: int, x: State) -> Command:
