@@ -82,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0: every run solved, or found its best where there is nothing to meet; 1: some run not solved, not to be trusted, or
     failed, or a gradient that is wrong; 2: wrong usage or problem file;
-    130: interrupted; 141: nobody reads the output any more.
+    3: a page could not be made, and of runs all is as for 0; 130: interrupted; 141: nobody reads the output any more.
     """
     with contextlib.ExitStack() as opened:
         prepare(opened)

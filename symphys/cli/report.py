@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 MOST_JOBS = 256
 MOST_PRINTED = 50
 """Pages of runs are printed one by one up to so many."""
+UNDRAWN = 3
+"""The exit code where a page could not be made."""
 MOST_NAMED = 20
 """The same of pages that failed."""
 
@@ -77,17 +79,17 @@ def report(folder: Path, pages: str, remake: bool, new: bool, jobs: int | None) 
         click.echo(page)
     if all(fault.page != made.page for fault in made.faults):
         click.echo(made.page)
-    return 1 if made.faults else 0
+    return UNDRAWN if made.faults else 0
 
 
-def make_shown(wanted: WantedPages, kind: str, jobs: int, silent: bool = False) -> MadePages:
+def make_shown(wanted: WantedPages, kind: str, jobs: int, silent: bool = False, limit: float = math.inf) -> MadePages:
     """Make pages, say how far it is unless ``silent``, and name those that could not be made."""
     from symphys.report import make_pages
 
     progress = PageProgress(len(wanted.runs))
     try:
         with nullcontext() if silent else shown(progress):
-            made = make_pages(wanted, kind, jobs, progress.tell)
+            made = make_pages(wanted, kind, jobs, progress.tell, limit)
     except KeyboardInterrupt:
         again = shlex.join(["symphys", "report", str(wanted.root)])
         click.echo(f"symphys: {progress.over} of {progress.runs} pages were made; `{again}` makes the others", err=True)

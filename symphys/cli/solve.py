@@ -29,7 +29,7 @@ from symphys.cli.arguments import (
     sweep_options,
 )
 from symphys.cli.batch_options import BatchOptions, batch_options
-from symphys.cli.report import make_shown, pages_option
+from symphys.cli.report import UNDRAWN, make_shown, pages_option
 from symphys.cli.wording import duration, many_pairs
 
 if TYPE_CHECKING:
@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 MOST_SEEDS = 10_000
 MOST_JOBS = 256
 INTERRUPTED = 130
+LEAST_PAGE = 60.0
+"""[s] that a page may take at least where runs have a timeout."""
 
 
 @click.command()
@@ -146,7 +148,8 @@ def solve(
         else:
             batch = run_batch(asked, jobs, observer, made, multi_start, limits, how.rerun)
     silent, over = how.json or how.quiet, batch.interrupted or not any(batch.results)
-    write = None if no_report or over else partial(write_reports, asked, out, pages, jobs, silent)
+    limit = max(how.timeout, LEAST_PAGE)
+    write = None if no_report or over else partial(write_reports, asked, out, pages, jobs, silent, limit)
     if silent:
         return conclude_silently(batch, observer, write)
     parts = observer.notes.seconds if jobs == 1 and not (multi_start or how.on) else {}
@@ -204,7 +207,9 @@ def conclude(
     if batch.spent:
         click.echo(last_words(batch, out), err=True)
     click.echo(time_line(perf_counter() - began, parts))
-    click.echo(f"report: {made.page}" if made else f"no report; `symphys report {shlex.quote(str(out))}` makes one")
+    there = made is not None and all(fault.page != made.page for fault in made.faults)
+    again = f"`symphys report {shlex.quote(str(out))}` makes one"
+    click.echo(f"report: {made.page}" if made and there else f"no report; {again}")
     return exit_code(batch, made)
 
 
@@ -222,7 +227,9 @@ def exit_code(batch: BatchResult, made: MadePages | None) -> int:
     """Of a batch and its pages."""
     if batch.interrupted:
         return INTERRUPTED
-    return 0 if batch.accepted and not (made and made.faults) else 1
+    if not batch.accepted:
+        return 1
+    return UNDRAWN if made and made.faults else 0
 
 
 def last_words(batch: BatchResult, out: Path) -> str:
@@ -246,11 +253,14 @@ def time_line(total: float, parts: Mapping[str, float]) -> str:
     return f"time: {duration(total)} s in all; {', '.join(f'{word} {duration(part)}' for word, part in told.items())}"
 
 
-def write_reports(jobs: list[Job], out: Path, pages: str, processes: int, silent: bool) -> MadePages:
-    """Make the pages of the runs that are new, and that of the batch; ``silent``: say only which cannot be made."""
+def write_reports(jobs: list[Job], out: Path, pages: str, processes: int, silent: bool, limit: float) -> MadePages:
+    """Make the pages of the runs that are new, and that of the batch; ``silent``: say only which cannot be made.
+
+    ``limit``: [s] that the page of a run may take; inf where runs have no timeout.
+    """
     from symphys.report import WantedPages, outdated
     from symphys.results.file_names import RESULT
 
     over = dict.fromkeys(job.folder.path for job in jobs if (job.folder.path / RESULT).exists())
     new = [folder for folder in over if outdated(folder)]
-    return make_shown(WantedPages(out, tuple(new)), pages, processes, silent)
+    return make_shown(WantedPages(out, tuple(new)), pages, processes, silent, limit)

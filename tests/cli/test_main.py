@@ -345,15 +345,20 @@ def test_no_report_leaves_pages_out_and_report_makes_them_later(run: Run, throw:
 
 
 @pytest.mark.usefixtures("whole_report")
-def test_a_page_that_cannot_be_made_is_named_and_exits_1(run: Run, throw: Path) -> None:
+def test_a_page_that_cannot_be_made_is_named_and_exits_3(run: Run, throw: Path) -> None:
     """Of two runs that are solved one has no place for its page; the other page and that of the batch are made."""
     places = [Path(f"reports/throw/least_squares-seed{seed}/report.html") for seed in range(2)]
     (places[0] / "full").mkdir(parents=True)
     solve = ("solve", throw, "--solver", "least_squares", "--seeds", "2", "--pages", "light", *QUICK)
     code, out, err = run(*solve)
-    assert code == 1 and "2/2" in out and "report: reports/index.html" in out
+    assert code == 3 and "2/2" in out and "report: reports/index.html" in out
     assert f"symphys: {places[0]} could not be made: " in err
     assert places[1].read_text(encoding="utf-8").endswith("</html>\n") and Path("reports/index.html").is_file()
     code, out, err = run("report", "reports", "--pages", "light", "--jobs", "1", "--all")
-    assert code == 1 and out.split() == [str(places[1]), "reports/index.html"] and str(places[0]) in err
+    assert code == 3 and out.split() == [str(places[1]), "reports/index.html"] and str(places[0]) in err
     assert run("report", "reports", "--pages", "small")[0] == 2
+    Path("reports/index.html").unlink()
+    Path("reports/index.html/full").mkdir(parents=True)
+    code, out, err = run(*solve)
+    assert code == 3 and "no report; `symphys report reports` makes one" in out and "report:" not in out
+    assert "reports/index.html could not be made: " in err

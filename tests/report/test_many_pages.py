@@ -59,8 +59,40 @@ def test_a_page_that_cannot_be_made_is_named_and_the_others_are_made(runs: list[
     assert str(blocked) in str(made.faults[0]) and "could not be made: " in str(made.faults[0])
     assert list(made.runs) == [folder / PAGE for folder in runs if folder != runs[2]]
     assert all(map(is_whole, [*made.runs, made.page]))
+    said = made.page.read_text(encoding="utf-8").partition("Pages that could not be made")[2]
+    assert "throw/gradient-seed2" in said and "directory" in said
     with pytest.raises(ReportError, match="gradient-seed2"):
         symphys.report(runs[0].parents[1], pages="light")
+    (blocked / "inside").rmdir()
+    blocked.rmdir()
+    mended = make_pages(wanted_below(runs[0].parents[1], "light"), "light")
+    assert mended.runs == (blocked,) and "could not be made" not in mended.page.read_text(encoding="utf-8")
+
+
+def test_a_motion_that_cannot_be_drawn_ends_no_page_of_others(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page of its own run is a fault, that of the folder says why."""
+    shutil.copytree(made / "ball_throw" / "gradient-seed0", tmp_path / "all" / "throw" / "gradient-seed0")
+
+    def fails(*_: object) -> None:
+        raise ValueError("cannot convert float NaN to integer")
+
+    monkeypatch.setattr("symphys.report.pages.batch.draw_motion", fails)
+    monkeypatch.setattr("symphys.report.pages.run.draw_motion", fails)
+    found = make_pages(wanted_below(tmp_path / "all", remake=True))
+    assert [fault.page.name for fault in found.faults] == [PAGE]
+    text = found.page.read_text(encoding="utf-8")
+    assert is_whole(found.page) and text.count("ValueError: cannot convert float NaN to integer") == 2
+    assert "The motion could not be drawn" in text and "Pages that could not be made" in text
+
+
+def test_pages_that_take_too_long_are_given_up(runs: list[Path]) -> None:
+    """Their workers are killed, and others take their places."""
+    made = make_pages(WantedPages(runs[0].parents[1], tuple(runs[:2])), "light", limit=0.0)
+    assert [fault.reason for fault in made.faults] == ["it was not made within 0 s"] * 2
+    assert is_whole(made.page) and "it was not made within 0 s" in made.page.read_text(encoding="utf-8")
+    assert not multiprocessing.active_children()
 
 
 def test_any_error_is_a_fault_with_its_kind(runs: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,7 +104,7 @@ def test_any_error_is_a_fault_with_its_kind(runs: list[Path], monkeypatch: pytes
         return draw(folder)
 
     monkeypatch.setattr(single, "write_light_report", fails)
-    monkeypatch.setattr(making, "write_batch_report", lambda root: 1 / 0)
+    monkeypatch.setattr(making, "write_batch_report", lambda root, unmade: 1 / 0)
     made = make_pages(wanted_below(runs[0].parents[1]), "light")
     assert [fault.reason for fault in made.faults] == [
         "ZeroDivisionError: by nothing",

@@ -89,4 +89,5 @@ def draw_components(axes: Axes, time: Array, values: Array) -> None:
     axes.margins(x=0.01, y=0.08)
     flat = values[np.isfinite(values)]
     if flat.size and np.ptp(flat) < 1e-9 * max(1.0, float(np.abs(flat).max())):
-        axes.set_ylim(flat[0] - 1, flat[0] + 1)
+        half = max(1.0, 0.1 * abs(float(flat[0])))
+        axes.set_ylim(flat[0] - half, flat[0] + half)

@@ -96,6 +96,10 @@ SETTINGS: Any = {
 }
 
 
+CLOSE, LEAST = 1e-9, 1e-50
+"""Numbers on an axis count as one where they differ by less than such a share of their size, or by so little at all."""
+
+
 @dataclass(frozen=True)
 class Picture:
     """A finished figure: ``name`` is the stem of its files, ``alt`` says what it shows, ``csv`` holds its numbers."""
@@ -213,6 +217,18 @@ def set_symlog(axes: Axes, which: str, linear: float) -> None:
     axis.set_major_locator(locator)
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(number_label))
+
+
+def apart(low: Array, high: Array) -> tuple[Array, Array]:
+    """The lowest and highest corners (k,) of a box; those of a larger one about it where an axis sees only a point.
+
+    That is a box whose sides are all below ``CLOSE`` of its coordinates. The larger one takes a fifth of these, or 1.
+    """
+    size = float(max(np.abs(low).max(), np.abs(high).max()))
+    if float((high - low).max()) > max(CLOSE * size, LEAST):
+        return low, high
+    middle, half = low + (high - low) / 2, 0.1 * size if size > LEAST else 0.5
+    return middle - half, middle + half
 
 
 def thin(time: Array, columns: Array, points: int = 700) -> tuple[Array, Array]:

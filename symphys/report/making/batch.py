@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -79,7 +80,13 @@ def wanted_below(root: Path, kind: str = AUTO, remake: bool = False) -> WantedPa
     return WantedPages(root, tuple(runs), below != [root], remake, len(below) - len(runs))
 
 
-def make_pages(wanted: WantedPages, kind: str = AUTO, jobs: int = 1, tell: Told = lambda _: None) -> MadePages:
+def make_pages(
+    wanted: WantedPages,
+    kind: str = AUTO,
+    jobs: int = 1,
+    tell: Told = lambda _: None,
+    limit: float = math.inf,
+) -> MadePages:
     """Make the pages of runs, then that of the batch, which links to them.
 
     Args:
@@ -87,6 +94,7 @@ def make_pages(wanted: WantedPages, kind: str = AUTO, jobs: int = 1, tell: Told 
         kind: "full", "light", or "auto": light where more than ``MOST_FULL`` pages are made at once.
         jobs: how many processes make them.
         tell: receives how far it is.
+        limit: [s] that the page of a run may take.
 
     Raises:
         ReportError: there is no such kind, or no such folder. Pages that cannot be made are faults instead.
@@ -104,17 +112,18 @@ def make_pages(wanted: WantedPages, kind: str = AUTO, jobs: int = 1, tell: Told 
             faults[folder] = fault
         tell(over)
 
-    make_run_pages(wanted.runs, light, jobs, done)
+    make_run_pages(wanted.runs, light, jobs, done, limit)
     made = tuple(folder / PAGE for folder in wanted.runs if folder not in faults)
     found = [faults[folder] for folder in wanted.runs if folder in faults]
     tell(len(wanted.runs))
     if not wanted.batch:
         return MadePages(wanted.root / PAGE, made, light, tuple(found), wanted.kept)
     index = wanted.root / BATCH_PAGE
-    if not wanted.remake and is_current(index, batch_digest(wanted.root)):
+    if not (wanted.remake or found) and is_current(index, batch_digest(wanted.root)):
         return MadePages(index, made, light, tuple(found), wanted.kept)
+    unmade = {fault.page.parent: fault.reason for fault in found}
     with Interrupts().listening() as interrupted:
-        if fault := attempt(index, lambda: write_batch_report(wanted.root)):
+        if fault := attempt(index, lambda: write_batch_report(wanted.root, unmade)):
             found.append(fault)
     if interrupted():
         raise KeyboardInterrupt

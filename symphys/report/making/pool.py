@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import signal
 from collections import deque
@@ -11,12 +12,14 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from time import monotonic
 
 from symphys.interrupts import Interrupts, ignoring_interrupts
 from symphys.report.making.page import PageFault, make_run_page
 from symphys.report.pages.run import PAGE
 
 DIED = "the process that made it died: killed from outside, out of memory, or a crash in compiled code"
+SLOW = "it was not made within {:g} s"
 PATIENCE = 20.0
 """[s] that a worker has for the end of its page once it is asked to stop."""
 WORTH = {False: 4, True: 80}
@@ -26,15 +29,17 @@ Done = Callable[[Path, PageFault | None], None]
 """Receives each folder whose page was made, or could not be."""
 
 
-def make_run_pages(folders: Sequence[Path], light: bool, jobs: int, done: Done) -> None:
+def make_run_pages(folders: Sequence[Path], light: bool, jobs: int, done: Done, limit: float = math.inf) -> None:
     """Make the page of every folder, here or in up to ``jobs`` worker processes.
+
+    ``limit``: [s] that a page may take; there is always a worker where there is one.
 
     KeyboardInterrupt ends it: pages that are begun in workers are finished, and every page is whole or as it was.
     """
     count = min(jobs, len(folders) // WORTH[light])
     left = deque(folders)
-    if count > 1:
-        PagePool(left, light, done).run(count)
+    if count > 1 or limit < math.inf:
+        PagePool(left, light, done, limit).run(max(count, 1))
     with Interrupts().listening() as interrupted:  # a KeyboardInterrupt in the middle of a figure may be lost there
         while left:
             done(left[0], make_run_page(left[0], light))
@@ -45,11 +50,13 @@ def make_run_pages(folders: Sequence[Path], light: bool, jobs: int, done: Done) 
 
 @dataclass
 class PageWorker:
-    """A worker process; ``folder``: whose page it makes, None before it is ready."""
+    """A worker process; ``folder``: whose page it makes, None before it is ready; ``until``: [s] when it has to be."""
 
     process: BaseProcess
     pipe: Connection
     folder: Path | None = None
+    until: float = math.inf
+    ended: bool = False
 
     def stop(self) -> None:
         """Let it end after its page."""
@@ -64,6 +71,7 @@ class PagePool:
     left: deque[Path]
     light: bool
     done: Done
+    limit: float = math.inf
 
     def run(self, count: int) -> None:
         """Make all pages; some are left over only where no process can be started."""
@@ -72,11 +80,21 @@ class PagePool:
             with ignoring_interrupts():
                 workers += [start(self.light) for _ in range(count)]
             while workers:
-                ready = wait([worker.pipe for worker in workers])
+                ready = wait([worker.pipe for worker in workers], self.end_slow(workers))
                 for worker in [each for each in workers if each.pipe in ready]:
                     self.hear(worker, workers)
         finally:
             end(workers)
+
+    def end_slow(self, workers: Sequence[PageWorker]) -> float | None:
+        """Kill those that take too long; how long to wait for the others [s], None for ever."""
+        now = monotonic()
+        for worker in workers:
+            if now >= worker.until and not worker.ended:
+                worker.ended = True
+                worker.process.kill()
+        until = min((worker.until for worker in workers if not worker.ended), default=math.inf)
+        return None if until == math.inf else max(until - now, 0.0)
 
     def hear(self, worker: PageWorker, workers: list[PageWorker]) -> None:
         """Take what a worker has made, and give it the next page; replace one that died over a page."""
@@ -86,7 +104,8 @@ class PagePool:
             workers.remove(worker)
             worker.process.join()
             if worker.folder is not None:
-                self.done(worker.folder, PageFault(worker.folder / PAGE, DIED))
+                why = SLOW.format(self.limit) if worker.ended else DIED
+                self.done(worker.folder, PageFault(worker.folder / PAGE, why))
                 if self.left:
                     with ignoring_interrupts():
                         workers.append(start(self.light))
@@ -94,7 +113,7 @@ class PagePool:
         if worker.folder is not None:
             self.done(worker.folder, fault)
         if self.left:
-            worker.folder = self.left.popleft()
+            worker.folder, worker.until = self.left.popleft(), monotonic() + self.limit
             with suppress(OSError):  # one that died meanwhile is heard of as such
                 worker.pipe.send(worker.folder)
         else:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from symphys import files
@@ -31,6 +31,8 @@ from symphys.results.trajectories import POSES, read_trajectory
 from symphys.trajectory import Trajectory
 
 PAGE = BATCH_PAGE
+UNMADE = "0" * 64
+"""Stands for the digest of a batch of which some pages could not be made."""
 CLOSEST = "run that came closest"
 ROWS_MARK = 'class="rows"'
 MOST_STUDIES = 20
@@ -39,12 +41,13 @@ MOST_CURVES, LEAST_CURVES = 60, 5
 """Runs whose convergence a page draws at most about, and at least of each solver."""
 
 
-def write_batch_report(batch_dir: Path) -> Path:
+def write_batch_report(batch_dir: Path, unmade: Mapping[Path, str] | None = None) -> Path:
     """Write index.html, and figures as SVG and CSV, for all run folders found at or below a folder.
 
     Args:
         batch_dir: what ``symphys solve --out`` has written, or any folder above it. Links go to the pages of the
             runs as far as they exist, so write those first.
+        unmade: the runs whose pages could not be made, and why, which the page says.
 
     Returns:
         The page's path.
@@ -52,7 +55,8 @@ def write_batch_report(batch_dir: Path) -> Path:
     Raises:
         ReportError: there is no such folder, it holds no run folder, or it cannot be written to.
     """
-    digest = batch_digest(batch_dir)  # before files are read: what changes meanwhile is seen next time
+    # Before files are read: what changes meanwhile is seen next time. A page that names faults is never up to date.
+    digest = UNMADE if unmade else batch_digest(batch_dir)
     runs, broken = read_all(batch_dir, BriefReader(batch_dir))
     if not runs and not broken:
         raise ReportError(f"{batch_dir}: no run folder at or below it; `symphys solve --out` writes them")
@@ -64,12 +68,22 @@ def write_batch_report(batch_dir: Path) -> Path:
         tag("p", comparison.summary(found, broken), class_="lead"),
         *(build_tables(found) if len(found) > MOST_STUDIES else build_studies(found, batch_dir)),
         comparison.broken_card(broken),
+        unmade_card(batch_dir, unmade or {}),
         provenance(runs),
         tag("footer", "Made by symphys from the run folders alone; make it again with “symphys report”."),
     ]
     animated, rows = (any(mark in part for part in parts) for mark in ("<canvas", ROWS_MARK))
     files.write_text(batch_dir / PAGE, page(title, join(parts), animated, rows, Stamp(FULL, digest)))
     return batch_dir / PAGE
+
+
+def unmade_card(root: Path, unmade: Mapping[Path, str]) -> Html:
+    """The runs whose pages could not be made, and why; nothing without any."""
+    named = list(unmade.items())[: comparison.MOST_BROKEN]
+    rows = [[tag("code", folder.relative_to(root).as_posix()), why] for folder, why in named]
+    more = f" The first {len(named)} of {len(unmade)}." if len(named) < len(unmade) else ""
+    note = f"These runs have no page, or an older one.{more}"
+    return card("Pages that could not be made", table(["run", "why"], rows, "tt", "Pages") if rows else "", note=note)
 
 
 def build_tables(found: Sequence[Study]) -> list[Html]:
@@ -130,16 +144,11 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, curves: int
     """
     titled, few = every is None, sample(study, curves)
     whole = Study(few.problem, few.place, tuple(Entry(e.solver, tuple(map(with_trace, e.runs))) for e in few.entries))
-    motion, guess, scene, why = best_motion(study.best)
+    moved, played = best_motion(study.best, anchor, numbers)
     with style.paper():
         converged = style.picture(f"{anchor}-convergence", "Objective and errors", draw_convergence(drawable(whole)))
         checked = style.picture(f"{anchor}-checks", "Errors against tolerances", draw_checks(study))
-        strip = draw_strip(motion, scene) if motion else None
-        drawn = draw_motion(motion, scene, guess) if motion else None
-        moved = style.picture(f"{anchor}-strip", "The motion at even times", strip)
-        moved += style.picture(f"{anchor}-motion", "Path and poses over time", drawn)
     write_figures(root / FIGURES, converged + checked + moved)
-    played = animation(motion, scene, guess, numbers) if motion else tag("p", f"There is no motion to draw: {why}.")
     best = study.best
     kind = "best run" if best.verdict in ACCEPTED else "run with the lowest objective" if best.met else CLOSEST
     which = f"The {kind}: {best.solver}, seed {best.seed}."
@@ -161,12 +170,24 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, curves: int
     )
 
 
-def best_motion(run: Run) -> tuple[Trajectory | None, Trajectory | None, Scene, str]:
-    """Motion, guess and scene of a run, and why there is no motion if there is none."""
+def best_motion(run: Run, anchor: str, numbers: int) -> tuple[list[Picture], Html]:
+    """Pictures of the motion of a run, and its animation; in its place why there is none, which ends no page."""
     try:
-        motion = read_trajectory(run.folder / TRAJECTORY)
+        motion, guess, scene = read_motion(run)
+        played = animation(motion, scene, guess, numbers)
+        with style.paper():
+            drawn = style.picture(f"{anchor}-strip", "The motion at even times", draw_strip(motion, scene))
+            drawn += style.picture(f"{anchor}-motion", "Path and poses over time", draw_motion(motion, scene, guess))
     except ReportError as error:
-        return None, None, Scene(), str(error)
+        return [], tag("p", f"There is no motion to draw: {error}.")
+    except Exception as error:  # what one run has recorded must not take the page of all with it
+        return [], tag("p", f"The motion could not be drawn: {type(error).__name__}: {error}.")
+    return drawn, played
+
+
+def read_motion(run: Run) -> tuple[Trajectory, Trajectory | None, Scene]:
+    """Motion, guess and scene of a run; ReportError where there is no motion."""
+    motion = read_trajectory(run.folder / TRAJECTORY)
     try:
         scene = read_scene(run.folder / SCENE)
     except ReportError:
@@ -175,7 +196,7 @@ def best_motion(run: Run) -> tuple[Trajectory | None, Trajectory | None, Scene, 
         guess = read_trajectory(run.folder / GUESS, POSES)
     except ReportError:
         guess = None
-    return motion, guess, scene, ""
+    return motion, guess, scene
 
 
 def targets(study: Study, pictures: list[Picture]) -> Html:

@@ -15,7 +15,7 @@ from symphys.report.robots.branches import colours, linked, traced
 from symphys.report.robots.joint_positions import bones, draw_joint_positions, draw_lines
 from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
-from symphys.report.scene.views import View, centres, corners, solids_of, turn
+from symphys.report.scene.views import View, centres, corners, reach, turn
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Array, Trajectory
 
@@ -37,7 +37,9 @@ def draw_robots(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
 def spaced(trajectory: Trajectory, scene: Scene, view: View) -> list[int]:
     """The poses: first, last and between at even distances, if linked bodies go far enough; else the last."""
     low, high = extents(trajectory, scene, view, linked(trajectory, scene))
-    gone = ((low + high) / 2 - (low[0] + high[0]) / 2) / (high - low).max(axis=0)
+    middle = (low + high) / 2 - (low[0] + high[0]) / 2
+    least = np.abs(middle).max() / (APART * MOST)  # of robots without extent, all poses may be drawn
+    gone = middle / np.maximum((high - low).max(axis=0), least if least > 0 else 1.0)
     along = gone[:, np.abs(gone[-1]).argmax()]
     parts = min(int(abs(along[-1]) / APART), MOST)
     return sorted({int(np.abs(along - along[-1] * part / parts).argmin()) for part in range(parts)} | {len(along) - 1})
@@ -47,7 +49,11 @@ def extents(trajectory: Trajectory, scene: Scene, view: View, bodies: Sequence[i
     """(N+1, 2) [m] each: the lowest and highest seen coordinates of these bodies at each time."""
     low, high = [], []
     for body in bodies:
-        for solid in solids_of(trajectory, scene, body):
+        if not scene.solids(trajectory.body_names[body]):
+            middle, size = view.flat(trajectory.position[:, body]), reach(trajectory, scene, body)
+            low.append(middle - size)
+            high.append(middle + size)
+        for solid in scene.solids(trajectory.body_names[body]):
             middle = view.flat(centres(trajectory, body, solid))
             ends = view.flat(corners(trajectory.orientation[:, body], solid))
             low.append(middle + ends.min(axis=1) - solid.radius)

@@ -28,6 +28,8 @@ TALLEST, LOWEST = 2.4, 0.75
 """[in] a picture is at most and at least"""
 FAR, FAR_ON_RAILS = 2.0, 6.0
 """The section shown is fixed where all fits into so many sizes of the bodies: free ones, and those on the world."""
+POINT = 1e-6
+"""All is shown, too, where the bodies are so small a share of it."""
 MARGIN = 0.06
 EDGE = 0.14
 """[in] Numbers are at least so far from the sides of a picture, so that those of neighbours do not meet."""
@@ -101,12 +103,13 @@ def even_shots(count: int, size: Array) -> list[int]:
 def make_strip(view: View, trajectory: Trajectory, scene: Scene, shots: Sequence[int]) -> Strip:
     """The sections of these shots, and the ground where it is near."""
     low, high = (part[list(shots)] for part in extents(trajectory, scene, view, linked(trajectory, scene)))
-    size, union = (high - low).max(axis=0), high.max(axis=0) - low.min(axis=0)
-    middle = (low + high) / 2
+    size, middle = (high - low).max(axis=0), (low + high) / 2
+    least, most = style.apart(low.min(axis=0), high.max(axis=0))
+    union = most - least
     far = FAR if all(joint.second for joint in scene.joints) else FAR_ON_RAILS
-    still = np.array([union[0] <= far * size[0], True])
+    still = np.array([union[0] <= far * size[0] or size.max() <= POINT * union.max(), True])
     size = np.where(still, union, size)
-    corner = np.where(still, low.min(axis=0), middle - size / 2)
+    corner = np.where(still, least, middle - size / 2)
     room = float(size.max())
     bottom, top = corner.min(axis=0), (corner + size).max(axis=0)
     for plane in scene.planes:

@@ -37,8 +37,8 @@ def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajecto
     """The rectangle that holds every body, nearby static surfaces, and the guess unless it goes far away."""
     sizes = np.array([reach(trajectory, scene, body) for body in range(len(trajectory.body_names))])[:, None]
     flat = view.flat(trajectory.position)
-    low, high = (flat - sizes).min(axis=(0, 1)), (flat + sizes).max(axis=(0, 1))
-    room = max(float((high - low).max()), 1e-6)
+    low, high = style.apart((flat - sizes).min(axis=(0, 1)), (flat + sizes).max(axis=(0, 1)))
+    room = float((high - low).max())
     if guess is not None:
         path = view.flat(guess.position)
         low = np.maximum(np.minimum(low, path.min(axis=(0, 1))), low - 0.25 * room)

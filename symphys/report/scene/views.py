@@ -98,5 +98,8 @@ def solids_of(trajectory: Trajectory, scene: Scene, body: int) -> tuple[Solid, .
 
 
 def reach(trajectory: Trajectory, scene: Scene, body: int) -> float:
-    """[m] from the body's centre to the farthest point of its surface."""
-    return max(solid.reach for solid in solids_of(trajectory, scene, body))
+    """[m] from the body's centre to the farthest point of its surface; to its joints where it has no surface."""
+    name = trajectory.body_names[body]
+    sides = [side for joint in scene.joints for side in zip(joint.bodies, joint.frames, strict=False)]
+    held = [float(np.linalg.norm(frame.point)) for whose, frame in sides if whose == name]
+    return max([solid.reach for solid in scene.solids(name)] or held, default=0.0)
