@@ -12,22 +12,25 @@ For some things MuJoCo has laws of its own:
   several steps, with their default softness; here they are rigid. Friction of contacts is on the same disc (elliptic
   cone); torsion and rolling share one ellipsoid with it.
 - A servo here aims at the velocity clip(gain (command - angle), +-velocity), and reaches it within a step unless that
-  takes more than its torque. Nearest is a position actuator with kv = 100 torque / velocity, kp = gain kv and the same
-  bound of force. It aims at gain (command - angle), not held in +-velocity, and gives all of its torque only where the
-  velocity is off by a hundredth of the largest: it sags under load.
+  takes more than its torque. Nearest is a position actuator with kp = gain kv and the same bound of force. It aims at
+  gain (command - angle), not held in +-velocity, and gives all of its torque only where the velocity is off by torque /
+  kv: it sags under load. kv is 100 torque / velocity, or what the time step takes without swinging (``mjcf_step``).
 - A velocity motor likewise becomes a velocity actuator with that kv.
+- The time step is cut into parts where motors, springs or contacts that give way need it.
+- A contact that gives way has the same frequency and damping ratio, by MuJoCo's own estimate of the mass behind it.
 - Terrain is smooth here and triangles there, and ends at the edge of its grid.
 
 Such actuators are stiff, hence the integrator ``implicitfast``. What has no counterpart is refused, or left out where
-that is asked for: restitution, contacts that give way, some joints that give way or close a loop, terrain without a
-grid. ``Departure`` is one of all these, and the file begins with them. Variables, objectives and controllers are no
-part of a model, and commands are its ctrl, 0 at the start.
+that is asked for: restitution, some joints that give way or close a loop, terrain without a grid. ``Departure`` is one
+of all these, and the file begins with them. Variables, objectives and controllers are no part of a model, and commands
+are its ctrl, 0 at the start.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
@@ -37,12 +40,13 @@ from numpy.typing import NDArray
 
 from symphys.dynamics.motion import inertia_matrix
 from symphys.export.mjcf_bodies import NestedBody, StartState, nested_bodies, relative
-from symphys.export.mjcf_departures import Departure, departures, require_expressible
+from symphys.export.mjcf_departures import Departure, departures, require_expressible, shorter_step
 from symphys.export.mjcf_equality import equalities
 from symphys.export.mjcf_joints import freedoms
 from symphys.export.mjcf_motors import actuators
 from symphys.export.mjcf_sensors import sensor_elements, site_elements
-from symphys.export.mjcf_surfaces import APART, geoms, meshes, pairs, text
+from symphys.export.mjcf_step import inertias, parts
+from symphys.export.mjcf_surfaces import APART, FRICTION_RATIO, geoms, meshes, pairs, text
 from symphys.export.mjcf_terrain import height_field, middle
 from symphys.model.body import Body
 from symphys.model.shapes import Terrain
@@ -67,14 +71,17 @@ class MjcfModel:
     departures: tuple[Departure, ...]
 
 
-def problem_model(problem: Problem, approximate: bool = False) -> MjcfModel:
+def problem_model(
+    problem: Problem, approximate: bool = False, stiffer: Mapping[tuple[str, str], float] = MappingProxyType({})
+) -> MjcfModel:
     """The model of a problem's world; see ``mjcf_model``."""
     dt, name = problem.simulation.dt, problem.name
     laws = [Departure("left out", (law.name,), "a force law; MuJoCo has no formulas") for law in problem.forces]
     text = "numbers that hold in a phase alone; a model of MuJoCo has one of each"
     laws += [Departure("left out", (phase.name,), text) for phase in problem.phases if phase.sets]
     world = problem.parametric.world({}, listed=True)
-    return mjcf_model(world, problem.initial, dt, name, problem.sensors, laws, approximate=approximate)
+    felt = problem.sensors
+    return mjcf_model(world, problem.initial, dt, name, felt, laws, approximate=approximate, stiffer=stiffer)
 
 
 def mjcf_files(problem: Problem, approximate: bool = False) -> dict[str, bytes]:
@@ -96,6 +103,7 @@ def mjcf_model(
     laws: Sequence[Departure] = (),
     *,
     approximate: bool = False,
+    stiffer: Mapping[tuple[str, str], float] = MappingProxyType({}),
 ) -> MjcfModel:
     """A model, and in what it departs from the world.
 
@@ -107,20 +115,25 @@ def mjcf_model(
         sensors: of the problem.
         laws: what of the problem's force laws is left out.
         approximate: leave out what MJCF cannot say, instead of refusing it.
+        stiffer: factors on stiffness and damping of contacts that give way, by the names of their surfaces.
 
     Raises:
         ExportError: names all that MJCF cannot say.
     """
     start = StartState(world, initial)
     felt = sensor_elements(world, sensors)
-    found = [*laws, *departures(start)]
+    acted_on = inertias(start)
+    count = parts(start, acted_on, dt)
+    step = dt / count
+    found = [*laws, *departures(start), *shorter_step(dt, count)]
     require_expressible(found, name, approximate)
     if felt.left_out:
         found.append(Departure("left out", tuple(felt.left_out), "a sensor of a formula that MuJoCo has none for"))
     model = Element("mujoco", model=name)
     model.extend(Comment(f" {one_line(str(each))} ") for each in found)
     SubElement(model, "compiler", angle="radian", inertiafromgeom="false")
-    options = {"timestep": repr(float(dt)), "gravity": text(world.gravity)}
+    options = {"timestep": repr(float(step)), "gravity": text(world.gravity)}
+    options |= {"impratio": text([FRICTION_RATIO])} if any(pair.law.soft for pair in world.pairs) else {}
     SubElement(model, "option", {**options, "integrator": "implicitfast", "cone": "elliptic"})
     terrains = [static for static in world.statics if isinstance(static, Terrain)]
     assets = [*(height_field(start, terrain) for terrain in terrains), *meshes(world)]
@@ -131,9 +144,9 @@ def mjcf_model(
     worldbody.extend(geoms(world, None))
     worldbody.extend(ground(start, terrain) for terrain in terrains)
     worldbody.extend(numbers.parts(None))
-    model.append(pairs(world))
+    model.append(pairs(world, step, stiffer))
     SubElement(model, "equality").extend(equalities(start.reference))
-    SubElement(model, "actuator").extend(motor for joint in world.joints for motor in actuators(joint))
+    SubElement(model, "actuator").extend(motor for joint in world.joints for motor in actuators(joint, acted_on, step))
     SubElement(model, "sensor").extend(felt.elements)
     SubElement(SubElement(model, "keyframe"), "key", name="start", qpos=text(numbers.qpos), qvel=text(numbers.qvel))
     for empty in [each for each in model if each.tag in ("equality", "sensor") and not len(each)]:

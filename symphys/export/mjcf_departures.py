@@ -17,7 +17,7 @@ from symphys.model.shapes import Terrain
 
 LISTED = 5
 """Names in a message."""
-Kind = Literal["approximated", "left out", "refused"]
+Kind = Literal["approximated", "left out", "refused", "measured"]
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,8 @@ class Departure:
     """Something that MJCF has no exact counterpart for.
 
     Attributes:
-        kind: ``approximated`` by what is nearest; ``left out``, which is refused unless it is asked for; ``refused``.
+        kind: ``approximated`` by what is nearest; ``left out``, which is refused unless it is asked for; ``refused``;
+            ``measured``: found by a trial.
         what: names of joints, contacts, surfaces or sensors.
         how: what was written instead, or what can be done.
     """
@@ -70,6 +71,13 @@ def departures(start: StartState) -> list[Departure]:
     return sorted((each for each in found if each.what), key=lambda each: order.index(each.kind))
 
 
+def shorter_step(dt: float, count: int) -> Iterator[Departure]:
+    """That a step is written in parts."""
+    if count > 1:
+        text = f"{dt / count:g} s in place of {dt:g} s, at which MuJoCo does not hold these motors, springs or contacts"
+        yield Departure("approximated", ("time step",), text)
+
+
 def joint_departures(start: StartState) -> Iterator[Departure]:
     """Of joints and motors."""
     world, trees = start.world, nesting_joints(start.world)
@@ -86,7 +94,7 @@ def joint_departures(start: StartState) -> Iterator[Departure]:
     text = "a joint that closes a loop, which only ball, hinge and fixed joints between bodies with mass do there"
     yield Departure("left out", tuple(loops), text)
     driven = [joint.name for joint in world.joints if isinstance(joint.motor, Servo | VelocityMotor)]
-    text = "a motor that reaches its velocity within a step, as an actuator with a stiff gain: it sags under load"
+    text = "a motor that reaches its velocity within a step, as an actuator of finite gain: it sags under load"
     yield Departure("approximated", tuple(driven), text)
 
 
@@ -97,8 +105,8 @@ def contact_departures(start: StartState) -> Iterator[Departure]:
     text = "restitution, which MuJoCo does not have; give the surfaces restitution 0"
     yield Departure("left out", tuple(bouncing), text)
     soft = [name for name, law in contacts.items() if law.soft]
-    text = "contact that gives way, by another law than MuJoCo's; leave out its frequency"
-    yield Departure("left out", tuple(soft), text)
+    text = "a contact that gives way, with its frequency by MuJoCo's estimate of the mass behind it"
+    yield Departure("approximated", tuple(soft), text)
 
 
 def terrain_departures(start: StartState) -> Iterator[Departure]:
@@ -120,7 +128,7 @@ def terrain_departures(start: StartState) -> Iterator[Departure]:
 def soft_departures(start: StartState) -> Iterator[Departure]:
     """What is rigid here and a spring with a damper there, acting over several steps; with default softness."""
     world, trees = start.world, nesting_joints(start.world)
-    if world.pairs:
+    if any(not pair.law.soft for pair in world.pairs):
         yield Departure("approximated", ("contacts",), "rigid here; springs and dampers there, of default softness")
     limited = [joint.name for joint in world.joints if {"lower", "upper"} & set(joint.acting)]
     yield Departure("approximated", tuple(limited), "limits that are rigid here and soft there")

@@ -6,36 +6,38 @@ from math import inf
 from xml.etree.ElementTree import Element
 
 from symphys.export.mjcf_joints import names
+from symphys.export.mjcf_step import Inertias, steepness
 from symphys.export.mjcf_surfaces import text
 from symphys.model.joints import AffineMotor, Joint, Motor, Servo, TorqueMotor
 from symphys.model.scalar import is_zero
 
-GIVING_WAY = 0.01
-"""Of a motor's largest velocity: how far off it MuJoCo's gives all of its torque."""
 UNBOUNDED = 1e10
 """Where one of two ends is missing."""
 
 
-def actuators(joint: Joint) -> list[Element]:
-    """The motor along every coordinate."""
+def actuators(joint: Joint, inertias: Inertias, step: float) -> list[Element]:
+    """The motor along every coordinate, for a time step [s]."""
     if joint.motor is None:
         return []
-    kind, attributes = actuator(joint.motor)
-    return [Element(kind, {"name": name, "joint": name, **attributes}) for name in names(joint)]
+    found = []
+    for number, name in enumerate(names(joint)):
+        kind, attributes = actuator(joint.motor, inertias.get((joint.name, number), inf), step)
+        found.append(Element(kind, {"name": name, "joint": name, **attributes}))
+    return found
 
 
-def actuator(motor: Motor) -> tuple[str, dict[str, str]]:
-    """The element that is nearest to a motor, and its attributes."""
+def actuator(motor: Motor, inertia: float, step: float) -> tuple[str, dict[str, str]]:
+    """The element that is nearest to a motor on a coordinate of this inertia, and its attributes."""
     if isinstance(motor, AffineMotor):
         return affine(motor)
     bound = text((-motor.torque, motor.torque))
     if isinstance(motor, TorqueMotor):
         return "motor", {"ctrlrange": bound}
-    steepness = motor.torque / (GIVING_WAY * motor.velocity)
-    attributes = {"kv": text([steepness]), "forcerange": bound}
+    kv = steepness(motor, inertia, step)
+    attributes = {"kv": text([kv]), "forcerange": bound}
     if isinstance(motor, Servo):
         held = {} if motor.range is None else {"ctrlrange": text((-motor.range, motor.range))}
-        return "position", {"kp": text([steepness * motor.gain]), **attributes, **held}
+        return "position", {"kp": text([kv * motor.gain]), **attributes, **held}
     return "velocity", {**attributes, "ctrlrange": text((-motor.velocity, motor.velocity))}
 
 

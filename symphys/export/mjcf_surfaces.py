@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from math import pi
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -13,6 +14,10 @@ from symphys.model.world import Law, Side, World, side_name
 MJCF_PLACEMENT = {"centre": "pos", "orientation": "quat"}
 APART = {"contype": "1", "conaffinity": "0"}
 """Of a geom that touches another in an explicit pair only: affinity with none. Readers see that it is no picture."""
+IMPEDANCE = 0.01
+"""Of contacts that give way: they are springs and dampers beside the other forces, a hundredth too soft."""
+FRICTION_RATIO = 100.0
+"""Of the impedance of friction to that of contacts: friction does not give way with them."""
 
 
 def text(numbers: Iterable[Any]) -> str:
@@ -67,15 +72,26 @@ def meshes(world: World) -> list[Element]:
     return found
 
 
-def pairs(world: World) -> Element:
-    """Every two surfaces that may touch, with friction, torsion and rolling of their law."""
+def pairs(world: World, step: float, stiffer: Mapping[tuple[str, str], float]) -> Element:
+    """Every two surfaces that may touch, with the numbers of their law; ``stiffer``: see ``mjcf_model``."""
     contact = Element("contact")
     laws = {(pair.first, pair.second): pair.law for pair in world.pairs}
     for sides, law in laws.items():
         first, second = (side_name(world.bodies, world.statics, side) for side in sides)
         friction = (law.friction, law.friction, law.torsion, law.rolling, law.rolling)
-        contact.append(Element("pair", geom1=first, geom2=second, condim=directions(law), friction=text(friction)))
+        given = {"geom1": first, "geom2": second, "condim": directions(law), "friction": text(friction)}
+        contact.append(Element("pair", given | softness(law, step, stiffer.get((first, second), 1.0))))
     return contact
+
+
+def softness(law: Law, step: float, factor: float) -> dict[str, str]:
+    """Of a contact that gives way: stiffness and damping by mass, MuJoCo's direct form; friction stops within steps."""
+    if not law.soft:
+        return {}
+    rate, stop = 2 * pi * float(law.frequency), IMPEDANCE / step
+    spring = -factor * rate * rate, -factor * 2 * max(float(law.damping), 1e-9) * rate
+    held = {"solimp": text((IMPEDANCE, IMPEDANCE, 1.0, 0.5, 1.0)), "solreffriction": text((-stop, -stop))}
+    return {"solref": text(spring), **held}
 
 
 def directions(law: Law) -> str:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from symphys.export.casadi_files import casadi_files
 from symphys.export.folder import ExportError, write_folders
-from symphys.export.mjcf import problem_model
 from symphys.export.mjcf_departures import Departure
+from symphys.export.mjcf_trial import tried_model
 from symphys.export.sources import c_files
 from symphys.problem import Problem, require_solvable
 from symphys.problem.loading import Source, load
@@ -76,7 +76,7 @@ def write(problem: Problem, asked: Mapping[str, Path], approximate: bool = False
         folders[asked[kind]] = folders.get(asked[kind], {}) | contents
     departures: tuple[Departure, ...] = ()
     if "mjcf" in asked:
-        model = problem_model(problem, approximate)
+        model = tried_model(problem, approximate)
         departures, folder = model.departures, asked["mjcf"]
         folders[folder] = folders.get(folder, {}) | {f"{problem.name}.xml": model.text.encode()}
     return ExportedFiles(tuple(write_folders(folders)), departures)

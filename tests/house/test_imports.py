@@ -54,8 +54,8 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "how far a solution can be trusted, as numbers",
     ),
     "export": (
-        "codegen dynamics errors files maths model problem transcription verbs version",
-        "casadi numpy",
+        "codegen dynamics errors files maths model problem trajectory transcription verbs version",
+        "casadi mujoco numpy",
         "other programs' files",
     ),
     "solvers": ("errors shooting", "casadi cma numpy scipy", "optimisation methods"),

@@ -1,0 +1,116 @@
+"""The time step of a model for MuJoCo, and how stiff its motors may be at that step.
+
+MuJoCo takes the forces of springs and of contacts that give way as they are at the begin of a step, and so it does with
+a motor that is at its bound. All of a motor's torque T over a step h changes the rate of a coordinate of inertia I by
+T h / I. Where that is more than twice the speed error at which the motor begins to give way, T / kv, it swings between
+its bounds for ever. So kv is at most 2 I / h, and the step is cut into parts until such a motor gives way by no more
+than a tenth of its largest velocity.
+
+I is what a coordinate shows at the start while all others are free: 1 / (M^-1) of the trees' mass matrix M.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symphys.dynamics.motion import inertia_matrix
+from symphys.export.mjcf_bodies import StartState, links_of
+from symphys.model.joints import AffineMotor, Joint, Servo, VelocityMotor
+
+Array = NDArray[np.float64]
+Inertias = Mapping[tuple[str, int], float]
+"""[kg m^2] or [kg] of each coordinate, by its joint and number there; of joints in trees only."""
+STIFFEST, SOFTEST = 0.01, 0.1
+"""Of a motor's largest velocity: how far off it gives all of its torque, at best, and at worst."""
+WITHIN, WITHIN_CONTACT = 1.0, 0.125
+"""Largest h omega of a spring, and of a contact that gives way: a body may have several, whose damping adds up."""
+MOST_PARTS = 50
+"""Of a time step."""
+
+
+def parts(start: StartState, found: Inertias, dt: float) -> int:
+    """In how many parts a step of ``dt`` [s] is written."""
+    longest = min(_longest(start, found), default=math.inf)
+    return max(1, min(MOST_PARTS, math.ceil(dt / longest - 1e-9))) if longest > 0 else MOST_PARTS
+
+
+def steepness(motor: Servo | VelocityMotor, inertia: float, step: float) -> float:
+    """kv on a coordinate of this inertia [N m s/rad] or [N s/m], at a time step [s]."""
+    return min(motor.torque / (STIFFEST * motor.velocity), 2 * inertia / step)
+
+
+def inertias(start: StartState) -> Inertias:
+    """Of all coordinates at the start, the others being free."""
+    world, links = start.world, links_of(start.world)
+    columns: list[Array] = []
+    """(B, 6): what a coordinate's rate of 1 does to each body: velocity of its centre of mass, and turning."""
+    owners: dict[int, tuple[str, int]] = {}
+    above: dict[int | None, frozenset[int]] = {None: frozenset()}
+    for link in links:
+        held = above[link.parent]
+        for name, number, twist in _freedoms(start, link.joint, link.body):
+            if name:
+                owners[len(columns)] = name, number
+            held |= {len(columns)}
+            columns.append(twist)
+        above[link.body] = held
+    mass = np.diag([_armature(world.joints, owners.get(k)) for k in range(len(columns))])
+    for link in links:
+        body, moving = world.bodies[link.body], sorted(above[link.body])
+        if moving and not body.massless:
+            centre = start.of(link.body, "position")
+            turning = np.array([columns[k][3:] for k in moving]).T
+            shifting = np.array([columns[k][:3] + np.cross(columns[k][3:], centre) for k in moving]).T
+            axes = start.axes(link.body)
+            tensor = axes @ np.array(ca.DM(inertia_matrix(body.inertia))) @ axes.T
+            mass[np.ix_(moving, moving)] += body.mass * shifting.T @ shifting + turning.T @ tensor @ turning
+    give = np.diag(np.linalg.pinv(mass, hermitian=True)) if columns else np.zeros(0)
+    return {owner: 1 / max(float(give[k]), 1e-300) for k, owner in owners.items()}
+
+
+def _freedoms(start: StartState, joint: int | None, body: int) -> Iterator[tuple[str, int, Array]]:
+    """Name and number of a coordinate, no name for those of none, and its twist (6,) at the world's origin."""
+    if joint is None:
+        yield from (("", k, row) for k, row in enumerate(np.eye(6)))
+        return
+    made = start.world.joints[joint]
+    side, frame = made.bodies[0], made.frames[0]
+    point = start.of(side, "position") + start.axes(side) @ np.array(frame.point, float)
+    if made.kind.name == "ball":
+        yield from (("", k, np.concatenate([np.cross(point, row), row])) for k, row in enumerate(np.eye(3)))
+        return
+    for number, direction in enumerate(start.directions(made)):
+        turns = made.kind.coordinates[number].turns
+        twist = [np.cross(point, direction), direction] if turns else [direction, np.zeros(3)]
+        yield made.name, number, np.concatenate(twist)
+
+
+def _armature(joints: tuple[Joint, ...], owner: tuple[str, int] | None) -> float:
+    """Of what turns with a coordinate."""
+    return next((float(joint.armature) for joint in joints if owner and joint.name == owner[0]), 0.0)
+
+
+def _longest(start: StartState, found: Inertias) -> Iterator[float]:
+    """The longest step that each motor, spring and soft contact takes [s]."""
+    joints = {joint.name: joint for joint in start.world.joints}
+    for (name, _), inertia in found.items():
+        motor, stiffness = joints[name].motor, _stiffness(joints[name])
+        if isinstance(motor, Servo | VelocityMotor):
+            yield 2 * SOFTEST * motor.velocity * inertia / motor.torque
+        if stiffness > 0:
+            yield WITHIN * math.sqrt(inertia / stiffness)
+    for pair in start.world.pairs:
+        if pair.law.soft:
+            yield WITHIN_CONTACT / (2 * math.pi * float(pair.law.frequency) * max(1.0, float(pair.law.damping)))
+
+
+def _stiffness(joint: Joint) -> float:
+    """Of a joint's spring and affine motor along each coordinate."""
+    spring = 0.0 if joint.spring is None else float(joint.spring.stiffness)
+    motor = joint.motor
+    return spring + (float(motor.kp) * float(motor.gear) ** 2 if isinstance(motor, AffineMotor) else 0.0)
