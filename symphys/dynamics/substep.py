@@ -40,8 +40,9 @@ from symphys.dynamics.pgs import apply_start, iterate
 from symphys.dynamics.position_correction import Corrected, close_gaps, displacements
 from symphys.dynamics.prediction import bodies_of, detect_contacts, free_motions, jointed_bodies, predicted_motions
 from symphys.dynamics.tracing.decorator import gathered, opened, traced
-from symphys.dynamics.unknowns import Momenta, Momentum, PlacedConstraint
+from symphys.dynamics.unknowns import AllVelocities, Momenta, Momentum, PlacedConstraint
 from symphys.maths import rotation
+from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.state_layout import BODY_FIELDS
 
 Expr = Any
@@ -49,6 +50,8 @@ Expr = Any
 
 
 NONE = ca.SX(0)
+SLIDES = 0.999
+"""Of the largest friction: from there on surfaces slide."""
 ZERO_MOMENTUM = Momentum(ca.SX.zeros(3), ca.SX.zeros(3))
 
 
@@ -103,7 +106,8 @@ def advance(
         bodies = bodies_of(pair)
         moving = tuple(trees.motions[i] for i in bodies)
         force = x[f"{pair.name}.force"]
-        conditions = Conditions(off, plastic, force, trees.same(bodies), coupled, near)
+        lagging = () if world.joints else tuple(_lasting_on(x, world.bodies[i].name) for i in bodies)
+        conditions = Conditions(off, plastic, force, trees.same(bodies), coupled, near, lagging, x["lag"])
         constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
         constraints.append(trees.placed(bodies, constraint))
     jointed, joints, fitted = joint_constraints(context, x, trees, paths, duration, kick)
@@ -124,9 +128,10 @@ def advance(
 
     # 8. what is stored: persistent forces (20), velocities (21)
     values: State = {"lag": half}
-    reactions, rotors = _store_forces(context, constraints, impulses, kick, values), Rotors()
+    reactions, rotors = _store_forces(context, constraints, impulses, solved.momenta, kick, values), Rotors()
+    momenta = _with_late_impulses(constraints, impulses, momenta)
     if world.joints:
-        struck, forces = lasting_forces(context, constraints, joints, by_joints, x, kick)
+        struck, forces = lasting_forces(context, constraints, joints, by_joints, solved.momenta, x, kick)
         angles = unwrapped_angles(context, jointed, closed, duration)
         add_joint_forces(context, forces | angles, poses, reactions)
         momenta = keep_momentum(context, momenta, closed.made, struck, duration)
@@ -225,6 +230,7 @@ def _store_forces(
     context: StepContext,
     constraints: Sequence[PlacedConstraint],
     impulses: Sequence[ContactImpulse],
+    solved: AllVelocities,
     kick: Expr,
     values: State,
 ) -> list[tuple[Expr, Expr]]:
@@ -232,7 +238,8 @@ def _store_forces(
     scheme = context.settings.scheme
     total = [opened((ca.SX.zeros(3), ca.SX.zeros(3)), k) for k in range(len(context.world.bodies))]
     for pair, each, impulse in zip(context.world.pairs, constraints, impulses, strict=True):
-        force, torque = _persistent(each.constraint, impulse, kick, context.shortest_kick)
+        moving = tuple(solved[i] for i in each.carriers) if pair.law.soft else ()
+        force, torque = _persistent(each.constraint, impulse, kick, context.shortest_kick, moving)
         values[f"{pair.name}.force"] = force if scheme.warm_start else ca.SX.zeros(3)
         if pair.law.spins:
             values[f"{pair.name}.torque"] = torque if scheme.warm_start else ca.SX.zeros(3)
@@ -244,10 +251,48 @@ def _store_forces(
 
 @traced
 def _persistent(
-    constraint: ContactConstraint, impulse: ContactImpulse, kick: Expr, shortest: Expr
+    constraint: ContactConstraint, impulse: ContactImpulse, kick: Expr, shortest: Expr, momenta: AllVelocities
 ) -> tuple[Expr, Expr]:
     share = (1 - constraint.leaving) * (1 - constraint.struck) / ca.fmax(kick, shortest)
+    if constraint.soft is not None:
+        n = constraint.impulse_normal
+        normal = constraint.soft.lasting(ca.dot(constraint.normal, constraint.slip(momenta)), impulse.normal)
+        return n * normal + share * impulse.tangent, share * impulse.angular(n)
     return share * impulse.linear(constraint.impulse_normal), share * impulse.angular(constraint.impulse_normal)
+
+
+def _lasting_on(x: State, body: str) -> tuple[Expr, Expr]:
+    return x[f"{body}.reaction_force"], x[f"{body}.reaction_torque"]
+
+
+def _with_late_impulses(
+    constraints: Sequence[PlacedConstraint], impulses: Sequence[ContactImpulse], momenta: Momenta
+) -> Momenta:
+    """The momenta with what soft contacts that begin or end have given by the end of the substep."""
+    given = [(each, impulse) for each, impulse in zip(constraints, impulses, strict=True) if each.constraint.law.soft]
+    found = [opened(each, k) if given else each for k, each in enumerate(momenta)]
+    for each, impulse in given:
+        moved = _late(each.constraint, impulse, tuple(found[i] for i in each.bodies))
+        for i, after in zip(each.bodies, moved, strict=True):
+            found[i] = after
+    return tuple(found)
+
+
+@traced
+def _late(constraint: ContactConstraint, impulse: ContactImpulse, momenta: Momenta) -> Momenta:
+    """Friction of surfaces that slide comes late by the same share."""
+    assert constraint.soft is not None
+    late = ca.if_else(impulse.normal > 0, constraint.soft.late, 0)
+    most, given = (
+        constraint.law.friction * impulse.normal,
+        ca.sqrt(ca.dot(impulse.tangent, impulse.tangent) + TINY_SQUARE),
+    )
+    share = ca.if_else(given > SLIDES * most, late / ca.fmax(impulse.normal, TINY_SQUARE), 0)
+    push, found = constraint.impulse_normal * late + share * impulse.tangent, []
+    for term, m in zip(constraint.terms, momenta, strict=True):
+        turned = m.angular + term.sign * ca.cross(term.impulse_arm, push)
+        found.append(Momentum(m.velocity + term.sign * term.inverse_mass * push, turned))
+    return tuple(found)
 
 
 @traced

@@ -21,6 +21,7 @@ import casadi as ca
 from symphys.dynamics.contact import body_term
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.coupling import Coupling
+from symphys.dynamics.contact.soft import SoftImpulse
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import length, onto_disc, positive
 from symphys.model.world import Law
@@ -128,6 +129,7 @@ class ContactConstraint:
         paradox: 1 if the friction of the free slip would pull the surfaces together.
         near: 0 if the surfaces are too far apart to act: no impulse is given.
         before: where both impulses are found in turn: shortens what a projection waits for.
+        soft: of a soft contact.
     """
 
     law: Law
@@ -156,6 +158,7 @@ class ContactConstraint:
     paradox: Expr = NEVER
     near: Expr = ALWAYS
     before: KnownBefore | None = None
+    soft: SoftImpulse | None = None
 
     def slip(self, momenta: tuple[Any, ...]) -> Expr:
         """(3,) [m/s]: relative velocity of the touching points."""

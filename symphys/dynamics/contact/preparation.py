@@ -12,7 +12,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact
+from symphys.dynamics.collision.contact_geometry import Contact, Frame
 from symphys.dynamics.collision.time_of_impact import TINY_RATE, TOUCH
 from symphys.dynamics.contact.body_term import BodyTerm, Motions, at_touch, body_terms, free_slip
 from symphys.dynamics.contact.constraint import UNREACHED, ContactConstraint
@@ -24,7 +24,9 @@ from symphys.dynamics.contact.effective_mass import (
     separates,
     symmetric_mobilities,
 )
+from symphys.dynamics.contact.soft import SoftApproach, SoftImpulse, soft_impulse
 from symphys.dynamics.context import NEAR, StepSettings
+from symphys.dynamics.motion import apply
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import clip, positive
 from symphys.model.world import Law
@@ -56,6 +58,8 @@ class Conditions:
         same: whether both bodies are of one tree of joints.
         coupled: whether friction may act strongly on the normal velocity.
         near: 0 if the surfaces are too far apart to act.
+        lagging: force and torque on each body that lasted from the last step, where the motions are without them.
+        lag: over how much time these have acted already [s].
     """
 
     suppressed: Expr
@@ -64,6 +68,8 @@ class Conditions:
     same: bool
     coupled: bool
     near: Expr
+    lagging: tuple[tuple[Expr, Expr], ...]
+    lag: Expr
 
 
 @traced
@@ -75,7 +81,8 @@ def prepare(
     suppressed, same, coupled = conditions.suppressed, conditions.same, conditions.coupled
     touch = _touch(settings, law, contact, motions, duration, conditions)
     instant = half + touch.leaving * (touch.time - half)
-    frame, applied = contact.geometry.frame(instant), contact.geometry.frame(touch.leaving * touch.time)
+    acting = touch.hit * contact.time if law.soft else touch.leaving * touch.time
+    frame, applied = contact.geometry.frame(instant), contact.geometry.frame(acting)
     terms = body_terms(motions, instant, frame, applied)
     push, twist = symmetric_mobilities(terms, same)
     k_normal, *k_others = inverse_masses(terms, frame.normal, push, twist)
@@ -83,7 +90,9 @@ def prepare(
     slip = free_slip(terms, motions)
     free = ca.dot(frame.normal, slip)
     away = ca.fmin(free - (contact.end + slack) / duration, 0)
-    softness, target = _normal_target(law, contact, duration, touch, k_normal, away, smoothing)
+    soft = _soft_impulse(law, contact, motions, duration, conditions, (free, applied, acting)) if law.soft else None
+    softness = ca.SX(0) if soft is None else soft.softness
+    target = _normal_target(contact, duration, touch, away, smoothing) if soft is None else soft.target
     landing = _landing(contact, duration, touch.time, target, free)
     column = delassus_column(terms, applied.normal, same)
     parts = separates(terms, frame.normal, column)
@@ -102,7 +111,7 @@ def prepare(
         separates=parts,
         target=ca.if_else(ca.logic_or(suppressed, 1 - parts), UNREACHED, target),
         slip_target=touch.slip(half) if scheme.impact_friction else ca.SX.zeros(3),
-        delay=_delay(touch, landing, lasts, half, terms) if scheme.time_of_impact else ca.SX(0),
+        delay=_delay(touch, landing, lasts, half, terms) if scheme.time_of_impact and not law.soft else ca.SX(0),
         leaving=touch.leaving,
         lasts=lasts,
         load=weight * duration,
@@ -114,6 +123,7 @@ def prepare(
         coupling=coupling_of(push, frame.normal, law, softness) if coupled else None,
         paradox=pulls_together(push, frame.normal, law, slip) if coupled else ca.SX(0),
         near=conditions.near,
+        soft=soft,
     )
 
 
@@ -219,22 +229,50 @@ def _slack(settings: StepSettings, contact: Contact, touch: _Touch) -> Expr:
     return ca.if_else(passes, TIE + 2 * SHORTEST * settings.scheme.dt * speed, 0)
 
 
-def _normal_target(
-    law: Law, contact: Contact, duration: Expr, touch: _Touch, inverse_mass: Expr, away: Expr, smoothing: Expr
-) -> tuple[Expr, Expr]:
-    """(softness, target): the velocity that the normal constraint asks for at the middle of the step.
+def _normal_target(contact: Contact, duration: Expr, touch: _Touch, away: Expr, smoothing: Expr) -> Expr:
+    """The velocity that the normal constraint of a rigid contact asks for at the middle of the step.
 
     Hit: the rebound carried from t* to the middle, b = max(u + n.f* (dt/2 - t*), 0). Not hit: ``away``, that of the
     free motion less what would close the gap that this leaves at the end.
-    Soft (Catto, GDC 2011), deviation: the spring acts over what is left of the step, so that a contact that
-    begins late in the step begins gently.
     """
-    if not law.soft:
-        carried = positive(touch.rebound + touch.pull * (duration / 2 - touch.time), smoothing)
-        return ca.SX(0), ca.if_else(contact.hit, carried, away)
-    omega = 2 * ca.pi * law.frequency
-    stiffness, damper = omega**2 / inverse_mass, 2 * law.damping * omega / inverse_mass
-    left = duration - touch.time
-    beta = stiffness / (damper + left * stiffness)
-    gamma = 1 / (left * (damper + left * stiffness) + 1e-30)
-    return gamma, ca.if_else(contact.hit, -beta * ca.if_else(contact.gap < -TOUCH, contact.gap, 0), away)
+    carried = positive(touch.rebound + touch.pull * (duration / 2 - touch.time), smoothing)
+    return ca.if_else(contact.hit, carried, away)
+
+
+def _soft_impulse(
+    law: Law,
+    contact: Contact,
+    motions: Motions,
+    duration: Expr,
+    conditions: Conditions,
+    seen: tuple[Expr, Frame, Expr],
+) -> SoftImpulse:
+    """What a soft contact gives; ``seen``: its velocity in the middle of the substep; where and when it begins to act.
+
+    What lasts from the last step goes on acting in the prediction, but for the contact's own force.
+    """
+    free, applied, acting = seen
+    terms = body_terms(motions, acting, applied, applied)
+    inverse_mass, *_ = inverse_masses(terms, applied.normal, *symmetric_mobilities(terms, conditions.same))
+    velocity, _, normal = at_touch(contact, motions, ca.SX(0))
+    rate = ca.dot(normal, velocity)
+    acceleration, arms = (free - rate) * 2 / duration, contact.geometry.frame(ca.SX(0)).arms
+    for k, (motion, (force, torque)) in enumerate(zip(motions, conditions.lagging, strict=False)):
+        turning = apply(motion.inverse_inertia(ca.SX(0)), torque)
+        gained = (1 - 2 * k) * ca.dot(normal, force / motion.mass + ca.cross(turning, arms[k]))
+        rate, acceleration = rate + conditions.lag * gained, acceleration + gained
+    load = ca.fmax(ca.dot(normal, conditions.force), 0)
+    return soft_impulse(
+        law,
+        SoftApproach(
+            active=ca.logic_and(ca.logic_or(contact.hit, contact.gap < -TOUCH), ca.logic_not(conditions.suppressed)),
+            gap=contact.gap,
+            rate=rate,
+            time=contact.time,
+            acceleration=acceleration - inverse_mass * load,
+            force=load,
+            inverse_mass=inverse_mass,
+            duration=duration,
+            lag=conditions.lag,
+        ),
+    )

@@ -157,7 +157,7 @@ def joint_constraints(
         moving = tuple(trees.motions[i] for i in joint.bodies)
         frames, same = along[index].frames, trees.same(joint.bodies)
         if index not in places:
-            lock = trees.placed(joint.bodies, lock_constraint(settings, frames, moving, substep, same))
+            lock = trees.placed(joint.bodies, lock_constraint(frames, moving, substep, same))
             projected.append(JointConstraint(lock, f"{joint.name}.lock"))
             fitted += [] if joint.soft else [lock]
         for k in range(len(joint.kind.coordinates)) if joint.acting else ():
@@ -217,10 +217,10 @@ def _places(world: World, trees: KinematicTrees) -> dict[int, tuple[int, Expr]]:
 
 
 def locks_at(context: StepContext, trees: KinematicTrees) -> list[tuple[PlacedConstraint, JointImpulse]]:
-    """The constraints, without impulse, of joints that close loops or are soft, at the instant of an impact."""
+    """The constraints, without impulse, of joints that close loops, at the instant of an impact; soft ones give way."""
     found, exact = [], tree_joints(context.world.joints)
     for index, joint in enumerate(context.world.joints):
-        if index in exact:
+        if index in exact or joint.soft:
             continue
         moving = tuple(trees.motions[i] for i in joint.bodies)
         states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)

@@ -20,7 +20,8 @@ from symphys.dynamics.context import StepSettings
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint, TreeCoordinate, by_law, towards
 from symphys.dynamics.joints.joint_frames import JointFrames, errors, free, locked
 from symphys.dynamics.joints.joint_impulse import Directions, mobility, speeds
-from symphys.dynamics.joints.locked_directions import LockConstraint, inverse
+from symphys.dynamics.joints.locked_directions import LastingForce, LockConstraint, inverse
+from symphys.dynamics.oscillator import SpringLaw, response, spring_law
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Momentum
 from symphys.maths.smoothing import at_least, at_most, clip
@@ -90,25 +91,31 @@ class CoordinateTerms:
 
 
 @traced
-def lock_constraint(
-    settings: StepSettings, frames: JointFrames, motions: Motions, substep: SubstepTimes, same: bool
-) -> LockConstraint:
-    """The locked directions of a joint, rigid or soft (Catto, GDC 2011)."""
+def lock_constraint(frames: JointFrames, motions: Motions, substep: SubstepTimes, same: bool) -> LockConstraint:
+    """The locked directions of a joint, rigid or soft: each then a spring and damper on its own effective mass."""
     joint, start, middle = frames.joint, ca.SX(0), substep.duration / 2
     now = frames.placed(start)
-    terms, seen = frames.terms(motions, middle, start), locked(joint, frames.placed(middle))
+    terms, seen, given = frames.terms(motions, middle, start), locked(joint, frames.placed(middle)), locked(joint, now)
     k, error = regular_mobility(terms, seen, same), errors(joint, now)
-    share, softness = _softness(joint, ca.diag(k), settings.scheme.dt)
+    softness, target, lasting = ca.SX(k.size1(), 1), ca.SX(k.size1(), 1), None
+    if joint.soft:
+        omega, law = 2 * ca.pi * joint.frequency, _spring_law(joint, substep)
+        at_start = ca.diag(regular_mobility(frames.terms(motions, start, start), given, same))
+        rate, due = _path_rates(frames, motions, terms, (given, seen))
+        before = rate - 2 * substep.lag / substep.duration * (due - rate)
+        softness, target = at_start / law.b, -(law.stiff * error + law.c * before) / law.b
+        lasting = LastingForce(-law.end / at_start, -(omega**2 * error + law.end_before * before) / at_start)
     return LockConstraint(
         terms=terms,
         seen=seen,
-        given_along=locked(joint, now),
+        given_along=given,
         mass=inverse(k + ca.diag(softness)),
         softness=softness,
-        target=-share * error / settings.scheme.dt,
+        target=target,
         error=error,
         axes=now.a,
         same=same,
+        lasting=lasting,
     )
 
 
@@ -132,13 +139,21 @@ def regular_mobility(terms: tuple[BodyTerm, ...], seen: Directions, same: bool) 
     return k + REDUNDANT * ca.diag(ca.diag(mobility(apart, seen, False)))
 
 
-def _softness(joint: Joint, mobilities: Expr, dt: Expr) -> tuple[Expr, Expr]:
-    """(share of the error that velocities take back in a step, gamma), (n,) each."""
-    if not joint.soft:
-        return ca.SX(mobilities.size1(), 1), ca.SX(mobilities.size1(), 1)
-    omega = 2 * ca.pi * joint.frequency
-    stiffness, damper = omega**2 / mobilities, 2 * joint.damping * omega / mobilities
-    return dt * stiffness / (damper + dt * stiffness), 1 / (dt * (damper + dt * stiffness))
+def _spring_law(joint: Joint, substep: SubstepTimes) -> SpringLaw:
+    """What a soft joint gives along each of its locked directions."""
+    omega, ratio = 2 * ca.pi * joint.frequency, joint.damping
+    return spring_law(response(omega, ratio, substep.duration), response(omega, -ratio, 2 * substep.lag))
+
+
+def _path_rates(
+    frames: JointFrames, motions: Motions, terms: tuple[BodyTerm, ...], directions: tuple[Directions, Directions]
+) -> tuple[Expr, Expr]:
+    """(n,) each: rates along directions at the start of the substep, and at its middle if forces stay as they were."""
+    start, (given, seen) = ca.SX(0), directions
+    before = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
+    due = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
+    now = tuple(replace(term, jacobian=None) for term in frames.terms(motions, start, start))
+    return speeds(now, given, before), speeds(tuple(replace(term, jacobian=None) for term in terms), seen, due)
 
 
 @traced
@@ -172,12 +187,7 @@ def coordinate_terms(
     start, middle, coordinate = ca.SX(0), duration / 2, frames.joint.kind.coordinates[k]
     now, terms = frames.placed(start), frames.terms(motions, middle, start)
     seen, given = free(coordinate, frames.placed(middle)), free(coordinate, now)
-    before = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
-    due = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
-    rate_now = speeds(
-        tuple(replace(term, jacobian=None) for term in frames.terms(motions, start, start)), given, before
-    )
-    rate_due = speeds(tuple(replace(term, jacobian=None) for term in terms), seen, due)
+    rate_now, rate_due = _path_rates(frames, motions, terms, (given, seen))
     if isinstance(place, bool):
         rate, k_of = speeds(terms, seen, momenta), mobility(terms, seen, place)
         return CoordinateTerms(terms, seen, given, value, rate, rate_now, rate_due, k_of, place, None)

@@ -16,6 +16,14 @@ Expr = Any
 
 
 @dataclass(frozen=True)
+class LastingForce:
+    """The forces (n,) slope u + constant of springs and dampers at the end of a substep, from the velocities u (n,)."""
+
+    slope: Expr
+    constant: Expr
+
+
+@dataclass(frozen=True)
 class LockConstraint:
     """The locked directions of a joint, prepared for the sweeps.
 
@@ -29,6 +37,7 @@ class LockConstraint:
         axes: (3, 3) of the first frame at the start. Forces on a point are stored along these, so that they turn with
             the body: a rod's pull stays along the rod.
         same: whether both bodies are of one tree of joints.
+        lasting: of a joint that is soft: the force that goes on acting at the end of the substep.
     """
 
     terms: tuple[BodyTerm, ...]
@@ -40,10 +49,16 @@ class LockConstraint:
     error: Expr
     axes: Expr
     same: bool
+    lasting: LastingForce | None = None
 
     def fitting(self, moved: Expr) -> Expr:
         """(n,): displacements by the directions moved to impulses times a time that close what is then left open."""
         return -ca.mtimes(self.mass, self.error + moved)
+
+    def at_end(self, momenta: tuple[Any, ...]) -> JointImpulse:
+        """The force of a joint that is soft at the end of the substep, from the velocities after the sweeps."""
+        assert self.lasting is not None
+        return JointImpulse(self.lasting.slope * speeds(self.terms, self.seen, momenta) + self.lasting.constant)
 
     def carried(self, impulse: JointImpulse) -> Expr:
         """(n,): what is stored of an impulse; also of a force."""

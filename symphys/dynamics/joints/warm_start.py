@@ -50,12 +50,16 @@ def lasting_forces(
     contacts: Sequence[PlacedConstraint],
     joints: Sequence[JointConstraint],
     given: Sequence[JointImpulse],
+    solved: AllVelocities,
     x: State,
     kick: Expr,
 ) -> tuple[Struck, State]:
-    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last."""
+    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last.
+
+    ``solved``: the velocities after the sweeps.
+    """
     struck = _struck(context, contacts, joints, given)
-    return struck, _lasting_forces(context, joints, given, struck, x, kick)
+    return struck, _lasting_forces(context, joints, given, struck, solved, x, kick)
 
 
 def _struck(
@@ -91,6 +95,7 @@ def _lasting_forces(
     constraints: Sequence[JointConstraint],
     given: Sequence[JointImpulse],
     struck: Struck,
+    solved: AllVelocities,
     x: State,
     kick: Expr,
 ) -> State:
@@ -100,10 +105,19 @@ def _lasting_forces(
     """
     forces = dict[str, list[Expr]]()
     for each, impulse in zip(constraints, given, strict=True):
+        if isinstance(each.placed.constraint, LockConstraint) and each.placed.constraint.lasting is not None:
+            moving = tuple(solved[i] for i in each.placed.carriers)
+            forces[each.name] = [_sprung(each.placed.constraint, moving)]
+            continue
         constraint, impact, old = each.placed.constraint, of_body(struck, each.placed.bodies[0]), x[each.name]
         force = _lasting(constraint, impulse, own(old, each.k), impact, (kick, x["lag"], context.shortest_kick))
         forces.setdefault(each.name, []).append(force)
     return {name: _stacked(tuple(parts)) for name, parts in forces.items()}
+
+
+@traced
+def _sprung(constraint: LockConstraint, momenta: tuple[Any, ...]) -> Expr:
+    return constraint.carried(constraint.at_end(momenta))
 
 
 def of_body(struck: Struck, body: int) -> Expr:
