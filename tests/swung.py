@@ -15,7 +15,6 @@ TABLES: dict[str, Any] = {
             "between": ["world", "bob"],
             "hinge": {"axis": [0, 1, 0]},
             "point": [0, 0, 0],
-            "centre": 1.57,
             "motor": {"torque": {"torque": 8.0}},
         }
     ],

@@ -15,7 +15,7 @@ from symphys.problem import problem_of_tables
 UPRIGHT = {
     "simulation": {"duration": 0.8, "dt": 0.02},
     "body": [{**TABLES["body"][0], "position": [0, 0, 1]}],
-    "joint": [{**TABLES["joint"][0], "centre": 0.0, "motor": {"torque": {"torque": 100.0}}}],
+    "joint": [{**TABLES["joint"][0], "motor": {"torque": {"torque": 100.0}}}],
     "variable": [{"name": "twist", "sets": "pivot.command", "knots": 20, "guess": 0.5, "scale": 2.0}],
     "cost": [
         {"name": "way", "at": "always", "squares": "[pivot.angle, 0.1 * pivot.rate]", "weight": 40},

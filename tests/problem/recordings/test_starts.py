@@ -60,7 +60,8 @@ def test_joints_carry_the_others(body: str, tmp_path: Path) -> None:
         assert found[name][0] == pytest.approx(value, abs=1e-12)
     assert max(found["apart 0"] + found["apart 1"]) < 1e-12
     own = problem.recordings[0].start
-    assert len(own) == 12
+    assert len(own) == 13
+    assert own["elbow.unwrapped"] == [0.7]
     for field, value in POSE.items():
         np.testing.assert_allclose(own[f"{body}.{field}"], value, atol=1e-15)
 
