@@ -124,9 +124,9 @@ def revived_outcome(saved: dict[str, Any], solver: str) -> Outcome:
         raise SymphysError(f"this checkpoint is of the solver {saved.get('solver')!r}, not of {solver!r}")
     try:
         found = saved[OUTCOME]
-        arrays = {
-            key: {name: np.array(each, float) for name, each in found[key].items()} for key in ("gains", "multipliers")
-        }
+        gains, multipliers = (
+            {name: np.array(each, float) for name, each in found[key].items()} for key in ("gains", "multipliers")
+        )
         return Outcome(
             status=Status(found["status"]),
             advice=str(found["advice"]),
@@ -134,7 +134,8 @@ def revived_outcome(saved: dict[str, Any], solver: str) -> Outcome:
             trace=tuple(revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in saved["rows"]),
             counts=Counts(*map(int, saved["counts"])),
             stages=tuple(revive(StageResult, each, Counts) for each in found["stages"]),
-            **arrays,
+            gains=gains,
+            multipliers=multipliers,
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise damaged(error) from error

@@ -19,11 +19,12 @@ KEPT: dict[Hashable, Any] = {}
 
 
 def structure(world: World, parameters: Sequence[Any]) -> Hashable:
-    """Equal for worlds that are equal as functions of these symbols (SX), numbers included."""
+    """Equal for worlds that are equal as functions of these symbols (SX) and of their phases, numbers included."""
     leaves: list[Any] = []
     shape = dismantle(world, leaves)
     column = ca.vertcat(ca.SX(0, 1), *(ca.vec(ca.densify(leaf)) for leaf in leaves))
-    return shape, ca.Function("world", [ca.vertcat(ca.SX(0, 1), *parameters)], [column]).serialize()
+    symbols = [*parameters, *(symbol for _, symbol in world.scheduled)]
+    return shape, ca.Function("world", [ca.vertcat(ca.SX(0, 1), *symbols)], [column]).serialize()
 
 
 def kept(
