@@ -10,7 +10,6 @@ import casadi as ca
 from symphys.dynamics.collision.body_points import axes
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, chosen
 from symphys.dynamics.collision.witness_points import steady
-from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Box, Capsule
 
@@ -173,13 +172,13 @@ def tolerances(a: MovingBox, b: MovingBox, directions: list[Parabola]) -> list[E
     if gravity is None:
         return [ca.SX(FLUSH)] * len(directions)
     step = ca.fmin(STEP_UP, THIN * 2 * shortest([*a.halves, *b.halves]))
-    up = gravity / ca.sqrt(ca.fmax(ca.dot(gravity, gravity), TINY_SQUARE))
-    found = []
-    for direction in directions:
-        along, lean = direction.start, ca.dot(direction.start, up)
-        upright = lean * lean > UPRIGHT * UPRIGHT * ca.dot(along, along)
-        found.append(ca.if_else(upright, step, FLUSH))
-    return found
+    return [ca.if_else(leans_little(direction.start, gravity), step, FLUSH) for direction in directions]
+
+
+def leans_little(direction: Expr, gravity: Expr) -> Expr:
+    """1 if a direction (3,) is near the vertical; never without gravity."""
+    lean = ca.dot(direction, gravity)
+    return lean * lean > UPRIGHT * UPRIGHT * ca.dot(direction, direction) * ca.dot(gravity, gravity)
 
 
 def shortest(halves: list[Expr]) -> Expr:

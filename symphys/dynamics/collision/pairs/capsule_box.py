@@ -10,17 +10,16 @@ from symphys.dynamics.collision.body_points import ends
 from symphys.dynamics.collision.box_geometry import facing, moving_box, nearing
 from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.pairs.box_box import approach_of, edges_across
-from symphys.dynamics.collision.pairs.sphere_box import BoxField
+from symphys.dynamics.collision.pairs.sphere_box import ball_at_box
 from symphys.dynamics.collision.pairs.sphere_capsule import ball_at_capsule
 from symphys.dynamics.collision.predicted_path import PredictedPath
-from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.model.shapes import Box, Capsule
 
 
 def capsule_box(capsule: Capsule, box: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """Eight points: the round ends, the side across the box's face, the corners of that face."""
-    field, tips = BoxField(box.half_sizes), ends(capsule)
-    found = [ball_in_field(a.path(end), a.arm(end), capsule.radius, box, field, b) for end in tips]
+    tips = ends(capsule)
+    found = [ball_at_box(end, capsule.radius, box, a, b) for end in tips]
     rod, other = moving_box(capsule, a), moving_box(box, b)
     edges = [rod.axes[2].cross(edge) for edge in other.axes]
     near = nearing(rod, other, list(other.axes), edges, a.dt, capsule.radius)
