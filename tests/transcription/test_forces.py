@@ -64,6 +64,58 @@ def test_a_ball_that_falls_through_air_follows_tanh() -> None:
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.05)
 
 
+OIL = {"name": "oil", "on": "ball.force", "value": "-oil.c * ball.velocity"}
+
+
+@pytest.mark.parametrize("share", [0.5, 1.5, 3, 20])
+def test_thick_oil_stops_a_ball_after_m_v_over_c(share: float) -> None:
+    """The momentum is c times the way, at any c dt / m; up to 2 nothing overshoots."""
+    found = motion([{**OIL, "numbers": {"c": share * MASS / 0.01}}], 0.01, start={"velocity": [1, 0, 0]})
+    way = found.position[:, 0, 0]
+    assert way[-1] == pytest.approx(0.01 / share, rel=1e-9)
+    assert way.max() < 0.01 / share * (1 + 1e-9 if share < 2 else 2)
+
+
+@pytest.mark.parametrize("share", [1.5, 15.0])
+def test_strong_quadratic_drag_stops_a_ball(share: float) -> None:
+    """It loses speed in every step; at last it is slow enough to follow 1 / (1 / v + c t / m)."""
+    found = motion([{**DRAG, "numbers": {"c": share * MASS / 0.01}}], 0.01, start={"velocity": [1, 0, 0]})
+    speed = found.velocity[:, 0, 0]
+    assert (np.diff(np.abs(speed)) < 0).all()
+    assert np.abs(speed[-1]) == pytest.approx(1 / (1 + 200 * share), rel=0.05)
+
+
+JOINTED = [
+    ("ball.torque", "-oil.c * ball.angular_velocity"),
+    ("hinge.command", "-oil.c * hinge.rate"),
+    ("ball.force", "-oil.c / 0.09 * ball.velocity"),
+]
+
+
+@pytest.mark.parametrize(("on", "value"), JOINTED)
+def test_an_arm_in_oil_stops_after_its_momentum_over_c(on: str, value: str) -> None:
+    """As a torque on the body, as a motor's command, and as a force 0.3 m from the hinge."""
+    inertia, share = 0.4 * MASS * 0.01 + MASS * 0.09, 1.5
+    law = {"name": "oil", "on": on, "value": value, "numbers": {"c": share * inertia / 0.01}}
+    hinge = {**HINGE, "start": 0, "motor": {"torque": {"torque": 1e6}}}
+    start = {"position": [0, 0, -0.3], "velocity": [-0.6, 0, 0], "angular_velocity": [0, 2, 0]}
+    found = motion([law], 0.01, duration=0.5, joint=[hinge], start=start)
+    assert found.joint_value[-1, 0, 0] == pytest.approx(0.02 / share, rel=1e-4)
+
+
+def test_oil_that_turns_with_a_body_stops_its_spin() -> None:
+    inertia = 0.4 * MASS * 0.01
+    law = {
+        "name": "oil",
+        "on": "ball.torque",
+        "value": "-oil.c * ball.angular_velocity",
+        "numbers": {"c": inertia * 300},
+    }
+    found = motion([law], 0.01, duration=0.3, start={"angular_velocity": [0, 3, 0]})
+    assert np.abs(found.angular_velocity[-1]).max() < 1e-9
+    assert 2 * np.arcsin(found.orientation[-1, 0, 2]) == pytest.approx(0.01, rel=1e-9)
+
+
 def test_magnus_force_bends_the_path_as_scipy_integrates_it() -> None:
     forces = [{**DRAG, "numbers": {"c": 0.005}}, {**MAGNUS, "numbers": {"c": 0.002}}]
     spin = np.array([0, 10.0, 60.0])

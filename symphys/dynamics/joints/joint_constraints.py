@@ -217,13 +217,26 @@ def motor_constraint(
     if isinstance(motor, AffineMotor):
         return _affine(settings, motor, at, command, substep)
     if isinstance(motor, TorqueMotor):
-        return _driven(at, clip(command.given, -motor.torque, motor.torque, settings.smoothing), command, substep)
+        return _driven(at, commanded_torque(motor, command.given, settings.smoothing), command, substep)
     assert isinstance(motor, Servo | VelocityMotor)
     aim = command.given
     wanted = servo_velocity(motor, aim, at.value, settings.smoothing) if isinstance(motor, Servo) else aim
     target = clip(wanted, -motor.velocity, motor.velocity, settings.smoothing)
     most = motor.torque * substep.kick
     return _constraint(at, towards(target, at.mobility), -most, most, width)
+
+
+def commanded_torque(motor: TorqueMotor | AffineMotor, given: Expr, smoothing: Expr = 0, width: Expr = 0) -> Expr:
+    """What a motor gives by its command alone [N m], [N]; ``width`` of the bounds of its force."""
+    if isinstance(motor, TorqueMotor):
+        return clip(given, -motor.torque, motor.torque, smoothing)
+    for end, held in zip(motor.command_range or (), (at_least, at_most), strict=False):
+        given = held(given, end, smoothing) if isfinite(end) else given
+    drive = motor.gear * (motor.gain * given + motor.offset)
+    if motor.passive:
+        for force, held in zip(_force_ends(motor), (at_least, at_most), strict=True):
+            drive = drive if force is None else held(drive, force, width)
+    return drive
 
 
 def _driven(at: CoordinateTerms, drive: Expr, command: Command, substep: SubstepTimes) -> CoordinateConstraint:
@@ -241,13 +254,9 @@ def _affine(
     settings: StepSettings, motor: AffineMotor, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
     """A torque that is affine in command, coordinate and rate; what depends on these acts as a spring and damper do."""
-    gear, kick, given, width = motor.gear, substep.kick, command.given, settings.smoothing / at.mobility
-    for end, held in zip(motor.command_range or (), (at_least, at_most), strict=False):
-        given = held(given, end, settings.smoothing) if isfinite(end) else given
-    drive, ends = gear * (motor.gain * given + motor.offset), _force_ends(motor)
+    gear, kick, width, ends = motor.gear, substep.kick, settings.smoothing / at.mobility, _force_ends(motor)
+    drive = commanded_torque(motor, command.given, settings.smoothing, width / kick)
     if motor.passive:
-        for force, held in zip(ends, (at_least, at_most), strict=True):
-            drive = drive if force is None else held(drive, force, width / kick)
         return _driven(at, drive, command, substep)
     pull, slope = _spring(settings, at, substep, Spring(gear**2 * motor.kp, gear**2 * motor.kv))
     law = by_law(pull - _impulse(drive, command, substep), slope, at.mobility)

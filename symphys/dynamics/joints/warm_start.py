@@ -176,7 +176,7 @@ def add_joint_forces(context: StepContext, forces: State, poses: Poses, total: T
         if not names:
             continue
         parts = tuple((part, forces[f"{joint.name}.{part}"]) for part in names)
-        found = _on_bodies(joint, held, parts)
+        found = on_bodies(joint, held, parts)
         for body, wrench in zip(joint.bodies, found, strict=True):
             total[body] = _added(total[body], wrench)
 
@@ -192,7 +192,7 @@ def _add_coupling(context: StepContext, coupling: JointCoupling, forces: State, 
     near = [ca.SX(0, 1) if joint.unwrapped is None else forces[joint.unwrapped] for joint in joints]
     along = [force] if len(joints) == 1 else [force, _against(coupling, joints[1], held[1], near[1], force)]
     for joint, sides, numbers in zip(joints, held, along, strict=True):
-        for body, wrench in zip(joint.bodies, _on_bodies(joint, sides, (("motor", numbers),)), strict=True):
+        for body, wrench in zip(joint.bodies, on_bodies(joint, sides, (("motor", numbers),)), strict=True):
             total[body] = _added(total[body], wrench)
 
 
@@ -205,7 +205,7 @@ def _against(
 
 
 @traced
-def _on_bodies(
+def on_bodies(
     joint: Joint, poses: tuple[tuple[Expr, Expr], ...], parts: tuple[tuple[str, Expr], ...]
 ) -> tuple[tuple[Expr, Expr], ...]:
     """Force and torque on each moving side."""

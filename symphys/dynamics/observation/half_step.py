@@ -8,9 +8,13 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.arguments import arguments_of, context_of, inline, parts_of
+from symphys.dynamics.context import State, StepContext
+from symphys.dynamics.joints.joint_constraints import commanded_torque
+from symphys.dynamics.joints.warm_start import on_bodies
 from symphys.dynamics.prediction import predicted_motions
 from symphys.dynamics.tracing.decorator import traced, tracing
 from symphys.maths import rotation
+from symphys.model.joints.motor import AffineMotor, TorqueMotor, given_torque
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
 
@@ -25,7 +29,7 @@ def half_step_function(
 
     Places drift with the velocities at t_k: a force of these places alone makes the step position Verlet (drift, kick,
     drift), which is symplectic. Velocities change with the accelerations under gravity, the inputs and the persistent
-    forces of the last step, as joints let them. Everything else is as at t_k.
+    forces of the last step, as joints let them; commands of torques act at once. Everything else is as at t_k.
     """
     arguments = arguments_of(world, inputs, parameters)
     tracer, layout = inline(world, arguments, reduces=False), Layout(world)
@@ -33,7 +37,7 @@ def half_step_function(
         context = context_of(world, scheme, inputs, arguments)
         x, dt = parts_of(layout, arguments[0]), ca.SX(context.settings.scheme.dt)
         values = dict(x)
-        for body, motion in zip(world.bodies, predicted_motions(context, x, dt), strict=True):
+        for body, motion in zip(world.bodies, predicted_motions(context, _commanded(context, x), dt), strict=True):
             place = _drifted(motion.position, motion.orientation, motion.velocity, motion.angular_velocity, dt / 2)
             changes = (motion.acceleration, motion.angular_acceleration)
             moving = _accelerated(motion.velocity, motion.angular_velocity, *changes, dt / 2)
@@ -41,6 +45,22 @@ def half_step_function(
                 values[f"{body.name}.{name}"] = value
     packed = layout.pack({name: tracer.value(part) for name, part in values.items()})
     return ca.Function("half_step", arguments[:3], [ca.densify(packed)], ["x", "u", "p"], ["x_half"])
+
+
+def _commanded(context: StepContext, x: State) -> State:
+    """The state with what commands of torques give in this step in place of what they gave in the last one."""
+    values, bodies = dict(x), context.world.bodies
+    for joint in context.world.joints:
+        given = context.input(f"{joint.name}.command")
+        if given is None or not isinstance(joint.motor, TorqueMotor | AffineMotor) or not given_torque(joint.motor):
+            continue
+        names = [bodies[i].name for i in joint.bodies]
+        poses = tuple((x[f"{name}.position"], x[f"{name}.orientation"]) for name in names)
+        change = commanded_torque(joint.motor, given) - x[f"{joint.name}.{joint.drive}"]
+        for name, wrench in zip(names, on_bodies(joint, poses, (("motor", change),)), strict=True):
+            for part, more in zip(("reaction_force", "reaction_torque"), wrench, strict=True):
+                values[f"{name}.{part}"] = values[f"{name}.{part}"] + more
+    return values
 
 
 FIELDS = ("position", "orientation", "velocity", "angular_velocity")

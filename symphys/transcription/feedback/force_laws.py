@@ -1,8 +1,10 @@
 """Forces that follow from the state: what they add to the inputs of a step.
 
 Inputs are constant over a step. A force of the state at t_k would therefore be of first order. The laws are evaluated
-at t_k + dt/2 instead, see ``half_step_function``, which makes them of second order. Velocities there need
-accelerations, which depend on the laws. For them the laws are evaluated at t_k first.
+at t_k + dt/2 instead, see ``half_step_function``, which makes them of second order. Velocities there depend on the laws
+themselves, f = law(state at t_k + dt/2 under f), so that drag is the implicit midpoint rule: a body that drag stops
+goes m v / c at any step. Two steps of Newton's method from f = 0, with one slope, solve this: exactly for what is
+linear in velocities, and drag that grows with them takes speed in every step.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ from symphys.transcription.formula_names import Instant, Parameters, instant, na
 
 Expr = Any
 """casadi SX"""
+LEAST_PIVOT = 0.5
+"""Laws that push the stronger the faster a body goes grow by at most its inverse within a step."""
 QUARTER = 0.25
 """Of a step: so far from its ends it is asked which step a time belongs to, so that rounding does not matter."""
 
@@ -34,13 +38,41 @@ def force_function(
     ahead = half_step_function(world, scheme, inputs, parameters.symbols)
     plain = Layout(world).size
 
-    def added(laws: Sequence[ForceLaw], x: Expr, time: Expr) -> Expr:
-        return _added(problem, world, inputs, parameters, memory, laws, Instant(x, at.u, at.p, time, at.z))
-
-    first = at.u + added(problem.forces, at.x, at.time)
-    half = ca.vertcat(ahead(at.x[:plain], first, at.p), at.x[plain:])
-    total = at.u + added(problem.forces, half, at.time + scheme.dt / 2)
+    given = ca.SX.sym("given", at.u.size1())
+    half = ca.vertcat(ahead(at.x[:plain], at.u + given, at.p), at.x[plain:])
+    moment = Instant(half, at.u, at.p, at.time + scheme.dt / 2, at.z)
+    law = _added(problem, world, inputs, parameters, memory, problem.forces, moment)
+    first, slope = ca.substitute([law, ca.jacobian(law, given)], [given], [ca.SX.zeros(given.size1())])
+    found = _with_slope(first, slope)
+    again = ca.substitute(law, given, found)
+    total = at.u + found + _with_slope(again - found, slope)
     return ca.Function("forces", [at.x, at.u, at.p, at.time], [ca.densify(total)])
+
+
+def _with_slope(first: Expr, slope: Expr) -> Expr:
+    """(nu,): f of f = first + slope f, by elimination among the entries that the slope (nu, nu) depends on."""
+    slope = ca.sparsify(slope)
+    own = sorted(set(slope.sparsity().get_triplet()[1]))
+    rows = [{j: float(i == j) - slope[i, j] for j in own if i == j or slope.has_nz(i, j)} for i in own]
+    right = {i: first[i] for i in own}
+    for k, i in enumerate(own):
+        pivot = ca.fmax(rows[k][i], LEAST_PIVOT)
+        for below in range(k + 1, len(own)):
+            share = rows[below].get(i)
+            if share is None:
+                continue
+            for j in own[k + 1 :]:
+                if j in rows[k]:
+                    rows[below][j] = rows[below].get(j, 0) - share / pivot * rows[k][j]
+            right[own[below]] -= share / pivot * right[i]
+    found: dict[int, Expr] = {}
+    for k, i in reversed(list(enumerate(own))):
+        known = sum((rows[k][j] * found[j] for j in own[k + 1 :] if j in rows[k]), ca.SX(0))
+        found[i] = (right[i] - known) / ca.fmax(rows[k][i], LEAST_PIVOT)
+    solved = ca.SX.zeros(first.size1())
+    for i, value in found.items():
+        solved[i] = value
+    return first + ca.mtimes(slope, solved)
 
 
 def _added(
