@@ -23,6 +23,9 @@ DRIFT_LIMITS = (1e-6, 1e-2)
 DRIFTED_LIMITS = (1e-3, 5e-2)
 """The same, added up over the motion."""
 
+JUMP_LIMITS = (2e-2, 0.1)
+"""Of a body's size, or of a radian."""
+
 
 def largest_energy(trust: Examination) -> float:
     """[J] that energies are compared with: the largest kinetic one, or a share of the other where nothing moves."""
@@ -42,6 +45,29 @@ def gains_finding(trust: Examination) -> Finding:
     meaning = f"{where}, which no real contact does; restitution together with friction can."
     doubt = f"contacts add {show(trust.gained, 2)} J, most of it {listed(worst.contacts)} at t = {show(worst.time)} s"
     return Finding(ENERGY, level, what, number, meaning, doubt * (level == BAD))
+
+
+def jump_findings(trust: Examination) -> list[Finding]:
+    """A change of place that no velocity explains, if there is one that matters."""
+    level = graded(trust.jump, JUMP_LIMITS)
+    if level not in (FAIR, BAD) or not trust.jump_of:
+        return []
+    where = f'"{trust.jump_of}" at t = {show(trust.jump_time)} s'
+    meaning = (
+        f"{where} moves in one step by {show(trust.jump_size, 3)}, farther than its velocities take it: something puts "
+        "it there at once, as a coupling or a limit that is not kept, or bodies that begin inside each other."
+    )
+    doubt = f"{where} jumps by {show(trust.jump_size, 3)}, which no velocity explains"
+    return [
+        Finding(
+            ENERGY,
+            level,
+            "Change of place that no velocity explains",
+            show(trust.jump_size, 3),
+            meaning,
+            doubt * (level == BAD),
+        )
+    ]
 
 
 def balance_finding(trust: Examination) -> Finding:

@@ -13,6 +13,7 @@ from symphys.verification import gradient, refinement, smoothing
 from symphys.verification.balance import balance
 from symphys.verification.contacts import contacts, slides
 from symphys.verification.held_bounds import held_bounds
+from symphys.verification.jumps import jumps
 from symphys.verification.near_misses import near_misses
 from symphys.verification.sensitivity_growth import sensitivity_growth
 from symphys.verification.target_conflicts import target_conflicts
@@ -89,7 +90,7 @@ def _fault(transcription: Transcription, record: Record, compared: list[dict[str
 
 @np.errstate(invalid="ignore", over="ignore", divide="ignore")  # numbers that are not finite are reported as such
 def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
-    """Energy and momentum, contacts, and tunnelling; it takes little beside a solve.
+    """Energy and momentum, jumps, contacts, and tunnelling; it takes little beside a solve.
 
     Where impulses of contacts have not settled, the motion is simulated again with other numbers of sweeps.
 
@@ -100,4 +101,4 @@ def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
     rollout = transcription.timed(record).rollout
     resolved = contacts(rollout, record)
     again = refinement.resettled(transcription, record.z, resolved["residual"], resolved["impulse"])
-    return {**balance(rollout, record), **resolved, **again, **tunnelling(rollout, record)}
+    return {**balance(rollout, record), **jumps(rollout, record), **resolved, **again, **tunnelling(rollout, record)}
