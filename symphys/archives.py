@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import zipfile
 from collections.abc import Container, Sequence
-from typing import BinaryIO, NamedTuple
+from typing import IO, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.lib import format as npy
@@ -105,7 +105,7 @@ def _member_header(archive: zipfile.ZipFile, member: str, name: str) -> ArrayHea
             raise ArchiveError(f"{quote(name)} {error}") from error
 
 
-def _header(stream: BinaryIO) -> ArrayHeader:
+def _header(stream: IO[bytes]) -> ArrayHeader:
     """What stands before the entries of an array."""
     try:
         version = npy.read_magic(stream)
@@ -148,7 +148,7 @@ def _member(archive: zipfile.ZipFile, member: str, header: ArrayHeader, name: st
         raise ArchiveError(f"{quote(name)} is damaged") from error
 
 
-def _entries(stream: BinaryIO, header: ArrayHeader, chunk: int) -> PlainArray:
+def _entries(stream: IO[bytes], header: ArrayHeader, chunk: int) -> PlainArray:
     content, place = bytearray(header.size), 0
     while place < header.size:
         part = stream.read(min(chunk, header.size - place))
@@ -156,5 +156,4 @@ def _entries(stream: BinaryIO, header: ArrayHeader, chunk: int) -> PlainArray:
             raise ArchiveError("ends before its last number")
         content[place : place + len(part)] = part
         place += len(part)
-    order = "F" if header.by_columns else "C"
-    return np.ndarray(header.shape, header.kind, buffer=content, order=order)
+    return np.ndarray(header.shape, header.kind, buffer=content, order="F" if header.by_columns else "C")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, fields
 from functools import cache, cached_property
 from typing import Annotated, get_type_hints
@@ -27,6 +28,10 @@ OF_BODIES = {
 """The quantities of a body by their fields, and their units."""
 COORDINATES = ("joint_value", "joint_rate", "joint_torque", "joint_command")
 """Fields with as many columns as the joint has coordinates, or one number where there is one."""
+
+
+NAMED = 6
+"""Contacts in a message."""
 
 
 class NotFinite(SymphysError):
@@ -99,7 +104,7 @@ class Trajectory:
     def __getitem__(self, name: str) -> Array:
         """(N + 1, ...), or (N, ...) of what acts in a step: a quantity by its name; KeyError says which there are."""
         if name not in self._columns:
-            raise KeyError(f"there is no {quote(name)}; {hint(name, self._columns)}")
+            raise KeyError(f"there is no {quote(name)}; {self._meant(name)}")
         field_name, index, _ = self._columns[name]
         array = getattr(self, field_name)[:, index] if index is not None else getattr(self, field_name)
         if field_name not in COORDINATES:
@@ -115,6 +120,17 @@ class Trajectory:
     def units(self) -> dict[str, str]:
         """The unit of every quantity by its name: ``{"ball.position": "m", ...}``; empty where there is none."""
         return {name: unit for name, (_, _, unit) in self._columns.items()}
+
+    def _meant(self, name: str) -> str:
+        """What somebody may have meant who asked for a name that is none."""
+        owner, _, quantity = name.rpartition(".")
+        touching = [each for each in self.contact_names if owner in re.split("[-:]", each)]
+        if touching and ("contact" in quantity or "gap" in quantity):
+            known = [f"{each}.{'gap' if 'gap' in quantity else 'force'}" for each in touching]
+            more = f" and {len(known) - NAMED} more" if len(known) > NAMED else ""
+            return f"contacts go by their two surfaces: {', '.join(map(quote, known[:NAMED]))}{more}"
+        own = [known for known in self._columns if known.rpartition(".")[0] == owner]
+        return hint(name, own or self._columns)
 
     @cached_property
     def _columns(self) -> dict[str, tuple[str, int | None, str]]:

@@ -41,7 +41,7 @@ def parts(start: StartState, found: Inertias, dt: float) -> int:
 
 def steepness(motor: Servo | VelocityMotor, inertia: float, step: float) -> float:
     """kv on a coordinate of this inertia [N m s/rad] or [N s/m], at a time step [s]."""
-    return min(motor.torque / (STIFFEST * motor.velocity), 2 * inertia / step)
+    return float(min(motor.torque / (STIFFEST * motor.velocity), 2 * inertia / step))
 
 
 def inertias(start: StartState) -> Inertias:

@@ -83,8 +83,8 @@ def trial(problem: Problem, text: str) -> Departure:
     over = f"over the first {seconds:g} s MuJoCo {mujoco.__version__}"
     if motion is None:
         return Departure("measured", ("motion",), f"{over} holds this model; the motions were not compared")
-    far = f"{1000 * place[0]:.3g} mm ({place[1]}) and {np.degrees(turn[0]):.3g} degrees ({turn[1]})"
-    return Departure("measured", ("motion",), f"{over} is off by at most {far}, under the same commands")
+    most = f"{1000 * place[0]:.3g} mm ({place[1]}) and {np.degrees(turn[0]):.3g} degrees ({turn[1]})"
+    return Departure("measured", ("motion",), f"{over} is off by at most {most}, under the same commands")
 
 
 def own_motion(problem: Problem) -> Trajectory | None:

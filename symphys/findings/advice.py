@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from symphys.findings.contacts import CONTACTS, contact_findings, miss_findings
-from symphys.findings.energy import ENERGY, JOINTS, balance_finding, gains_finding, jump_findings
+from symphys.findings.energy import ENERGY, balance_finding, gains_finding, jump_findings
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
 from symphys.findings.numerics import (
@@ -46,8 +46,8 @@ def findings(trust: Examination, judged: Judged) -> list[Finding]:
     lines += [growth_finding(trust.growth)] if trust.growth.factor.size else []
     lines += smoothed_findings(trust.smoothed, judged)
     numbers = ((trust.gained, gains_finding), (trust.momentum, balance_finding))
-    lines += [find(trust) for number, find in numbers if not math.isnan(number)] + jump_findings(trust)
-    return lines + contact_findings(trust, judged)
+    lines += [find(trust) for number, find in numbers if not math.isnan(number)]
+    return lines + jump_findings(trust) + contact_findings(trust, judged)
 
 
 def slopes(trust: Examination) -> tuple[list[str], list[list[str]]]:
@@ -171,7 +171,6 @@ def of_physics(lines: Sequence[Finding], level: dict[str, str]) -> str:
     if level[ENERGY] in (FAIR, BAD):
         worst = next(line for line in lines if line.about == ENERGY and line.level == level[ENERGY])
         parts.append(f"Look at the energy: {worst.meaning}")
-    parts += [line.meaning for line in lines if line.about == JOINTS]
     parts.append(
         {
             GOOD: "The contacts are resolved cleanly.",

@@ -10,7 +10,7 @@ from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, graded, worst_of
 from symphys.findings.writing import listed, percent, show
 
-ENERGY, JOINTS = "energy", "joints"
+ENERGY = "energy"
 
 AT_REST = 1e-6
 """Of the potential energy: kinetic energy below that is of what hardly moves, and no measure of anything."""
@@ -23,9 +23,8 @@ DRIFT_LIMITS = (1e-6, 1e-2)
 DRIFTED_LIMITS = (1e-3, 5e-2)
 """The same, added up over the motion."""
 
-
-JUMP_LIMITS = (0.2, 1.0)
-"""Of a joint that jumps, as a share of the most that it moves in a step."""
+JUMP_LIMITS = (2e-2, 0.1)
+"""Of a body's size, or of a radian."""
 
 
 def largest_energy(trust: Examination) -> float:
@@ -46,6 +45,29 @@ def gains_finding(trust: Examination) -> Finding:
     meaning = f"{where}, which no real contact does; restitution together with friction can."
     doubt = f"contacts add {show(trust.gained, 2)} J, most of it {listed(worst.contacts)} at t = {show(worst.time)} s"
     return Finding(ENERGY, level, what, number, meaning, doubt * (level == BAD))
+
+
+def jump_findings(trust: Examination) -> list[Finding]:
+    """A change of place that no velocity explains, if there is one that matters."""
+    level = graded(trust.jump, JUMP_LIMITS)
+    if level not in (FAIR, BAD) or not trust.jump_of:
+        return []
+    where = f'"{trust.jump_of}" at t = {show(trust.jump_time)} s'
+    meaning = (
+        f"{where} moves in one step by {show(trust.jump_size, 3)}, farther than its velocities take it: something puts "
+        "it there at once, as a coupling or a limit that is not kept, or bodies that begin inside each other."
+    )
+    doubt = f"{where} jumps by {show(trust.jump_size, 3)}, which no velocity explains"
+    return [
+        Finding(
+            ENERGY,
+            level,
+            "Change of place that no velocity explains",
+            show(trust.jump_size, 3),
+            meaning,
+            doubt * (level == BAD),
+        )
+    ]
 
 
 def balance_finding(trust: Examination) -> Finding:
@@ -72,15 +94,3 @@ def balance_finding(trust: Examination) -> Finding:
     when = f", most in the step from t = {show(trust.drift_at)} s" * math.isfinite(trust.drift_at)
     doubt = total + when if by_energy == BAD else f"{percent(trust.momentum)} of the momentum comes from nowhere"
     return Finding(ENERGY, level, "Left unexplained in a step", number, meaning, doubt * (level == BAD))
-
-
-def jump_findings(trust: Examination) -> list[Finding]:
-    """A joint that jumps, if one does."""
-    level = graded(trust.jump, JUMP_LIMITS)
-    if level in (GOOD, UNKNOWN):
-        return []
-    moved = f"{trust.jump_joint} moves by {show(abs(trust.jump_moved), 2)} {trust.jump_unit}"
-    where = f"{moved} in the step from t = {show(trust.jump_time)} s, which its rate does not account for"
-    meaning = f"The joint {where}: a coupling, a limit or a loop put it there, as where one does not hold at the start."
-    number = f"{percent(trust.jump)} of a step"
-    return [Finding(JOINTS, level, "Joint that jumps", number, meaning, where * (level == BAD))]

@@ -171,9 +171,8 @@ class Examination:
         unexplained, drift_at: the largest that the work of motors cannot explain [J], and when [s].
         drifted: the largest sum of such changes since the start [J].
         momentum: largest change of momentum in a step that nothing accounts for, relative.
-        jump, jump_joint, jump_time, jump_moved, jump_unit: the largest change of a joint's coordinate in a step that
-            its rates do not account for, as a share of the most that it moves in a step; whose, when [s], by how much
-            it moved in all, [rad] or [m].
+        jump, jump_of, jump_time, jump_size: the largest change of place in a step that no velocity explains, as a share
+            of the body's size or of a radian; of which body or joint, when [s], and how far [m] or [rad].
         residual, residual_at, impulse: largest change of an impulse in the last sweep [N s], when [s], and largest
             impulse in a step [N s].
         unsettled: steps in which that change is large beside the largest impulse.
@@ -209,10 +208,9 @@ class Examination:
     drifted: float = np.nan
     momentum: float = np.nan
     jump: float = np.nan
-    jump_joint: str = field(default="", metadata={"key": "jump_at.joint"})
+    jump_of: str = field(default="", metadata={"key": "jump_at.name"})
     jump_time: float = field(default=np.nan, metadata={"key": "jump_at.time"})
-    jump_moved: float = field(default=np.nan, metadata={"key": "jump_at.moved"})
-    jump_unit: str = field(default="", metadata={"key": "jump_at.unit"})
+    jump_size: float = field(default=np.nan, metadata={"key": "jump_at.size"})
     residual: float = np.nan
     residual_at: float = np.nan
     unsettled: float = np.nan

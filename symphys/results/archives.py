@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from symphys import json_values as values
 from symphys.archives import ArchiveError, TooLarge, read_arrays
 from symphys.files import check_regular
 from symphys.results.text_files import ReportError, reason
-from symphys.trajectory import Array
 
 
-def read_archive(path: Path, only: Sequence[str] = ()) -> dict[str, Array]:
+def read_archive(path: Path, only: Sequence[str] = ()) -> dict[str, Any]:
     """Every array of an archive, or ``only`` those of these names that it has.
 
     Raises:

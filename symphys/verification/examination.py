@@ -90,7 +90,7 @@ def _fault(transcription: Transcription, record: Record, compared: list[dict[str
 
 @np.errstate(invalid="ignore", over="ignore", divide="ignore")  # numbers that are not finite are reported as such
 def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
-    """Energy and momentum, contacts, and tunnelling; it takes little beside a solve.
+    """Energy and momentum, jumps, contacts, and tunnelling; it takes little beside a solve.
 
     Where impulses of contacts have not settled, the motion is simulated again with other numbers of sweeps.
 

@@ -1,39 +1,49 @@
-"""Coordinates of joints that jump: that change in a step by what their rates do not account for."""
+"""Places that jump: bodies and joints that are, after a step, where no velocity of the step takes them.
+
+What a coupling puts back, or a body that is moved out of another at once, does not show in energy or momentum, where it
+is counted among what contacts and joints do.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symphys.transcription import Record, Rollout
+from symphys.verification.bodies import bodies
 from symphys.verification.joints import coordinates
 
-LEAST = {"rad": 1e-2, "m": 1e-3}
-"""What a coordinate may be pushed in a step at any speed, as out of an overlap."""
+Array = NDArray[np.float64]
+MARGIN = 1.5
+"""Places may move by so many times what the faster of a step's two ends would: between them speeds may be larger."""
 
 
 def jumps(rollout: Rollout, record: Record) -> dict[str, Any]:
-    """The largest jump of a coordinate.
-
-    In a step a coordinate moves by between dt times the least and dt times the greatest of its rates there and in the
-    steps before and after. What is beyond that no motion did: a coupling, a limit or a loop put it there.
+    """The largest jump.
 
     Returns:
-        "jump": what is beyond, as a share of the most that the joint moves in a step; "jump_at": "joint", "time" [s],
-        "moved" and "unit". Nothing without joints that have coordinates.
+        "jump": how far it is beyond what the velocities explain, as a share: of a body's radius of gyration; of the
+        smallest one for sliders; of a radian for hinges. "jump_at": None, or its "name" of a body or joint, "time" [s]
+        and "size" [m] or [rad].
     """
-    motion, found, worst = record.motion, dict[str, Any](), -1.0
+    motion, dt, sizes = record.motion, rollout.dt, bodies(rollout, record).size
+    moving = [
+        (name, np.linalg.norm(np.diff(motion.position[:, b], axis=0), axis=1), motion.velocity[:, b], float(sizes[b]))
+        for b, name in enumerate(motion.body_names)
+        if np.isfinite(sizes[b])
+    ]
     for joint, value, rate in coordinates(rollout, record):
-        unit = "rad" if joint.kind.winds else "m"
-        around = np.pad(rollout.dt * rate, ((1, 1), (0, 0)), mode="edge")
-        ends = np.stack([around[:-3], around[1:-2], around[2:-1], around[3:]])
-        moved = np.diff(value, axis=0)
-        beyond = np.maximum(ends.min(axis=0) - moved, moved - ends.max(axis=0)).clip(min=0)
-        share = beyond / max(float(np.abs(around).max()), LEAST[unit])
-        step, k = np.unravel_index(int(share.argmax()), share.shape)
-        if share[step, k] > worst:
-            worst = float(share[step, k])
-            where = {"joint": joint.name, "time": float(motion.time[step]), "moved": float(moved[step, k])}
-            found = {"jump": worst, "jump_at": where | {"unit": unit}}
+        for i, coordinate in enumerate(joint.kind.coordinates):
+            size = 1.0 if coordinate.turns else float(sizes.min())
+            moving.append((joint.name, np.abs(np.diff(value[:, i])), rate[:, [i]], size))
+    found: dict[str, Any] = {"jump": 0.0, "jump_at": None}
+    for name, step, velocity, size in moving:
+        speed = np.linalg.norm(velocity, axis=1)
+        beyond = step - MARGIN * dt * np.maximum(speed[:-1], speed[1:])
+        k = int(beyond.argmax())
+        if size > 0 and beyond[k] > found["jump"] * size:
+            at = {"name": name, "time": float(motion.time[k]), "size": float(step[k])}
+            found = {"jump": float(beyond[k] / size), "jump_at": at}
     return found

@@ -125,3 +125,14 @@ def test_a_notebook_shows_verdict_checks_and_motion(solution: symphys.Solution) 
     shown = solution._repr_html_()
     assert "solved" in shown and "there" in shown and shown.count("<svg") == 1
     assert repr(solution).startswith("<Solution of problem by least_squares: solved")
+
+
+def test_a_contact_goes_by_its_two_surfaces() -> None:
+    """Who asks a motion for the force of contacts on a body is told the names that there are."""
+    motion = symphys.simulate("ball_throw")
+    with pytest.raises(KeyError, match=r"contacts go by their two surfaces: .*ball-ground.*force"):
+        motion["ball.contact_force"]
+    with pytest.raises(KeyError, match=r"valid: ball.position, ball.orientation"):
+        motion["ball.colour"]
+    with pytest.raises(KeyError, match=r'did you mean "ball.velocity"'):
+        motion["ball.velocty"]

@@ -22,7 +22,9 @@ class LinearRecordings(AnalyticRecordings):
         super().__init__(
             model=lambda s, o, t: t,
             shared=fit_parameters(names, truth[:shared] * 1.5 + scale[:shared], scale=scale[:shared]),
-            own=fit_parameters(own, np.tile(truth[shared:] * 1.5, (count, 1)), scale=np.tile(scale[shared:], (count, 1))),
+            own=fit_parameters(
+                own, np.tile(truth[shared:] * 1.5, (count, 1)), scale=np.tile(scale[shared:], (count, 1))
+            ),
             times=[np.arange(float(len(table))) for table in tables],
             measured=[np.zeros((len(table), 1)) for table in tables],
             noise=np.array([1.0]),

@@ -35,7 +35,7 @@ def _beyond(place: Place, value: Any) -> Iterator[tuple[Place, float]]:
     while stack:
         where, here = stack.pop()
         if isinstance(here, Mapping):
-            stack += [((*where, str(key)), each) for key, each in reversed(here.items()) if key not in APART]
+            stack += [((*where, str(key)), each) for key, each in reversed(list(here.items())) if key not in APART]
         elif isinstance(here, list | tuple):
             stack += [((*where, k), each) for k, each in reversed(list(enumerate(here)))]
         elif isinstance(here, int | float) and LARGEST < abs(here) < math.inf:
