@@ -41,6 +41,7 @@ class How(TypedDict, total=False):
     Attributes:
         retries: how often a run that fails is tried again; 0 if not given.
         timeout: [s] of a run, building and compiling included; with a folder, the same call goes on with what it stops.
+            A run that has to end at a time has a process of its own, which is killed 1 s after it was asked to stop.
         budget: [s] of all; likewise.
         rerun: what is done again although it is over: "failed", "changed" (by another version of symphys) or "all".
         guess: another run from which all start, as in ``solve``.
@@ -75,8 +76,7 @@ def solve_all(
         problems: each what ``load`` takes. Those of one name get numbers behind it: ``ball_throw``, ``ball_throw-2``.
         solvers: their names; None: for each problem those that it names, else those that fit it.
         seeds: how many, from 0 on, or which; 0 starts from the guess.
-        jobs: how many runs go on at once, in processes; a script then needs ``if __name__ == "__main__":``,
-            and also with a ``timeout`` or ``budget``, as what is to end at a time has a process of its own.
+        jobs: how many runs at once, in processes, as with limits; a script then needs ``if __name__ == "__main__":``.
         folder: of run folders, as by ``symphys solve --out``; what is done is not done again. None: nothing is kept.
         examine: whether to examine how far solutions can be trusted.
         multi_start: whether to solve the seeds of a problem side by side, their evaluations in batches.
