@@ -3,7 +3,8 @@
 Each box turns one face to the other: the one whose normal is nearest to the direction along which they are farthest
 apart when they meet. The candidates are the corners of these two faces over the other face, and the points where
 edges of the one cross edges of the other: the corners of the region that both faces cover. They are chosen where the
-boxes are expected to meet, or at the end of the step.
+boxes are expected to meet, or at the end of the step. A box that slides over the seam of two boards meets their tops
+alone (``box_geometry.nearing``).
 
 What it cannot do: two pairs of faces that meet in the same step; boxes that have sunk into each other deeper than
 about half of the thinner one may be pushed out at another side. Where edges cross, the point of contact stays where it

@@ -51,7 +51,8 @@ class BoxField:
 
     def _over(self, point: Expr) -> Expr:
         """(3,): how far the point is beyond the faces."""
-        over: Expr = ca.fabs(point) - ca.vertcat(*self.half_sizes)
+        reach: Expr = ca.fabs(point)
+        over = reach - ca.vertcat(*self.half_sizes)
         return ca.if_else(ca.vertcat(*self.endless), ca.fmin(over, 0), over) if self.endless else over
 
     def _nearest_face(self, over: Expr) -> Expr:
