@@ -10,7 +10,7 @@ import numpy as np
 from symphys.importing.tables.links import frame_table
 from symphys.importing.tables.pose import range_of
 from symphys.importing.tables.reading import BALL, FREE, HINGE, SLIDE, ModelReading, WeldedLink, numbers
-from symphys.model.joints.gimbal import Screw, locks
+from symphys.model.gimbal import Screw, locks
 
 ROTOR, LEAST_ROTOR = 0.1, 1e-6
 """Of a body's largest moment of inertia, and at least [kg m^2]: the armature that is added against gimbal lock."""

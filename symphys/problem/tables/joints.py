@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from symphys.model.gimbal import Screw, locks
 from symphys.model.joints import (
     KINDS,
     AffineMotor,
@@ -22,7 +23,6 @@ from symphys.model.joints import (
     VelocityMotor,
 )
 from symphys.model.joints.frames import WORLD
-from symphys.model.joints.gimbal import Screw, locks
 from symphys.model.joints.turn import natural_centre, outside
 from symphys.model.scalar import is_zero
 from symphys.problem.parametric.joints import ParametricJoint
