@@ -98,13 +98,12 @@ def advance(
 
     # 4. constraints of contacts (7-13) and of joints (25, 26)
     suppressed = suppressed or [ca.SX(0)] * len(contacts)
-    constraints = []
-    couple = which_couple(world)
+    constraints, couple = list[PlacedConstraint](), which_couple(world)
     for (pair, near), contact, off, coupled in zip(context.pairs_and_near(), contacts, suppressed, couple, strict=True):
         bodies = bodies_of(pair)
         moving, force = tuple(trees.motions[i] for i in bodies), x[f"{pair.name}.force"]
-        lagging = _lagging(context, x, bodies)
-        conditions = Conditions(off, plastic, force, trees.same(bodies), coupled, near, lagging, x["lag"])
+        same, lagging = trees.same(bodies), _lagging(context, x, bodies)
+        conditions = Conditions(off, plastic, force, same, coupled, near, lagging, x["lag"])
         constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
         constraints.append(trees.placed(bodies, constraint))
     joints, fitted = joint_constraints(context, x, trees, paths, duration, kick)
@@ -135,8 +134,8 @@ def advance(
         values |= forces if scheme.warm_start else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
         values |= commanded(context, joints, forces)
     values |= _moving_bodies(context, motions, momenta, reactions, poses, rotors)
-    changes = tuple(zip(solved.impulses, solved.last, strict=True))
-    return Substep(values, tuple(constraints), tuple(contacts), impulses, changes)
+    changes = zip(solved.impulses, solved.last, strict=True)
+    return Substep(values, tuple(constraints), tuple(contacts), impulses, tuple(changes))
 
 
 def _poses(
