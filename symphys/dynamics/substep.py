@@ -100,14 +100,12 @@ def advance(
 
     # 4. constraints of contacts (7-13) and of joints (25, 26)
     suppressed = suppressed or [ca.SX(0)] * len(contacts)
-    constraints = []
-    couple = which_couple(world)
+    constraints, couple = list[PlacedConstraint](), which_couple(world)
     for (pair, near), contact, off, coupled in zip(context.pairs_and_near(), contacts, suppressed, couple, strict=True):
         bodies = bodies_of(pair)
-        moving = tuple(trees.motions[i] for i in bodies)
-        force = x[f"{pair.name}.force"]
-        lagging = () if world.joints else tuple(_lasting_on(x, world.bodies[i].name) for i in bodies)
-        conditions = Conditions(off, plastic, force, trees.same(bodies), coupled, near, lagging, x["lag"])
+        moving, force = tuple(trees.motions[i] for i in bodies), x[f"{pair.name}.force"]
+        same, lagging = trees.same(bodies), _lagging(context, x, bodies)
+        conditions = Conditions(off, plastic, force, same, coupled, near, lagging, x["lag"])
         constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
         constraints.append(trees.placed(bodies, constraint))
     jointed, joints, fitted = joint_constraints(context, x, trees, paths, duration, kick)
@@ -128,8 +126,8 @@ def advance(
 
     # 8. what is stored: persistent forces (20), velocities (21)
     values: State = {"lag": half}
-    reactions, rotors = _store_forces(context, constraints, impulses, solved.momenta, kick, values), Rotors()
-    momenta = _with_late_impulses(constraints, impulses, momenta)
+    momenta, rotors = _with_late_impulses(constraints, impulses, momenta), Rotors()
+    reactions = _store_forces(context, constraints, impulses, solved.momenta, kick, values)
     if world.joints:
         struck, forces = lasting_forces(context, constraints, joints, by_joints, solved.momenta, x, kick)
         angles = unwrapped_angles(context, jointed, closed, duration)
@@ -138,8 +136,8 @@ def advance(
         rotors = keep_rotors(context, trees.coordinates, solved.momenta, closed.turned, struck, duration)
         values |= _kept(context, joints, forces) | angles
     values |= _moving_bodies(context, motions, momenta, reactions, poses, rotors)
-    changes = tuple(zip(solved.impulses, solved.last, strict=True))
-    return Substep(values, tuple(constraints), tuple(contacts), impulses, changes)
+    changes = zip(solved.impulses, solved.last, strict=True)
+    return Substep(values, tuple(constraints), tuple(contacts), impulses, tuple(changes))
 
 
 def _poses(
@@ -261,8 +259,10 @@ def _persistent(
     return share * impulse.linear(constraint.impulse_normal), share * impulse.angular(constraint.impulse_normal)
 
 
-def _lasting_on(x: State, body: str) -> tuple[Expr, Expr]:
-    return x[f"{body}.reaction_force"], x[f"{body}.reaction_torque"]
+def _lagging(context: StepContext, x: State, bodies: Sequence[int]) -> tuple[tuple[Expr, Expr], ...]:
+    """See ``Conditions``; with joints motions are predicted under what lasts."""
+    names = () if context.world.joints else tuple(context.world.bodies[i].name for i in bodies)
+    return tuple((x[f"{name}.reaction_force"], x[f"{name}.reaction_torque"]) for name in names)
 
 
 def _with_late_impulses(

@@ -145,3 +145,18 @@ def test_switches_of_the_model() -> None:
     assert tables["body"][0]["collides_with"] == []
     assert "switch actuators off" in texts(findings, "left out")
     assert not problem_of(tables).world().pairs
+
+
+GIMBAL = """<worldbody><body name="arm" pos="0 0 1"><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.03 0.025"/>
+<joint name="yaw" axis="0 0 1"/><joint name="pitch" axis="0 1 0"/><joint name="roll" axis="1 0 0"/>
+</body></worldbody>"""
+
+
+def test_joints_of_one_body_that_can_lock_get_an_armature() -> None:
+    """A tenth of the body's largest moment on the first, and it is said; not where limits keep axes apart."""
+    tables, findings = read(GIMBAL)
+    assert [joint.get("armature") for joint in tables["joint"]] == [pytest.approx(0.003), None, None]
+    assert "armature of" in texts(findings, "approximated")
+    problem_of(tables, 0.1, 0.01)
+    held, _ = read(GIMBAL.replace('"0 1 0"', '"0 1 0" limited="true" range="-1.2 1.2"'))
+    assert not any("armature" in joint for joint in held["joint"])

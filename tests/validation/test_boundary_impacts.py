@@ -123,6 +123,29 @@ def test_an_impact_on_the_boundary_keeps_its_slope(name: str, cuts: int | None) 
         assert np.array(slopes[:, k]).ravel()[kept] == pytest.approx(slope[kept], abs=1e-6), (z, e)
 
 
+FALLS = [(n, v) for n in range(1, 6) for v in (0.0, -1.0, 0.25) if n * DT * 2 > v]
+"""Steps until a ball meets the ground under 4 m/s^2, and its velocity at the start."""
+
+
+@pytest.mark.parametrize("shape", ["ball", "box"])
+def test_a_slow_impact_on_the_boundary_keeps_its_slope(shape: str) -> None:
+    """Released from rest, thrown down and up: at v it rebounds with e v, and is e v s - g s^2 / 2 high after s."""
+    g, e, z = 4.0, 0.75, ca.MX.sym("z", 2)
+    body = Body("a", 1.0, STOUT, (Sphere(0.5) if shape == "ball" else Box((0.5, 0.5, 0.5)),))
+    lab = Lab(make_world([body], [Plane.ground()], Law(0.0, e), (0, 0, -g)), Scheme(dt=DT))
+    start = {"a.position": ca.vertcat(0, 0, z[0]), "a.velocity": ca.vertcat(0, 0, z[1])}
+    for n, speed in FALLS:
+        end = lab.trajectory(start, DT * (n + 1))[lab.layout["a.position"], -1][2]
+        found = ca.Function("end", [z], [end, ca.gradient(end, z)])
+        time, v = n * DT, g * n * DT - speed
+        height, sooner = 0.5 + g * time**2 / 2 - speed * time, (g * DT - e * v) / v
+        slopes = [e * g * DT / v + sooner, e * DT * (g * time / v - 1) + time * sooner]
+        for at in (height, np.nextafter(height, 9), np.nextafter(height, -9)):
+            value, slope = found([at, speed])
+            assert float(value) == pytest.approx(0.5 + e * v * DT - g * DT**2 / 2, abs=1e-6), (n, speed)
+            assert np.array(slope).ravel() == pytest.approx(slopes, abs=1e-5), (n, speed, at - height)
+
+
 @cache
 def coordinate_at_the_end(kind: str) -> ca.Function:
     """(value, rate, limit) -> (a coordinate at the end, its gradient) of a block on a rail, or a rod on a hinge."""

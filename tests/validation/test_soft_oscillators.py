@@ -12,7 +12,7 @@ from laboratory import Array, Lab
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from symphys.model.joints import BALL, FIXED, Joint, JointFrame
+from symphys.model.joints import BALL, FIXED, SLIDER, Joint, JointFrame
 from symphys.model.shapes import Box, Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
 
@@ -127,3 +127,16 @@ def test_a_box_on_soft_ground_gains_no_energy(hz: float) -> None:
     states = Lab(world, Scheme(dt=0.01)).states({"b.position": [0, 0, 0.16]}, 1.0)
     energy = mass * G * states["b.position"][:, 2] + mass / 2 * (states["b.velocity"] ** 2).sum(1)
     assert energy.max() < 1.01 * energy[0]
+
+
+@pytest.mark.parametrize("ratio", [0, 0.3])
+def test_a_foot_on_a_rail_rebounds_as_a_free_ball(ratio: float) -> None:
+    """Of a tree of joints, whose motion is predicted under the forces of the last step."""
+    half = 0.5**0.5
+    law, upright = Law(0.5, 0.0, frequency=HZ, damping=ratio), JointFrame(orientation=(half, 0, -half, 0))
+    free = make_world([Body("b", 2.0, 0.02, (Sphere(RADIUS),))], [Plane.ground()], law)
+    rail = Joint("rail", SLIDER, 0, None, (upright, upright))
+    world = World(free.bodies, free.statics, free.pairs, gravity=(0, 0, -G), joints=(rail,))
+    states = Lab(world, Scheme(dt=0.01)).states({"b.position": [0, 0, RADIUS + 0.0937]}, 0.42)
+    ended = states["b.position"][-1, 2] - RADIUS, states["b.velocity"][-1, 2]
+    assert ended == pytest.approx(rebound(ratio, 0.0937, 0.42), abs=1e-8)

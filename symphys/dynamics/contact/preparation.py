@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Frame
-from symphys.dynamics.collision.time_of_impact import TINY_RATE, TOUCH
+from symphys.dynamics.collision.time_of_impact import STILL, TINY_RATE, TOUCH
 from symphys.dynamics.contact.body_term import BodyTerm, Motions, at_touch, body_terms, free_slip
 from symphys.dynamics.contact.constraint import UNREACHED, ContactConstraint
 from symphys.dynamics.contact.coupling import coupling_of, pulls_together
@@ -86,7 +86,7 @@ def prepare(
     terms = body_terms(motions, instant, frame, applied)
     push, twist = symmetric_mobilities(terms, same)
     k_normal, *k_others = inverse_masses(terms, frame.normal, push, twist)
-    slack = ca.if_else(suppressed, ANY, _slack(settings, contact, touch))
+    slack = ca.if_else(suppressed, ANY, _slack(settings, contact, touch, duration))
     slip = free_slip(terms, motions)
     free = ca.dot(frame.normal, slip)
     away = ca.fmin(free - (contact.end + slack) / duration, 0)
@@ -216,17 +216,19 @@ def _landing(contact: Contact, duration: Expr, time: Expr, target: Expr, free: E
     return ca.fmin(ca.fmax(share, 0), time)
 
 
-def _slack(settings: StepSettings, contact: Contact, touch: _Touch) -> Expr:
+def _slack(settings: StepSettings, contact: Contact, touch: _Touch, duration: Expr) -> Expr:
     """[m] an overlap at the end of the substep that is rounding: that of an impact which falls on its very end.
 
     Whether such an impact belongs to this substep or to the next is rounding's choice. Either way nothing but the
     impact may act: a constraint that holds the surfaces where they just touch would have half of its slope there.
-    Splits are off the impact by the shortest substep at most.
+    Splits are off the impact by the shortest substep at most. What closes slowly meets there if it begins apart and
+    is not slower at the end than on average.
     """
     fast, speed = closes_fast(settings, contact), ca.fabs(contact.rate)
     lands = ca.logic_and(touch.hit, ca.logic_and(touch.leaving < 0.5, fast))
     passes = ca.logic_and(ca.logic_or(fast, speed > settings.fast), ca.logic_not(lands))
-    return ca.if_else(passes, TIE + 2 * SHORTEST * settings.scheme.dt * speed, 0)
+    meets = ca.logic_and(ca.fabs(contact.end) < TIE, contact.gap - contact.end > STILL * duration)
+    return ca.if_else(ca.logic_or(passes, meets), TIE + 2 * SHORTEST * settings.scheme.dt * speed, 0)
 
 
 def _normal_target(contact: Contact, duration: Expr, touch: _Touch, away: Expr, smoothing: Expr) -> Expr:

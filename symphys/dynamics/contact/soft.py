@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision.time_of_impact import TOUCH
-from symphys.dynamics.oscillator import LEAST, response, spring_law
+from symphys.dynamics.contact.oscillator import LEAST, response, spring_law
 from symphys.maths.smoothing import clip
 from symphys.model.world import Law
 

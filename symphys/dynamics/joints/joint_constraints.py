@@ -15,13 +15,13 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.contact.body_term import BodyTerm, Motions
+from symphys.dynamics.contact.oscillator import SpringLaw, response, spring_law
 from symphys.dynamics.contact.preparation import TIE
 from symphys.dynamics.context import StepSettings
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint, TreeCoordinate, by_law, towards
 from symphys.dynamics.joints.joint_frames import JointFrames, errors, free, locked
 from symphys.dynamics.joints.joint_impulse import Directions, mobility, speeds
 from symphys.dynamics.joints.locked_directions import LastingForce, LockConstraint, inverse
-from symphys.dynamics.oscillator import SpringLaw, response, spring_law
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Momentum
 from symphys.maths.smoothing import at_least, at_most, clip

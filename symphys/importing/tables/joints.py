@@ -10,7 +10,10 @@ import numpy as np
 from symphys.importing.tables.links import frame_table
 from symphys.importing.tables.pose import range_of
 from symphys.importing.tables.reading import BALL, FREE, HINGE, SLIDE, ModelReading, WeldedLink, numbers
+from symphys.model.gimbal import Screw, locks
 
+ROTOR, LEAST_ROTOR = 0.1, 1e-6
+"""Of a body's largest moment of inertia, and at least [kg m^2]: the armature that is added against gimbal lock."""
 KINDS = {BALL: "ball", SLIDE: "slide", HINGE: "hinge"}
 
 
@@ -46,9 +49,25 @@ def chain(reading: ModelReading, link: WeldedLink) -> tuple[list[dict[str, Any]]
             frames.append(frame_table(after, np.array(reading.data.xanchor[joint])))
         joints.append(joint_table(reading, joint, name, (before, after)))
         before = after
+    if len(indices) > 1 and locks([screw for joint in indices for screw in screws_of(reading, joint)]):
+        carried = max(ROTOR * float(np.max(model.body_inertia[link.top])), LEAST_ROTOR)
+        joints[0]["armature"] = numbers(carried)
+        text = "axes of several joints of one body can come together, where frames without mass have no inertia"
+        reading.note("approximated", f"armature of {reading.called('joint', indices[0])}", text, f"{carried:.3g}")
     if parent is not None and len(indices) > 1:
         reading.apart.append((parent.name, link.name))
     return frames, joints
+
+
+def screws_of(reading: ModelReading, joint: int) -> list[Screw]:
+    """The coordinates of a joint at the reference pose."""
+    model, point = reading.model, np.array(reading.data.xanchor[joint], float)
+    carried = bool(model.dof_armature[int(model.jnt_dofadr[joint])])
+    if model.jnt_type[joint] == BALL:
+        return [Screw(axis, point, carried=carried) for axis in np.eye(3)]
+    axis, slides = np.array(reading.data.xaxis[joint], float), model.jnt_type[joint] == SLIDE
+    low, high = range_of(reading, joint)
+    return [Screw(axis, None if slides else point, low, high, carried)]
 
 
 def floating(reading: ModelReading, joint: int, link: WeldedLink) -> None:

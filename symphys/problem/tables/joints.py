@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from symphys.model.joints import KINDS, AffineMotor, Kind, Limits, Motor, Servo, Spring, TorqueMotor, VelocityMotor
+from symphys.model.gimbal import Screw, locks
+from symphys.model.joints import (
+    KINDS,
+    AffineMotor,
+    JointFrame,
+    Kind,
+    Limits,
+    Motor,
+    Servo,
+    Spring,
+    TorqueMotor,
+    VelocityMotor,
+)
 from symphys.model.joints.frames import WORLD
+from symphys.model.scalar import is_zero
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.joints import JointTable, MotorTable, SpringTable
@@ -55,6 +69,66 @@ def check_frames(joints: Sequence[ParametricJoint | None], massless: Sequence[st
         if len(held) < 2 or any(joint.frequency for joint in held):
             text = f"{name} has mass 0, so it must be between two rigid joints, which hold it to bodies with mass"
             faults.add(("joint",), text)
+            return
+    for chain, screws in _chains(joints, massless):
+        if locks(screws):
+            names = ", ".join(joint.name for joint in chain)
+            text = (
+                f"{names}, with frames of mass 0 between them, can come to a pose in which their axes depend on each "
+                f"other (gimbal lock), where no inertia answers; use one ball joint, give {chain[0].name} or "
+                f"{chain[-1].name} an `armature`, or keep the joints between them away from it by `limits`"
+            )
+            faults.add(("joint", list(joints).index(chain[0])), text)
+
+
+def _chains(
+    joints: Sequence[ParametricJoint | None], massless: Sequence[str]
+) -> Iterator[tuple[list[ParametricJoint], list[Screw]]]:
+    """Joints between two bodies with mass, or the world, in a row with frames without mass; with their screws.
+
+    Left out: frames that hold three joints or more, and universal joints.
+    """
+    rigid = [joint for joint in joints if joint]
+    held = {name: [joint for joint in rigid if name in (joint.first, joint.second)] for name in massless}
+    for first in rigid:
+        for end in (first.first, first.second):
+            inner = first.second if end == first.first else first.first
+            if end in held or inner not in held:
+                continue
+            chain, screws = [first], list[Screw]()
+            place, at = _crossed(first, end, np.eye(4), screws), inner
+            while at in held and len(held[at]) == 2:
+                (joint,) = (each for each in held[at] if each is not chain[-1])
+                place, chain = _crossed(joint, at, place, screws), [*chain, joint]
+                at = str(joint.second or WORLD) if at == joint.first else joint.first
+            whole = at not in held and chain[0].name < chain[-1].name
+            if whole and all(joint.kind.name in ("hinge", "slider", "ball", "fixed") for joint in chain):
+                yield chain, screws
+
+
+def _crossed(joint: ParametricJoint, body: str | None, pose: Array, screws: list[Screw]) -> Array:
+    """The pose (4, 4) of the body on the other side of a joint from ``body`` at ``pose``, all coordinates 0."""
+    first, second = (_pose(frame) for frame in joint.frames)
+    here, there = (first, second) if body == joint.first else (second, first)
+    frame: Array = pose @ here
+    low, high = (_bound(joint.limits.lower, -np.inf), _bound(joint.limits.upper, np.inf))
+    low, high = (-high, -low) if body == joint.first else (low, high)
+    carried = not is_zero(joint.armature)
+    axes = {"hinge": [0], "slider": [0], "ball": [0, 1, 2]}.get(joint.kind.name, [])
+    for k in axes:
+        screws.append(Screw(frame[:3, k], None if joint.kind.name == "slider" else frame[:3, 3], low, high, carried))
+    return np.asarray(frame @ np.linalg.inv(there), float)
+
+
+def _pose(frame: JointFrame) -> Array:
+    found = np.eye(4)
+    found[:3, :3] = Rotation.from_quat(np.array(frame.orientation, float), scalar_first=True).as_matrix()
+    found[:3, 3] = np.array(frame.point, float)
+    return found
+
+
+def _bound(limit: float | None, none: float) -> float:
+    return none if limit is None else float(limit)
 
 
 def check_loops(joints: Sequence[ParametricJoint | None], faults: Faults) -> None:
