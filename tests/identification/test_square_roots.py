@@ -22,7 +22,9 @@ class LinearRecordings(AnalyticRecordings):
         super().__init__(
             model=lambda s, o, t: t,
             shared=fit_parameters(names, truth[:shared] * 1.5 + scale[:shared], scale=scale[:shared]),
-            own=fit_parameters(own, np.tile(truth[shared:] * 1.5, (count, 1)), scale=np.tile(scale[shared:], (count, 1))),
+            own=fit_parameters(
+                own, np.tile(truth[shared:] * 1.5, (count, 1)), scale=np.tile(scale[shared:], (count, 1))
+            ),
             times=[np.arange(float(len(table))) for table in tables],
             measured=[np.zeros((len(table), 1)) for table in tables],
             noise=np.array([1.0]),
@@ -121,7 +123,7 @@ def test_own_starts_of_many_recordings_are_eliminated_without_loss() -> None:
 
 
 def double_pendulum(shared: Array, own: Array, time: Array) -> Array:
-    """Two points on rods of 1 m, masses 1 and ``shared[0]``, gravity ``shared[1]``; angles from rest at ``own`` (2,)."""
+    """Two points on rods of 1 m: shared second mass and gravity, the first mass is 1; own angles (2,), from rest."""
     m, g = shared
 
     def rate(x: Array) -> Array:
