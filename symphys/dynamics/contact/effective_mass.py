@@ -64,6 +64,14 @@ def separates(terms: Sequence[BodyTerm], n: Expr, column: Expr) -> Expr:
     return ca.dot(n, column) > HELD * sum(term.inverse_mass for term in terms)
 
 
+def no_less_than_response(terms: Sequence[BodyTerm], n: Expr, column: Expr, normal: Expr) -> Expr:
+    """k along the normal, on trees at least half of what an impulse does: sweeps answer by too much with less."""
+    if all(term.jacobian is None for term in terms):
+        return normal
+    least = ca.dot(n, column) / 2
+    return ca.if_else(normal < least, least, normal)
+
+
 def symmetric_mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, Expr]:
     """Those of ``mobilities``, on trees their symmetric parts."""
     push, twist = mobilities(terms, same)
@@ -90,9 +98,17 @@ def _trace(inverse_inertia: Expr) -> Expr:
     return ca.trace(apply(inverse_inertia, ca.SX.eye(3)))
 
 
-def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr) -> dict[str, Expr]:
-    """The fields of a constraint from the inverse effective masses k, which are inverted once, not in each sweep."""
-    return {"normal_mass": 1 / normal, "tangent_mass": 1 / tangent, "spin_mass": 1 / spin, "roll_mass": 1 / roll}
+def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr, separates: Expr = 1) -> dict[str, Expr]:
+    """The fields of a constraint from the inverse effective masses k, which are inverted once, not in each sweep.
+
+    A contact that does not separate its surfaces has none, so that no sweep answers to it.
+    """
+    return {
+        "normal_mass": separates / normal,
+        "tangent_mass": separates / tangent,
+        "spin_mass": 1 / spin,
+        "roll_mass": 1 / roll,
+    }
 
 
 def along(k: Expr, n: Expr) -> Expr:

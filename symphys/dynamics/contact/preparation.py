@@ -21,6 +21,7 @@ from symphys.dynamics.contact.effective_mass import (
     delassus_column,
     effective_masses,
     inverse_masses,
+    no_less_than_response,
     separates,
     symmetric_mobilities,
 )
@@ -87,6 +88,7 @@ def prepare(
     landing = _landing(contact, duration, touch.time, target, free)
     column = delassus_column(terms, applied.normal, same)
     parts = separates(terms, frame.normal, column)
+    k_normal = no_less_than_response(terms, frame.normal, column, k_normal)
     weight, load = LOADED * settings.reference / k_normal, ca.dot(applied.normal, conditions.force)
     loaded = ca.logic_and(load > weight, ca.logic_not(suppressed))
     lasts = _lasts(settings, law, contact, touch.leaving, loaded)
@@ -97,7 +99,7 @@ def prepare(
         normal=frame.normal,
         impulse_normal=applied.normal,
         delassus_column=column,
-        **effective_masses(k_normal + softness, *k_others),
+        **effective_masses(k_normal + softness, *k_others, parts),
         softness=softness,
         separates=parts,
         target=ca.if_else(ca.logic_or(suppressed, 1 - parts), UNREACHED, target),
