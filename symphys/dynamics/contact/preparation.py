@@ -79,7 +79,7 @@ def prepare(
     frame, applied = contact.geometry.frame(instant), contact.geometry.frame(touch.leaving * touch.time)
     terms = body_terms(motions, instant, frame, applied)
     push, twist = symmetric_mobilities(terms, same)
-    k_normal, *k_others = inverse_masses(terms, frame.normal, push, twist)
+    k_normal, k_tangent, k_spin, k_roll = inverse_masses(terms, frame.normal, push, twist)
     slack = ca.if_else(suppressed, ANY, _slack(settings, contact, touch))
     slip = free_slip(terms, motions)
     free = ca.dot(frame.normal, slip)
@@ -99,7 +99,7 @@ def prepare(
         normal=frame.normal,
         impulse_normal=applied.normal,
         delassus_column=column,
-        **effective_masses(k_normal + softness, *k_others, parts),
+        **effective_masses(k_normal + softness, k_tangent, k_spin, k_roll, parts),
         softness=softness,
         separates=parts,
         target=ca.if_else(ca.logic_or(suppressed, 1 - parts), UNREACHED, target),
