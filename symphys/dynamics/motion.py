@@ -20,6 +20,9 @@ from symphys.maths.rotation import turn
 Expr = Any
 """casadi SX, MX or DM"""
 
+MAX_TURN = 4.0
+"""[rad] largest angle by which the paths of a body's points turn in a step: parabolas leave circles beyond it."""
+
 
 @dataclass(frozen=True)
 class BodyState:
@@ -63,6 +66,7 @@ class PredictedMotion(PredictedPath):
         inverse_mid: inverse inertia at t_k + dt/2, world frame: scalar if isotropic, else (3, 3) [1/(kg m^2)].
         inverse_rate: its time derivative; None if isotropic.
         inertia_mid: (3, 3) inertia at t_k + dt/2, world frame [kg m^2].
+        path_turn: (3,) each: angular velocity and acceleration, bounded as the paths of the body's points have them.
         jacobian: if the body is part of a tree of joints.
         massless: whether it is a frame between joints. It has the numbers of a body of mass 1 and moment 1 about all
             axes here, without weight, so that its momenta are its velocities; trees do not count them.
@@ -78,6 +82,7 @@ class PredictedMotion(PredictedPath):
     inverse_mid: Expr
     inverse_rate: Expr | None
     inertia_mid: Expr
+    path_turn: tuple[Expr, Expr]
     jacobian: BodyJacobian | None = None
     massless: bool = False
 
@@ -87,8 +92,9 @@ class PredictedMotion(PredictedPath):
         return ca.SX(0) if self.massless else self.mass
 
     def predicted_path(self) -> PredictedPath:
-        """The motion without its inertia."""
-        return PredictedPath(**{field.name: getattr(self, field.name) for field in fields(PredictedPath)})
+        """The motion without its inertia; it turns by ``MAX_TURN`` in the step at most."""
+        path = PredictedPath(**{field.name: getattr(self, field.name) for field in fields(PredictedPath)})
+        return replace(path, angular_velocity=self.path_turn[0], angular_acceleration=self.path_turn[1])
 
     def inverse_inertia(self, t: Expr) -> Expr:
         """World-frame inverse inertia at time t in the step, to first order; scalar if isotropic."""
@@ -110,6 +116,13 @@ class PredictedMotion(PredictedPath):
         if self.inverse_rate is None or ca.SX(t - self.dt / 2).is_zero():
             return self.inertia_mid
         return ca.inv_minor(self.inverse_inertia(t))
+
+
+def bounded_turn(angular_velocity: Expr, dt: Expr) -> tuple[Expr, Expr]:
+    """(3,): an angular velocity, shortened to ``MAX_TURN`` in the time ``dt`` [s]; 1 if it is longer, else 0."""
+    square = dt * dt * ca.dot(angular_velocity, angular_velocity)
+    fast = square > MAX_TURN**2
+    return angular_velocity * ca.if_else(fast, MAX_TURN / ca.sqrt(ca.fmax(square, MAX_TURN**2)), 1), fast
 
 
 def isotropic(inertia: Expr) -> bool:
@@ -181,14 +194,18 @@ def motion_from(
     acceleration = gravity + state.force / mass
     mid_momentum = state.angular_momentum + dt / 2 * state.torque
     middle = _middle(inertia, state.orientation, w if jointed else None, mid_momentum, dt / 2)
-    inverse_mid, inertia_mid, inverse_rate = _inertias(inertia, middle, mid_momentum)
+    inverse_mid, inertia_mid = _inertias(inertia, middle)
+    w_mid = apply(inverse_mid, mid_momentum)
+    (slow, fast), (slow_mid, fast_mid) = bounded_turn(w, dt), bounded_turn(w_mid, dt)
+    bend = (w_mid - w) * (2 / dt)
+    slow_bend = ca.if_else(ca.logic_or(fast, fast_mid), (slow_mid - slow) * (2 / dt), bend)
     return PredictedMotion(
         position=state.position,
         rotation=turned,
         velocity=state.velocity,
         acceleration=acceleration,
         angular_velocity=w,
-        angular_acceleration=(apply(inverse_mid, mid_momentum) - w) * (2 / dt),
+        angular_acceleration=bend,
         dt=dt,
         true_velocity=None,
         gravity=gravity,
@@ -200,8 +217,9 @@ def motion_from(
         mid_velocity=state.velocity + dt / 2 * acceleration,
         mid_momentum=mid_momentum,
         inverse_mid=inverse_mid,
-        inverse_rate=inverse_rate,
+        inverse_rate=None if isotropic(inertia) else _turning(inverse_mid, slow_mid),
         inertia_mid=inertia_mid,
+        path_turn=(slow, slow_bend),
     )
 
 
@@ -212,11 +230,15 @@ def _middle(inertia: Expr, q: Expr, w: Expr | None, momentum: Expr, t: Expr) -> 
     return free_rotation.turned(inertia, q, momentum, t, free_rotation.SECOND_ORDER) if w is None else turn(q, t * w)
 
 
-def _inertias(inertia: Expr, middle: Expr, momentum: Expr) -> tuple[Expr, Expr, Expr | None]:
-    """At the orientation ``middle``: inverse inertia, inertia, and the rate of the inverse, None if isotropic."""
+def _inertias(inertia: Expr, middle: Expr) -> tuple[Expr, Expr]:
+    """At the orientation ``middle``: inverse inertia and inertia."""
     if isotropic(inertia):
-        return 1 / inertia, inertia_matrix(inertia), None
+        return 1 / inertia, inertia_matrix(inertia)
     turned = rotation.matrix(middle)
-    inverse = inverse_inertia(inertia, turned)
-    changing: Expr = ca.mtimes(rotation.cross_matrix(apply(inverse, momentum)), inverse)
-    return inverse, in_world(inertia_matrix(inertia), turned), changing + changing.T
+    return inverse_inertia(inertia, turned), in_world(inertia_matrix(inertia), turned)
+
+
+def _turning(inverse: Expr, angular_velocity: Expr) -> Expr:
+    """(3, 3): how fast an inverse inertia changes as its body turns [1/(kg m^2 s)]."""
+    changing: Expr = ca.mtimes(rotation.cross_matrix(angular_velocity), inverse)
+    return changing + changing.T

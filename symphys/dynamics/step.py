@@ -21,7 +21,8 @@ from symphys.dynamics.impact.deferred_impacts import defer_impacts
 from symphys.dynamics.impact.impact import StepSplit, find_split, resolve_impact
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.substep import Substep, advance
-from symphys.dynamics.tracing.decorator import section
+from symphys.dynamics.tracing.decorator import section, traced
+from symphys.maths import rotation
 from symphys.model.world import Scheme, World
 
 Expr = Any
@@ -34,6 +35,7 @@ SPLITS_OFF_CENTRE = 2
 def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
     """The state after one step, and the substeps and impacts that led there."""
     left: Expr = ca.SX(context.settings.scheme.dt)
+    x = _with_unit_orientations(context, x)
     context = replace(context, near=near_pairs(context, x))
     count = splits_of(context.world, context.settings.scheme)
     ahead, approaches = context, _approaches(context, x)
@@ -63,6 +65,17 @@ def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
         last = advance(ahead, x, left, deferred.suppressed, deferred.plastic)
         last = replace(last, chained=deferred.chained)
     return last.x, [*substeps, last]
+
+
+def _with_unit_orientations(context: StepContext, x: State) -> State:
+    """The state with orientations of length 1: an optimiser that has states as variables leaves them at any length."""
+    names = [f"{body.name}.orientation" for body in context.world.bodies]
+    return x | {name: _normalised(x[name]) for name in names}
+
+
+@traced
+def _normalised(orientation: Expr) -> Expr:
+    return rotation.normalised(orientation)
 
 
 def _approaches(context: StepContext, x: State) -> Sequence[Approach]:

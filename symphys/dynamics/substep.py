@@ -215,7 +215,7 @@ def _resumed(constraint: ContactConstraint, kick: Expr, force: Expr, torque: Exp
     n = constraint.impulse_normal
     normal, tangent = _split(kick * force, n)
     turning = (ZERO.spin, ZERO.roll) if torque is None else _split(kick * torque, n)
-    return ContactImpulse(ca.fmax(normal, 0), tangent, *turning).times(constraint.near)
+    return ContactImpulse(ca.fmax(normal, 0), tangent, *turning).times(constraint.near * constraint.separates)
 
 
 def _split(impulse: Expr, n: Expr) -> tuple[Expr, Expr]:

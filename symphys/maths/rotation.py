@@ -15,6 +15,10 @@ Expr = Any
 
 SERIES_TERMS = 9
 """Terms of the series of cos and sinc: full double precision up to 2 rad, 1e-12 at half a turn."""
+MAX_ANGLE = 1e9
+"""[rad] largest angle whose whole turns can be taken off; rounding leaves nothing of a larger one."""
+UNIT_BAND = 1e-9
+"""Largest deviation of a squared length from 1 that counts as rounding."""
 
 
 def cross_matrix(a: Expr) -> Expr:
@@ -44,10 +48,10 @@ def exponential(r: Expr) -> Expr:
     """(4,): the quaternion that turns by |r| [rad] about r, world frame.
 
     cos(|r|/2) and sin(|r|/2)/|r| as polynomials in |r|^2, so every derivative is finite at r = 0. Whole turns are taken
-    off first: with them the polynomials would not give a rotation.
+    off first: with them the polynomials would not give a rotation. Beyond ``MAX_ANGLE`` no turn is made.
     """
     angle = length(r)
-    r = r * (1 - 2 * ca.pi * ca.floor(angle / (2 * ca.pi) + 0.5) / angle)
+    r = r * ca.if_else(angle < MAX_ANGLE, 1 - 2 * ca.pi * ca.floor(angle / (2 * ca.pi) + 0.5) / angle, 0)
     h2 = ca.dot(r, r) / 4
     cos, sinc = 0.0, 0.0
     for k in reversed(range(SERIES_TERMS)):
@@ -77,6 +81,14 @@ def turn(q: Expr, r: Expr) -> Expr:
 def unit(q: Expr) -> Expr:
     """(4,): a quaternion of almost length 1 nearer to it: a step of Newton's method."""
     return q * (3 - ca.dot(q, q)) / 2
+
+
+def normalised(q: Expr) -> Expr:
+    """(4,): a quaternion of any length but 0, divided by its length; as it stands within ``UNIT_BAND`` of length 1."""
+    largest = ca.fmax(ca.fmax(ca.fabs(q[0]), ca.fabs(q[1])), ca.fmax(ca.fabs(q[2]), ca.fabs(q[3])))
+    scaled = q / largest
+    near = ca.fabs(ca.dot(q, q) - 1) <= UNIT_BAND
+    return ca.if_else(near, q, scaled / ca.sqrt(ca.dot(scaled, scaled)))
 
 
 def rotate(q: Expr, a: Expr) -> Expr:

@@ -55,6 +55,12 @@ def length(a: Expr) -> Expr:
     return ca.sqrt(ca.dot(a, a) + TINY_SQUARE)
 
 
+def angle_of(sine: Expr, cosine: Expr) -> Expr:
+    """atan2(sine, cosine) [rad], with finite slopes where both are 0: the cosine is 1e-12 there."""
+    nowhere = sine * sine + cosine * cosine < TINY_SQUARE
+    return ca.atan2(sine, ca.if_else(nowhere, TINY_SQUARE**0.5, cosine))
+
+
 def onto_disc(y: Expr, radius: Expr, width: Expr, smoothing: Expr) -> Expr:
     """The point of the disc |y| <= radius nearest to ``y``; with smoothing > 0 pulled inside over ``width``.
 

@@ -123,7 +123,7 @@ def test_own_starts_of_many_recordings_are_eliminated_without_loss() -> None:
 
 
 def double_pendulum(shared: Array, own: Array, time: Array) -> Array:
-    """Two points on rods of 1 m, masses 1 and ``shared[0]``, gravity ``shared[1]``; angles from rest at ``own`` (2,)."""
+    """Two points on rods of 1 m: shared second mass and gravity, the first mass is 1; own angles (2,), from rest."""
     m, g = shared
 
     def rate(x: Array) -> Array:

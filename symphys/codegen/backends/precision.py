@@ -27,7 +27,7 @@ ROWS = 4
 SMALL = 1e-3
 """Of the longest gradient: what a shorter one is compared with, so that rounding of nearly nothing is no error."""
 WARNING = (
-    "gradients in single precision are off by {error} of their length here: use the backend {instead}, or a solver "
+    "gradients in single precision are off by {error} of their length here: use the backend simd or cuda, or a solver "
     "without gradients"
 )
 UNCHECKED = "gradients in single precision were not compared with double precision: {why}"
@@ -50,12 +50,12 @@ class PrecisionCheck:
         program = self._program.make() if isinstance(self._program, ProgramSource) else self._program
         try:
             kernel = double_reference(program, self._seeded)
-            given = (first_rows(each, rows) for each in (Z, seed, parameters))
-            _, exact = kernel.gradient(*given, discount, skipped)
-        except (KernelUnavailable, ProgramError) as error:
-            return UNCHECKED.format(why=error)
+            Z, seed, parameters = (first_rows(each, rows) for each in (Z, seed, parameters))
+            _, exact = kernel.gradient(Z, seed, parameters, discount, skipped)
+        except (KernelUnavailable, ProgramError) as refused:
+            return UNCHECKED.format(why=refused)
         error = largest_error(gradient[:rows], exact)
-        return WARNING.format(error=in_words(error), instead="simd or cuda") if error > MAX_ERROR else ""
+        return WARNING.format(error=in_words(error)) if error > MAX_ERROR else ""
 
 
 def first_rows(values: ArrayLike, rows: int) -> Array:

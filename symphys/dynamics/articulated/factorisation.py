@@ -12,6 +12,10 @@ Expr = Any
 """casadi SX"""
 Sparse = dict[int, Expr]
 """Entries of a vector by index; what is not there is zero."""
+ROUNDING = 1e-15
+"""Of an entry of the diagonal: a pivot that elimination leaves less of is rounding. Joints far apart may leave 0."""
+TINY = 1e-60
+"""[kg m^2] or [kg], the same where that entry is 0 itself."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,8 @@ def factorise(rows: Sequence[Mapping[int, Expr]], symmetric: bool = False) -> Fa
     left, n = [dict(row) for row in rows], len(rows)
     lower, upper, pivots = ca.SX(n, n), ca.SX(n, n), ca.SX(n, 1)
     for k in reversed(range(n)):
-        pivots[k] = reciprocal(left[k][k])
+        least = ROUNDING * ca.fabs(rows[k][k]) + TINY
+        pivots[k] = reciprocal(ca.if_else(ca.fabs(left[k][k]) < least, least, left[k][k]))
         above = [j for j in left[k] if j < k]
         for j in above:
             upper[j, k] = left[k][j] * pivots[k]

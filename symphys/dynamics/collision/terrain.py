@@ -26,6 +26,10 @@ CONVEX = 0.1
 """Least determinant of the squared distance's Hessian for Newton's method; else Gauss-Newton."""
 FOUND = 0.1
 """How far from perpendicular a line to the surface may be, as a share of its length, and count as a distance."""
+LONGEST = 10.0
+"""Of the height over the surface: the longest step of that search, whose end lies within once the height."""
+SHORT = 0.1
+"""[m] a step that is always taken: what is near the surface needs no bound."""
 TINY_AREA = 1e-12
 """[m^2] below which squares of lengths count as zero there."""
 Surface = Callable[[Expr], tuple[Expr, Expr, Expr]]
@@ -66,15 +70,17 @@ def upwards(slope: Expr) -> Expr:
 
 def foot(surface: Surface, point: Expr) -> Expr:
     """(2,): x, y of the surface's point that is nearest to ``point``, searched from straight below it."""
-    xy = point[:2]
+    xy, longest = point[:2], None
     for _ in range(FOOT_STEPS):
         height, slope, bend = surface(xy)
         over = point[2] - height
+        longest = LONGEST * ca.fabs(over) + SHORT if longest is None else longest
         residual = xy - point[:2] - over * slope
         rough = ca.SX.eye(2) + ca.mtimes(slope, slope.T)
         exact = rough - over * bend
         convex = ca.logic_and(exact[0, 0] > CONVEX, determinant(exact) > CONVEX)
-        xy = xy - solved(ca.if_else(convex, exact, rough), residual)
+        step = solved(ca.if_else(convex, exact, rough), residual)
+        xy = xy - ca.fmin(ca.fmax(step, -longest), longest)
     return xy
 
 
@@ -96,8 +102,9 @@ def determinant(m: Expr) -> Expr:
 
 
 def solved(m: Expr, b: Expr) -> Expr:
-    """(2,): m^-1 b."""
-    return ca.vertcat(m[1, 1] * b[0] - m[0, 1] * b[1], m[0, 0] * b[1] - m[1, 0] * b[0]) / determinant(m)
+    """(2,): m^-1 b of a matrix with a determinant of at least ``CONVEX``, whatever rounding leaves of it."""
+    found = ca.vertcat(m[1, 1] * b[0] - m[0, 1] * b[1], m[0, 0] * b[1] - m[1, 0] * b[0])
+    return found / ca.fmax(determinant(m), CONVEX)
 
 
 def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: PredictedPath) -> Contact:

@@ -22,6 +22,11 @@ Impulses act at another instant than that at which velocities are asked for: a r
 between the two has a mobility below 0 along it.
 """
 
+LEAST_SHARE = 0.5
+"""Least mobility of free bodies at a point, as a share of the sum of their inverse masses, which bounds it by 1."""
+LEAST_TURN = 1e-6
+"""Least mobility of free bodies against torques, as a share of the trace of their inverse inertia."""
+
 
 def mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, Expr]:
     """(3, 3) each: relative velocity for unit impulses at the point, relative spin for unit torque impulses."""
@@ -59,6 +64,14 @@ def separates(terms: Sequence[BodyTerm], n: Expr, column: Expr) -> Expr:
     return ca.dot(n, column) > HELD * sum(term.inverse_mass for term in terms)
 
 
+def no_less_than_response(terms: Sequence[BodyTerm], n: Expr, column: Expr, normal: Expr) -> Expr:
+    """k along the normal, on trees at least half of what an impulse does: sweeps answer by too much with less."""
+    if all(term.jacobian is None for term in terms):
+        return normal
+    least = ca.dot(n, column) / 2
+    return ca.if_else(normal < least, least, normal)
+
+
 def symmetric_mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, Expr]:
     """Those of ``mobilities``, on trees their symmetric parts."""
     push, twist = mobilities(terms, same)
@@ -68,16 +81,34 @@ def symmetric_mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, E
 
 
 def inverse_masses(terms: Sequence[BodyTerm], n: Expr, push: Expr, twist: Expr) -> tuple[Expr, Expr, Expr, Expr]:
-    """k along the normal, across it, and for torques about it and across it; from ``symmetric_mobilities``."""
-    if all(term.jacobian is None for term in terms):
-        return along(push, n), across(push, n), along(twist, n), across(twist, n)
-    normal, least = along(push, n), HELD * sum(term.inverse_mass for term in terms)
-    return ca.if_else(normal < least, least, normal), across(push, n), along(twist, n), across(twist, n)
+    """k along the normal, across it, and for torques about it and across it; from ``symmetric_mobilities``.
+
+    On free bodies at least shares of what their masses and moments of inertia give: the inverse inertia at an instant
+    of the step is extrapolated, which at a spin of about a radian a step need not leave it positive definite.
+    """
+    jointed = any(term.jacobian is not None for term in terms)
+    least = (HELD if jointed else LEAST_SHARE) * sum(term.inverse_mass for term in terms)
+    slow = (HELD if jointed else LEAST_TURN) * sum(_trace(term.inverse_inertia) for term in terms)
+    found = along(push, n), across(push, n), along(twist, n), across(twist, n)
+    floors = least, least, slow, slow
+    return tuple(ca.if_else(k < floor, floor, k) for k, floor in zip(found, floors, strict=True))
 
 
-def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr) -> dict[str, Expr]:
-    """The fields of a constraint from the inverse effective masses k, which are inverted once, not in each sweep."""
-    return {"normal_mass": 1 / normal, "tangent_mass": 1 / tangent, "spin_mass": 1 / spin, "roll_mass": 1 / roll}
+def _trace(inverse_inertia: Expr) -> Expr:
+    return ca.trace(apply(inverse_inertia, ca.SX.eye(3)))
+
+
+def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr, separates: Expr = 1) -> dict[str, Expr]:
+    """The fields of a constraint from the inverse effective masses k, which are inverted once, not in each sweep.
+
+    A contact that does not separate its surfaces has none, so that no sweep answers to it.
+    """
+    return {
+        "normal_mass": separates / normal,
+        "tangent_mass": separates / tangent,
+        "spin_mass": 1 / spin,
+        "roll_mass": 1 / roll,
+    }
 
 
 def along(k: Expr, n: Expr) -> Expr:

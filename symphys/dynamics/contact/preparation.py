@@ -21,6 +21,7 @@ from symphys.dynamics.contact.effective_mass import (
     delassus_column,
     effective_masses,
     inverse_masses,
+    no_less_than_response,
     separates,
     symmetric_mobilities,
 )
@@ -85,7 +86,7 @@ def prepare(
     frame, applied = contact.geometry.frame(instant), contact.geometry.frame(acting)
     terms = body_terms(motions, instant, frame, applied)
     push, twist = symmetric_mobilities(terms, same)
-    k_normal, *k_others = inverse_masses(terms, frame.normal, push, twist)
+    k_normal, k_tangent, k_spin, k_roll = inverse_masses(terms, frame.normal, push, twist)
     slack = ca.if_else(suppressed, ANY, _slack(settings, contact, touch, duration))
     slip = free_slip(terms, motions)
     free = ca.dot(frame.normal, slip)
@@ -96,6 +97,7 @@ def prepare(
     landing = _landing(contact, duration, touch.time, target, free)
     column = delassus_column(terms, applied.normal, same)
     parts = separates(terms, frame.normal, column)
+    k_normal = no_less_than_response(terms, frame.normal, column, k_normal)
     weight, load = LOADED * settings.reference / k_normal, ca.dot(applied.normal, conditions.force)
     loaded = ca.logic_and(load > weight, ca.logic_not(suppressed))
     lasts = _lasts(settings, law, contact, touch.leaving, loaded)
@@ -106,7 +108,7 @@ def prepare(
         normal=frame.normal,
         impulse_normal=applied.normal,
         delassus_column=column,
-        **effective_masses(k_normal + softness, *k_others),
+        **effective_masses(k_normal + softness, k_tangent, k_spin, k_roll, parts),
         softness=softness,
         separates=parts,
         target=ca.if_else(ca.logic_or(suppressed, 1 - parts), UNREACHED, target),

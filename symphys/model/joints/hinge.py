@@ -6,6 +6,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.maths.smoothing import angle_of
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 
 Expr = Any
@@ -17,7 +18,7 @@ def angle(placed: PlacedFrames) -> Expr:
     a, b = placed.a, placed.b
     cos = ca.dot(a[:, 1], b[:, 1]) + ca.dot(a[:, 2], b[:, 2])
     sin = ca.dot(a[:, 1], b[:, 2]) - ca.dot(a[:, 2], b[:, 1])
-    return ca.atan2(sin, cos)
+    return angle_of(sin, cos)
 
 
 def axis(placed: PlacedFrames) -> Expr:

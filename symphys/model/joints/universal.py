@@ -6,6 +6,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.maths.smoothing import angle_of
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 
 Expr = Any
@@ -15,13 +16,13 @@ Expr = Any
 def swing(placed: PlacedFrames) -> Expr:
     """In [-pi, pi] [rad]: of the first side's x about the second side's y; whole turns are not seen."""
     a, b = placed.a, placed.b
-    return ca.atan2(-ca.dot(a[:, 0], b[:, 2]), ca.dot(a[:, 0], b[:, 0]))
+    return angle_of(-ca.dot(a[:, 0], b[:, 2]), ca.dot(a[:, 0], b[:, 0]))
 
 
 def twist(placed: PlacedFrames) -> Expr:
     """In [-pi, pi] [rad]: of the first side about its own x, against the second side's y, without whole turns."""
     a, b = placed.a, placed.b
-    return ca.atan2(-ca.dot(a[:, 2], b[:, 1]), ca.dot(a[:, 1], b[:, 1]))
+    return angle_of(-ca.dot(a[:, 2], b[:, 1]), ca.dot(a[:, 1], b[:, 1]))
 
 
 UNIVERSAL = Kind(
