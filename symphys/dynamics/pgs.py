@@ -10,6 +10,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
 
 from symphys.dynamics.contact.constraint import ContactConstraint, known_before
+from symphys.dynamics.contact.newton_start import contact_softness, open_groups, solve_together
+from symphys.dynamics.context import StepContext
+from symphys.dynamics.joints.assembly import KinematicTrees
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint, project_in_turn, pushed_by
 from symphys.dynamics.line_search import EVERY, Cluster, clusters, lengthened
 from symphys.dynamics.motion import PredictedMotion
@@ -23,7 +26,6 @@ from symphys.dynamics.unknowns import (
     Velocities,
     VelocityConstraint,
 )
-from symphys.model.world import World
 
 
 @dataclass(frozen=True)
@@ -36,13 +38,15 @@ class Acceleration:
 
 
 def iterate(
-    world: World,
-    sweeps: int,
-    constraints: tuple[PlacedConstraint, ...],
-    start: Iterate,
-    motions: Sequence[PredictedMotion],
+    context: StepContext, constraints: tuple[PlacedConstraint, ...], start: Iterate, trees: KinematicTrees
 ) -> Iterate:
-    """The solution after all sweeps; in clusters of unequal bodies with a line search after some of them."""
+    """The solution after all sweeps; in clusters of unequal bodies with a line search after some of them.
+
+    Groups whose loads may be open begin where Newton's method takes them.
+    """
+    world, sweeps, motions = context.world, context.settings.scheme.sweeps, trees.motions
+    for group in open_groups(context, constraints, start.momenta):
+        start = solve_together(group, constraints, start, trees, contact_softness(group, constraints, trees))
     constraints = _coupled(constraints, start.momenta)
     found = tuple(clusters(world, constraints))
     if not found:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -13,17 +13,21 @@ from symphys.dynamics.articulated.forward_kinematics import FinalPose
 from symphys.dynamics.collision.contact_geometry import UNMOVED, Contact, Displacement
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
+from symphys.dynamics.contact.newton_start import contact_softness, open_groups, solve_together
 from symphys.dynamics.context import StepContext
 from symphys.dynamics.joints.assembly import KinematicTrees
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
+from symphys.dynamics.joints.joint_impulse import JointImpulse
 from symphys.dynamics.joints.loop_closure import Displacements, TreeDisplacement, close_loops, displaced
-from symphys.dynamics.motion import PredictedMotion, apply
+from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import gathered, opened, repeat, traced
-from symphys.dynamics.unknowns import AllVelocities, GeneralizedVelocities, PlacedConstraint, Velocities
+from symphys.dynamics.unknowns import AllVelocities, GeneralizedVelocities, Iterate, PlacedConstraint, Velocities
 from symphys.model.joints import kinematic_trees
 
 Expr = Any
 """casadi SX, MX or DM"""
+TOGETHER = 0, 0
+"""Steps of Newton's method on the gaps of contacts that share bodies."""
 
 
 def displacements(
@@ -133,11 +137,33 @@ def close_gaps(
     limits = tuple(each for each in joints if _of_tree(each))
     fixed = PositionPass(trees.motions, rigid, limits, scheme.push_out)
     along = gathered(tuple(moved)) if context.near else tuple(moved)
-    before: Pushed = along, tuple(ca.SX(0) for _ in rigid)
+    before = _start(context, trees, fixed, along)
     pushed, _ = repeat(scheme.position_sweeps, _push_all, fixed, before)
     others = tuple(each for each in joints if not _of_tree(each))
     along, by_loops = close_loops(scheme.position_sweeps, trees.motions, others, pushed)
     return _closed(context, trees, along, by_loops)
+
+
+def _start(
+    context: StepContext, trees: KinematicTrees, fixed: PositionPass, along: tuple[TreeDisplacement, ...]
+) -> Pushed:
+    """What the pass starts from: where contacts share bodies, with all of their gaps closed together."""
+    contacts = [each for each, _, _ in fixed.rigid]
+    pushes = [
+        replace(each, constraint=Push(each.constraint, contact, lasts, fixed.share, _jacobians(fixed, each)))
+        for each, contact, lasts in fixed.rigid
+    ]
+    none = tuple(JointImpulse(ca.SX(0)) for _ in pushes)
+    start: Any = along
+    found = Iterate(start, none, none)
+    for group in open_groups(context, contacts, along):
+        found = solve_together(group, pushes, found, trees, contact_softness(group, contacts, trees), TOGETHER)
+    ended: Any = found.momenta
+    return ended, tuple(each.numbers for each in found.impulses)
+
+
+def _jacobians(fixed: PositionPass, each: PlacedConstraint) -> tuple[BodyJacobian | None, ...]:
+    return tuple(fixed.motions[i].jacobian for i in each.bodies)
 
 
 def _closed(
@@ -219,17 +245,74 @@ def _push(
     old: Expr,
     share: float,
 ) -> tuple[tuple[TreeDisplacement, ...], Expr]:
-    gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED) + constraint.slack
-    free = old - share * gap * constraint.normal_mass * constraint.separates
+    free, _ = _free(constraint, contact, moved, old, share)
     # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
     new = constraint.near * ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
-    step = (new - old) * constraint.normal
+    return _given(constraint, along, (new - old) * constraint.normal), new
+
+
+def _free(
+    constraint: ContactConstraint, contact: Contact, moved: Displacements, old: Expr, share: float
+) -> tuple[Expr, Expr]:
+    """The push that closes the gap, of either sign, and the effective mass."""
+    gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED) + constraint.slack
+    mass = constraint.normal_mass * constraint.separates
+    return old - share * gap * mass, mass
+
+
+def _given(
+    constraint: ContactConstraint, along: tuple[TreeDisplacement, ...], step: Expr
+) -> tuple[TreeDisplacement, ...]:
+    """The displacements after a push (3,) of the first body."""
     if constraint.same:
         after = along[0]
         for term in constraint.terms:
             after = _pushed(term, after, step)
-        return tuple(after for _ in constraint.terms), new
-    return tuple(_pushed(term, each, step) for term, each in zip(constraint.terms, along, strict=True)), new
+        return tuple(after for _ in constraint.terms)
+    return tuple(_pushed(term, each, step) for term, each in zip(constraint.terms, along, strict=True))
+
+
+@dataclass(frozen=True)
+class Push:
+    """What ``_push`` does, for ``newton_start``.
+
+    Attributes:
+        constraint, contact: of the pair.
+        lasts: whether its gap is closed from either side.
+        share: of an overlap that is taken back.
+        jacobians: of its bodies.
+    """
+
+    constraint: ContactConstraint
+    contact: Contact
+    lasts: Expr
+    share: float
+    jacobians: tuple[BodyJacobian | None, ...]
+
+    def rates(self, along: tuple[TreeDisplacement, ...]) -> Expr:
+        """(1,): how far displacements part the surfaces, to first order [m]."""
+        parted = ca.SX(0)
+        for term, moved in zip(self.constraint.terms, self._moved(along), strict=True):
+            shift = moved.linear + ca.cross(moved.angular, term.arm)
+            parted += term.sign * ca.dot(self.constraint.normal, shift)
+        return parted
+
+    def apply(self, along: tuple[TreeDisplacement, ...], impulse: JointImpulse) -> tuple[TreeDisplacement, ...]:
+        """The displacements after a push."""
+        return _given(self.constraint, along, impulse.numbers * self.constraint.normal)
+
+    def linearised(
+        self, along: tuple[TreeDisplacement, ...], old: JointImpulse, softness: Expr, centre: float
+    ) -> tuple[Expr, Expr]:
+        """(a (1,), B (1, 1)); see ``newton_start``."""
+        del centre
+        free, mass = _free(self.constraint, self.contact, self._moved(along), old.numbers, self.share)
+        acts = self.constraint.near * self.constraint.separates * ca.logic_or(self.lasts, free >= 0)
+        gives = 1 - acts + acts * mass * softness
+        return (acts * free - old.numbers) / gives, acts * self.share * mass / gives
+
+    def _moved(self, along: tuple[TreeDisplacement, ...]) -> Displacements:
+        return tuple(displaced(jacobian, own) for jacobian, own in zip(self.jacobians, along, strict=True))
 
 
 def _pushed(term: BodyTerm, along: TreeDisplacement, step: Expr) -> TreeDisplacement:

@@ -115,7 +115,7 @@ def advance(
     every = (*(each.placed for each in joints), *constraints)
     states = gathered(trees.states) if context.near else trees.states
     start = apply_start(every, states, (*warm_started(context, joints, x, kick), *given))
-    solved = iterate(world, scheme.sweeps, every, start, trees.motions)
+    solved = iterate(context, every, start, trees)
     by_joints, impulses = solved.impulses[: len(joints)], solved.impulses[len(joints) :]
     momenta = momenta_of(context, trees, solved.momenta)
 

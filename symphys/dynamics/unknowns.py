@@ -10,6 +10,9 @@ import casadi as ca
 Expr = Any
 """casadi SX"""
 
+COMPLIANCE = 1e-6
+"""Of rigid constraints in ``newton_start``, of their inverse effective masses."""
+
 
 @dataclass(frozen=True)
 class Momentum:
@@ -55,6 +58,21 @@ class VelocityConstraint(Protocol):
 
     def apply(self, momenta: AllVelocities, impulse: AnyImpulse) -> AllVelocities:
         """The momenta after an impulse."""
+        ...
+
+    def rates(self, momenta: AllVelocities) -> Expr:
+        """(m,): the velocities that the projection looks at."""
+        ...
+
+    def linearised(self, momenta: AllVelocities, old: AnyImpulse, softness: Expr, centre: float) -> tuple[Expr, Expr]:
+        """(a (k,), B (k, m)): the k numbers of its impulse change by a - B d rates.
+
+        Args:
+            momenta: of the bodies.
+            old: the accumulated impulse.
+            softness: which rigid contacts get [1/kg]; other rigid constraints ``COMPLIANCE``.
+            centre: 1 if what is given at that softness counts from 0, 0 if from ``old``.
+        """
         ...
 
 

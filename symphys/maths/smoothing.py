@@ -26,6 +26,12 @@ def positive(x: Expr, width: Expr) -> Expr:
     return ca.if_else(width > 0, _soft(x, width), ca.fmax(x, 0))
 
 
+def positive_slope(x: Expr, width: Expr) -> Expr:
+    """The slope of ``positive``; 0 at x = 0 where it is exact."""
+    smooth = (1 + x / ca.sqrt(x * x + width * width + TINY_WIDTH_SQUARE)) / 2
+    return ca.if_else(width > 0, smooth, x > 0)
+
+
 def at_least(x: Expr, low: Expr, width: Expr) -> Expr:
     """max(x, low), and low + positive(x - low, w) for width w > 0."""
     return ca.if_else(width > 0, low + _soft(x - low, width), ca.fmax(x, low))

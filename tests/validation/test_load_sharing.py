@@ -85,14 +85,18 @@ def test_loads_are_linear_across_a_braking_crate() -> None:
 
 
 def test_a_crate_on_its_edge_keeps_its_loads() -> None:
-    """Two corners say how they share a load; the others, in the air, get none."""
+    """Two corners say how they share a load; the others, in the air, get none.
+
+    Sweeps alone turn the crate by 1e-8 about the other axes, which symmetry forbids.
+    """
     tilt = 0.3
     up = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
     low = (up @ np.array([0.15, 0.2, -0.1]))[2]
     start = {"b.position": [0, 0, -low], "b.orientation": [np.cos(tilt / 2), 0, np.sin(tilt / 2), 0]}
     with_it, without = (lab(load_sharing=share).states(start, 0.05) for share in (True, False))
     assert loads(with_it, 3) == pytest.approx(loads(without, 3), abs=1e-6)
-    assert with_it["b.orientation"][-1] == pytest.approx(without["b.orientation"][-1], abs=1e-9)
+    assert with_it["b.orientation"][-1] == pytest.approx(without["b.orientation"][-1], abs=2e-8)
+    assert np.abs(with_it["b.orientation"][-1][[1, 3]]).max() < 1e-14
 
 
 def test_points_that_share() -> None:

@@ -34,6 +34,11 @@ class Factorisation:
     upper: Expr
     pivots: Expr
 
+    def matrix(self) -> Expr:
+        """(n, n): what was factored."""
+        unit = ca.SX.eye(self.pivots.size1())
+        return ca.mtimes(unit + self.lower, ca.mtimes(ca.diag(1 / self.pivots), unit + self.upper.T))
+
     def solve(self, right: Mapping[int, Expr]) -> Sparse:
         """The solution for a right hand side."""
         reduced = dict(right)

@@ -140,6 +140,17 @@ def _counted(
 
 
 @traced
+def mass_matrix(coordinates: GeneralizedCoordinates) -> Expr:
+    """(n, n): by the generalized velocities of a tree, in which root and branches are decoupled."""
+    places, parts = numbering(coordinates.tree), coordinates.matrix
+    n = coordinates.tree.kinematic_tree.size
+    found = ca.SX(n, n)
+    for own, block in zip(places, (parts.root, *(branch.block for branch in parts.branches)), strict=True):
+        found[list(own), list(own)] = block.matrix()
+    return found
+
+
+@traced
 def _joined(numbering: Numbering, rates: TreeRates) -> Expr:
     return spread(numbering, (rates.r, *rates.z))
 

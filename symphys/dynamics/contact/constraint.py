@@ -23,7 +23,7 @@ from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.coupling import Coupling
 from symphys.dynamics.contact.soft import SoftImpulse
 from symphys.dynamics.tracing.decorator import traced
-from symphys.maths.smoothing import length, onto_disc, positive
+from symphys.maths.smoothing import length, onto_disc, positive, positive_slope
 from symphys.model.world import Law
 
 Expr = Any
@@ -55,6 +55,15 @@ class ContactImpulse:
     tangent: Expr
     spin: Expr
     roll: Expr
+
+    @property
+    def count(self) -> int:
+        """How many numbers load and friction have."""
+        return 4
+
+    def like(self, numbers: Expr) -> ContactImpulse:
+        """One with load and friction (4,)."""
+        return ContactImpulse(numbers[0], numbers[1:4], ca.SX(0), ca.SX.zeros(3))
 
     def linear(self, n: Expr) -> Expr:
         """(3,) [N s]."""
@@ -169,6 +178,14 @@ class ContactConstraint:
         linear, angular = impulse.linear(self.impulse_normal), impulse.angular(self.impulse_normal)
         return body_term.apply_impulse(self.terms, momenta, linear, angular, self.same)
 
+    rates = slip
+
+    def linearised(
+        self, momenta: tuple[Any, ...], old: ContactImpulse, softness: Expr, centre: float
+    ) -> tuple[Expr, Expr]:
+        """See ``newton_start``."""
+        return linearised(self, self.slip(momenta), old, softness, centre)
+
     def project(self, momenta: tuple[Any, ...], old: ContactImpulse) -> tuple[tuple[Any, ...], ContactImpulse]:
         """One projection of each of its impulses, one after the other."""
         zero = ca.SX.zeros(3)
@@ -224,6 +241,57 @@ def _tangent(contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal
     kept = old.tangent + contact.tangent_mass * _across(contact.slip_target, contact.normal)
     wanted = kept - contact.tangent_mass * _across(slip, contact.normal)  # what is known last comes in last
     return onto_disc(wanted, contact.law.friction * normal, contact.tangent_mass * contact.smoothing, contact.smoothing)
+
+
+def linearised(
+    contact: ContactConstraint, slip: Expr, old: ContactImpulse, softness: Expr, centre: float
+) -> tuple[Expr, Expr]:
+    """(a (4,), B (4, 3)): load and friction change by a - B du with the slip u.
+
+    Args:
+        contact: the contact.
+        slip: (3,) u [m/s].
+        old: what it has given so far.
+        softness: of a rigid contact here [1/kg].
+        centre: 1 if loads of that softness are counted from 0, 0 if from ``old``.
+    """
+    mass, width = contact.normal_mass, contact.normal_mass * contact.width
+    kept = old.normal + mass * (contact.target - contact.softness * old.normal - ca.dot(contact.normal, slip))
+    normal, rise = contact.near * positive(kept, width), contact.near * positive_slope(kept, width)
+    gives = 1 - rise * (1 - mass * (contact.softness + softness))
+    press = (normal - old.normal - rise * mass * softness * centre * old.normal) / gives
+    by_slip = rise * mass / gives * contact.normal.T
+    # a change of load that its own projection does not make widens the disc of friction
+    friction, widens, sliding = _friction(contact, slip, old, normal, (softness, centre))
+    friction += widens * (press - (normal - old.normal))
+    sliding += ca.mtimes(widens, by_slip)
+    return contact.near * ca.vertcat(press, friction), contact.near * ca.vertcat(by_slip, sliding)
+
+
+def _friction(
+    contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal: Expr, soft: tuple[Expr, float]
+) -> tuple[Expr, Expr, Expr]:
+    """(a (3,), its slope (3,) by the load, B (3, 3)) of friction alone, with the disc of a load ``normal``.
+
+    What points along the friction that is wanted is stretched or cut by ``onto_disc``, what lies across it is turned.
+    """
+    n, mass, smooth = contact.normal, contact.tangent_mass, contact.smoothing > 0
+    wanted = old.tangent + mass * _across(contact.slip_target - slip, n)
+    radius, size, width = contact.law.friction * normal, length(wanted), mass * contact.smoothing
+    reach = ca.if_else(smooth, radius + positive(size - radius, width) + 1e-30, ca.fmax(size, radius))
+    falls = ca.if_else(smooth, positive_slope(size - radius, width), size > radius)
+    share, along = radius / reach, wanted / size
+    stretch = share * (1 - size * falls / reach)
+    grows = contact.law.friction * size / reach * (1 - radius * (1 - falls) / reach)
+    gives, counted = mass * soft[0], mass * soft[0] * soft[1]
+    change = share * wanted - old.tangent
+    ahead = along * ca.dot(along, change - counted * stretch * old.tangent) / (1 - stretch + gives)
+    beside = change - counted * share * old.tangent
+    beside = (beside - along * ca.dot(along, beside)) / (1 - share + gives)
+    line = ca.mtimes(along, along.T)
+    plane = ca.SX.eye(3) - ca.mtimes(n, n.T) - line
+    sliding = mass * (stretch / (1 - stretch + gives) * line + share / (1 - share + gives) * plane)
+    return ahead + beside, grows / (1 - stretch + gives) * along, sliding
 
 
 def _torques(

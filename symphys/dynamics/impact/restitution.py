@@ -54,11 +54,11 @@ def rebound(
     """The impulses of an impact, and the momenta after it."""
     scheme = context.settings.scheme
     if not (scheme.energy_cap and eccentric_bodies(context.world)):
-        return iterate(context.world, scheme.sweeps, constraints, start, motions)
+        return iterate(context, constraints, start, trees)
     dead = tuple(replace(each, constraint=_without_rebound(each.constraint)) for each in constraints)
-    plastic = iterate(context.world, scheme.sweeps, dead, start, motions)
+    plastic = iterate(context, dead, start, trees)
     between = replace(plastic, momenta=gathered(plastic.momenta)) if context.near else plastic
-    newton = iterate(context.world, scheme.sweeps, constraints, between, motions)
+    newton = iterate(context, constraints, between, trees)
     sums: tuple[Expr, Expr, Expr] = opened((ca.SX(0), ca.SX(0), ca.SX(0)))
     solutions = replace(start, momenta=trees.states), plastic, newton
     bodies = (momenta_of(context, trees, solution.momenta) for solution in solutions)

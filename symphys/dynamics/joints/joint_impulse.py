@@ -20,6 +20,15 @@ class JointImpulse:
 
     numbers: Expr
 
+    @property
+    def count(self) -> int:
+        """How many numbers it has."""
+        return int(self.numbers.shape[0])
+
+    def like(self, numbers: Expr) -> JointImpulse:
+        """One of these numbers (n,)."""
+        return JointImpulse(numbers)
+
     def plus(self, other: JointImpulse) -> JointImpulse:
         """The sum."""
         return JointImpulse(self.numbers + other.numbers)

@@ -10,6 +10,7 @@ import casadi as ca
 from symphys.dynamics.articulated.factorisation import factorise
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
+from symphys.dynamics.unknowns import COMPLIANCE
 
 Expr = Any
 """casadi SX"""
@@ -75,6 +76,20 @@ class LockConstraint:
         miss = speeds(self.terms, self.seen, momenta) - self.target + self.softness * old.numbers
         change = JointImpulse(-ca.mtimes(self.mass, miss))
         return self.apply(momenta, change), old.plus(change)
+
+    def rates(self, momenta: tuple[Any, ...]) -> Expr:
+        """(n,): velocities along the directions."""
+        return speeds(self.terms, self.seen, momenta)
+
+    def linearised(
+        self, momenta: tuple[Any, ...], old: JointImpulse, softness: Expr, centre: float
+    ) -> tuple[Expr, Expr]:
+        """(a (n,), B (n, n)); see ``newton_start``."""
+        del softness
+        soft = COMPLIANCE / ca.diag(self.mass)
+        miss = self.rates(momenta) - self.target + (self.softness + centre * soft) * old.numbers
+        stiff = ca.diag(1 / (self.softness + soft))
+        return -ca.mtimes(stiff, miss), stiff
 
     def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
         """See ``VelocityConstraint``."""

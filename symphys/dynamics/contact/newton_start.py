@@ -1,0 +1,273 @@
+"""Newton's method on all constraints of a few bodies at once, before the sweeps.
+
+Where several faces, wheels, feet or fingers carry a body, rigid bodies leave open how they share its load, and sweeps,
+which take one constraint after the other, leave the share to their order: a symmetric machine then turns. And where
+points lie close together against the size of their body, each undoes what the last one did, and ten sweeps do not
+settle. So all constraints of such a group are linearised at the same velocities and solved together, in no order
+(semi-smooth Newton; Alart and Curnier, A mixed formulation for frictional contact problems prone to Newton like
+solution methods, Comput. Methods Appl. Mech. Engrg. 92, 1991). What the sweeps look for is then found, and is kept.
+
+Each constraint says how its projection answers a change of velocities: d impulse = a - B J d velocities. With the mass
+matrix M and the responses H to impulses, (M + M H B J) d velocities = M H a: a system as large as the group's
+velocities, however many points there are. A rigid constraint would have an infinite B. With ``COMPLIANCE`` loads that
+are open are those of least sum of squares; the last steps, about the loads that were found, take back what it gave way.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any
+
+import casadi as ca
+
+from symphys.dynamics.articulated.factorisation import factorise
+from symphys.dynamics.articulated.generalized_coordinates import mass_matrix
+from symphys.dynamics.collision.contact_geometry import Displacement
+from symphys.dynamics.contact.constraint import ContactConstraint
+from symphys.dynamics.context import StepContext
+from symphys.dynamics.joints.assembly import KinematicTrees
+from symphys.dynamics.motion import PredictedMotion, apply
+from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import (
+    COMPLIANCE,
+    AnyImpulse,
+    GeneralizedVelocities,
+    Iterate,
+    Momentum,
+    PlacedConstraint,
+    VelocityConstraint,
+)
+from symphys.model.world import World
+
+Expr = Any
+"""casadi SX"""
+State = Any
+"""``Velocities`` of a carrier, or its displacement."""
+States = tuple[State, ...]
+
+CENTRES = 1, 1, 0, 0
+"""Of the steps: 1 with loads about 0, 0 about those that were found."""
+LARGEST = 40
+"""Velocities of a group that is solved at once."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Bodies and trees that are solved together, by where their velocities are kept, and all constraints on them."""
+
+    carriers: tuple[int, ...]
+    constraints: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Lever:
+    """How a constraint sees the N velocities of its bodies, and acts on them.
+
+    Attributes:
+        rates: (m, N) J.
+        responses: (N, k) H, to unit impulses.
+        momenta: (N, k) M H.
+    """
+
+    rates: Expr
+    responses: Expr
+    momenta: Expr
+
+
+@dataclass(frozen=True)
+class Member:
+    """A constraint of a group: its number, its carriers among those of the group, each once, and its lever."""
+
+    number: int
+    placed: PlacedConstraint
+    own: tuple[int, ...]
+    lever: Lever
+
+
+def open_groups(context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State]) -> list[Group]:
+    """Those whose loads may be open, or whose points may lie close together."""
+    if context.sample or not context.settings.scheme.load_sharing:
+        return []
+    members: dict[int, set[int]] = {k: {k} for k, state in enumerate(states) if state is not None}
+    for each in constraints:
+        together = set().union(*(members[k] for k in each.carriers))
+        members |= dict.fromkeys(together, together)
+    found = []
+    for carriers in sorted({tuple(sorted(group)) for group in members.values()}):
+        own = tuple(k for k, each in enumerate(constraints) if each.carriers[0] in carriers)
+        size = sum(_size(states[k]) for k in carriers)
+        jointed = any(isinstance(states[k], GeneralizedVelocities) for k in carriers)
+        if size <= LARGEST and _is_open(context.world, [constraints[k] for k in own], jointed, size):
+            found.append(Group(carriers, own))
+    return found
+
+
+def _is_open(world: World, constraints: Sequence[PlacedConstraint], jointed: bool, size: int) -> bool:
+    """Whether a body that is no ball has several points, or a tree more friction and load than it has velocities."""
+    rigid = [each for each in constraints if _rigid(each.constraint)]
+    balls = {k for k, body in enumerate(world.bodies) if all(shape.central for shape in body.shapes)}
+    places = Counter(each.bodies for each in rigid if not balls.issuperset(each.bodies))
+    several = any(count > 1 for count in places.values())
+    return several or (jointed and len(rigid) > 1 and 3 * len(rigid) > size)
+
+
+def _rigid(constraint: VelocityConstraint) -> bool:
+    return isinstance(constraint, ContactConstraint) and not constraint.law.soft
+
+
+def solve_together(
+    group: Group,
+    constraints: Sequence[PlacedConstraint],
+    start: Iterate,
+    trees: KinematicTrees,
+    softness: Expr,
+    centres: Sequence[int] = CENTRES,
+) -> Iterate:
+    """The start of the sweeps, with the constraints of a group solved.
+
+    Args:
+        group: of carriers.
+        constraints: of all groups.
+        start: velocities, or displacements, and impulses.
+        trees: of the world.
+        softness: of contacts; see ``contact_softness``.
+        centres: of each step 1 if loads of that softness are counted from 0, 0 if from those that were found.
+    """
+    momenta, impulses = list(start.momenta), list(start.impulses)
+    metric = _metric(trees, group.carriers, momenta)
+    members = []
+    for number in group.constraints:
+        placed = constraints[number]
+        carriers = tuple(dict.fromkeys(placed.carriers))
+        own = tuple(group.carriers.index(i) for i in carriers)
+        sides = tuple(carriers.index(i) for i in placed.carriers)
+        states, masses = tuple(momenta[i] for i in carriers), tuple(metric[k] for k in own)
+        lever = _lever(placed.constraint, impulses[number], states, sides, masses)
+        members.append(Member(number, placed, own, lever))
+    for centre in centres:
+        answers = []
+        for each in members:
+            states = tuple(momenta[i] for i in each.placed.carriers)
+            constraint, old = each.placed.constraint, impulses[each.number]
+            answers.append(_answer(constraint, each.lever, states, old, softness, centre))
+        parts = tuple((each.own, *answer[:2]) for each, answer in zip(members, answers, strict=True))
+        changes = _changes(metric, parts)
+        for each, (_, _, *answer) in zip(members, answers, strict=True):
+            carriers = tuple(group.carriers[k] for k in each.own)
+            states, change = tuple(momenta[i] for i in carriers), tuple(changes[k] for k in each.own)
+            moved, impulses[each.number] = _moved(each.lever, tuple(answer), change, states, impulses[each.number])
+            for i, state in zip(carriers, moved, strict=True):
+                momenta[i] = state
+    return Iterate(tuple(momenta), tuple(impulses), tuple(impulses))
+
+
+def contact_softness(group: Group, constraints: Sequence[PlacedConstraint], trees: KinematicTrees) -> Expr:
+    """[1/kg]: the same for all contacts of a group, so that loads are shared by least squares."""
+    rigid = (constraints[k] for k in group.constraints if _rigid(constraints[k].constraint))
+    bodies = sorted({body for each in rigid for body in each.bodies})
+    return _softness(tuple(trees.motions[body].mass for body in bodies))
+
+
+def _size(state: State) -> int:
+    return int(state.numbers.shape[0]) if isinstance(state, GeneralizedVelocities) else 6
+
+
+def _metric(trees: KinematicTrees, carriers: Sequence[int], states: Sequence[State]) -> tuple[Expr, ...]:
+    """The mass matrix of each carrier: kinetic energy by its velocities."""
+    coordinates = dict(zip(trees.roots, trees.coordinates, strict=True))
+    return tuple(
+        mass_matrix(coordinates[k]) if k in coordinates else _of_body(trees.motions[k], states[k]) for k in carriers
+    )
+
+
+@traced
+def _of_body(motion: PredictedMotion, state: State) -> Expr:
+    """(6, 6) by velocity and angular momentum, or by displacements."""
+    turning = motion.inertia_mid if isinstance(state, Displacement) else apply(motion.inverse_mid, ca.SX.eye(3))
+    return ca.diagcat(motion.mass * ca.SX.eye(3), turning)
+
+
+@traced
+def _softness(masses: tuple[Expr, ...]) -> Expr:
+    return COMPLIANCE * sum(1 / mass for mass in masses) / len(masses)
+
+
+@traced
+def _lever(
+    constraint: VelocityConstraint,
+    impulse: AnyImpulse,
+    states: States,
+    sides: tuple[int, ...],
+    metric: tuple[Expr, ...],
+) -> Lever:
+    sizes = [_size(state) for state in states]
+    velocities = ca.SX.sym("v", sum(sizes))
+    cut = _cut(velocities, states)
+    rates = ca.jacobian(constraint.rates(tuple(cut[k] for k in sides)), velocities)
+    numbers = ca.SX.sym("p", impulse.count)
+    at_rest = _cut(ca.SX.zeros(sum(sizes)), states)
+    after = constraint.apply(tuple(at_rest[k] for k in sides), impulse.like(numbers))
+    by_carrier = dict(zip(sides, after, strict=True))
+    responses = ca.jacobian(ca.vertcat(*(_flat(by_carrier[k]) for k in range(len(states)))), numbers)
+    return Lever(rates, responses, ca.mtimes(ca.diagcat(*metric), responses))
+
+
+def _cut(velocities: Expr, states: States) -> list[State]:
+    """Velocities of carriers, side by side, one by one."""
+    found, start = list[State](), 0
+    for state in states:
+        end = start + _size(state)
+        part, start = velocities[start:end], end
+        if isinstance(state, GeneralizedVelocities):
+            found.append(GeneralizedVelocities(part))
+        else:
+            found.append(
+                Displacement(part[:3], part[3:]) if isinstance(state, Displacement) else Momentum(part[:3], part[3:])
+            )
+    return found
+
+
+def _flat(state: State) -> Expr:
+    assert state is not None
+    if isinstance(state, GeneralizedVelocities):
+        return state.numbers
+    return ca.vertcat(state.linear if isinstance(state, Displacement) else state.velocity, state.angular)
+
+
+@traced
+def _answer(
+    constraint: VelocityConstraint, lever: Lever, momenta: States, old: AnyImpulse, softness: Expr, centre: int
+) -> tuple[Expr, Expr, Expr, Expr]:
+    """M H B J, M H a, a and B."""
+    a, b = constraint.linearised(momenta, old, softness, centre)
+    return ca.mtimes(ca.mtimes(lever.momenta, b), lever.rates), ca.mtimes(lever.momenta, a), a, b
+
+
+@traced
+def _changes(metric: tuple[Expr, ...], parts: tuple[tuple[tuple[int, ...], Expr, Expr], ...]) -> tuple[Expr, ...]:
+    """Of the velocities of each carrier."""
+    sizes = [each.shape[0] for each in metric]
+    starts = [0, *accumulate(sizes)]
+    matrix: Expr = ca.diagcat(*metric)
+    right: Expr = ca.SX(starts[-1], 1)
+    for own, block, load in parts:
+        places = [j for k in own for j in range(starts[k], starts[k + 1])]
+        matrix[places, places] += block
+        right[places] += load
+    n = starts[-1]
+    rows = [{j: matrix[i, j] for j in range(n) if matrix.has_nz(i, j)} for i in range(n)]
+    solved = factorise(rows).solve({i: right[i] for i in range(n)})
+    return tuple(ca.vertcat(*(solved[i] for i in range(starts[k], starts[k + 1]))) for k in range(len(sizes)))
+
+
+@traced
+def _moved(
+    lever: Lever, answer: tuple[Expr, ...], changes: tuple[Expr, ...], momenta: States, old: AnyImpulse
+) -> tuple[States, AnyImpulse]:
+    a, b = answer
+    given = a - ca.mtimes(b, ca.mtimes(lever.rates, ca.vertcat(*changes)))
+    after = ca.vertcat(*(_flat(state) for state in momenta)) + ca.mtimes(lever.responses, given)
+    return tuple(_cut(after, momenta)), old.plus(old.like(given))
