@@ -7,7 +7,8 @@ import re
 from pathlib import Path
 
 import pytest
-from mutated_files import CHANGES, KINDS, PROBLEM, mutated, outcome
+from mutated_files import CHANGES, KINDS, mutated, outcome
+from mutated_texts import PROBLEM
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem
