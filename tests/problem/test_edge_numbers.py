@@ -37,6 +37,16 @@ def test_a_number_that_is_too_large_is_named(tmp_path: Path, old: str, new: str,
         load_problem(file)
 
 
+@pytest.mark.parametrize("kind", ["linear", "cubic"])
+def test_what_changes_within_next_to_no_time_is_named(tmp_path: Path, kind: str) -> None:
+    """A slope of 1e308 and more."""
+    file = tmp_path / "edge.toml"
+    fast = PROBLEM.replace("time = [0, 0.1, 0.2]", "time = [0, 1e-308, 0.2]")
+    file.write_text(fast.replace('"cubic"', f'"{kind}"'))
+    with pytest.raises(ProblemError, match=r'row 3, column "x": 0 becomes 0.5 within 1e-308 s, too fast'):
+        load_problem(file)
+
+
 @pytest.mark.parametrize(("kind", "count"), [("problem", 25), ("recording", 60)])
 def test_broken_files_are_read_or_become_messages(tmp_path: Path, kind: str, count: int) -> None:
     """A few of those that benchmarks/mutated_files.py makes."""
