@@ -86,7 +86,7 @@ def advance(
     Pairs whose ``suppressed`` is 1 give no impulse, since the substep ends as they meet. Where ``plastic`` is 1 nothing
     rebounds.
     """
-    world, scheme = context.world, context.settings.scheme
+    world = context.world
     kick, half = _times(duration, x["lag"])  # (2)
 
     # 1-2. predicted motion: free (1, 3, 4); of bodies with joints as the forces of the last step have it (5)

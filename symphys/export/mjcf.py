@@ -14,7 +14,7 @@ For some things MuJoCo has laws of its own:
 - A servo here aims at the velocity clip(gain (command - angle), +-velocity), and reaches it within a step unless that
   takes more than its torque. Nearest is a position actuator with kp = gain kv and the same bound of force. It aims at
   gain (command - angle), not held in +-velocity, and gives all of its torque only where the velocity is off by torque /
-  kv: it sags under load. kv is 100 torque / velocity, or what the time step takes without swinging (``mjcf_step``).
+  kv: it sags under load. kv is 100 torque / velocity, or what the time step takes without swinging (``moving.step``).
 - A velocity motor likewise becomes a velocity actuator with that kv.
 - The time step is cut into parts where motors, springs or contacts that give way need it.
 - A contact that gives way has the same frequency and damping ratio, by MuJoCo's own estimate of the mass behind it.
@@ -45,9 +45,9 @@ from symphys.export.mjcf_equality import equalities
 from symphys.export.mjcf_joints import freedoms
 from symphys.export.mjcf_motors import actuators
 from symphys.export.mjcf_sensors import sensor_elements, site_elements
-from symphys.export.mjcf_step import inertias, parts
 from symphys.export.mjcf_surfaces import APART, FRICTION_RATIO, geoms, meshes, pairs, text
 from symphys.export.mjcf_terrain import height_field, middle
+from symphys.export.moving.step import inertias, parts
 from symphys.model.body import Body
 from symphys.model.shapes import Terrain
 from symphys.model.site import Site

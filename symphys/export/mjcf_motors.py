@@ -6,8 +6,8 @@ from math import inf
 from xml.etree.ElementTree import Element
 
 from symphys.export.mjcf_joints import names
-from symphys.export.mjcf_step import Inertias, steepness
 from symphys.export.mjcf_surfaces import text
+from symphys.export.moving.step import Inertias, steepness
 from symphys.model.joints import AffineMotor, Joint, Motor, Servo, TorqueMotor
 from symphys.model.scalar import is_zero
 

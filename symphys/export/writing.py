@@ -9,7 +9,7 @@ from pathlib import Path
 from symphys.export.casadi_files import casadi_files
 from symphys.export.folder import ExportError, write_folders
 from symphys.export.mjcf_departures import Departure
-from symphys.export.mjcf_trial import tried_model
+from symphys.export.moving.trial import tried_model
 from symphys.export.sources import c_files
 from symphys.problem import Problem, require_solvable
 from symphys.problem.loading import Source, load

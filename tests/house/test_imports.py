@@ -23,7 +23,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "interrupts": ("", "", "Ctrl-C"),
     "threads": ("", "", "one thread for linear algebra"),
     "files": ("errors", "numpy", "files appear at once and whole, or not at all"),
-    "archives": ("suggest", "numpy", "archives of arrays, whose sizes are known before they are unpacked"),
+    "archives": ("suggest", "numpy", "archives of arrays"),
     "json_values": ("", "numpy", "tolerant readings of JSON"),
     "trajectory": ("errors suggest", "numpy", "a simulated motion as arrays"),
     "shooting": ("", "numpy", "what solvers see: the shooting problem, whole or step by step"),

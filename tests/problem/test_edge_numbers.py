@@ -7,7 +7,8 @@ import re
 from pathlib import Path
 
 import pytest
-from mutated_files import CHANGES, KINDS, PROBLEM, mutated, outcome
+from mutated_files import CHANGES, KINDS, mutated, outcome
+from mutated_texts import PROBLEM
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem
@@ -33,6 +34,16 @@ def test_a_number_that_is_too_large_is_named(tmp_path: Path, old: str, new: str,
     file = tmp_path / "edge.toml"
     file.write_text(PROBLEM.replace(old, new, 1))
     with pytest.raises(ProblemError, match=re.escape(f"{file}: {place}: ") + ".* is too large to be computed with"):
+        load_problem(file)
+
+
+@pytest.mark.parametrize("kind", ["linear", "cubic"])
+def test_what_changes_within_next_to_no_time_is_named(tmp_path: Path, kind: str) -> None:
+    """A slope of 1e308 and more."""
+    file = tmp_path / "edge.toml"
+    fast = PROBLEM.replace("time = [0, 0.1, 0.2]", "time = [0, 1e-308, 0.2]")
+    file.write_text(fast.replace('"cubic"', f'"{kind}"'))
+    with pytest.raises(ProblemError, match=r'row 3, column "x": 0 becomes 0.5 within 1e-308 s, too fast'):
         load_problem(file)
 
 

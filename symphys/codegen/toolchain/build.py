@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
 import time
 from collections.abc import Iterator, Sequence
@@ -35,6 +36,8 @@ if TYPE_CHECKING:  # what writes C is imported where it is called: a second star
 
 WORTH = 20_000
 """Operations of a kernel that takes long to compile, some seconds."""
+LONG = 30.0
+"""[s] of compiling that is told beforehand."""
 
 
 def compile_program(
@@ -123,6 +126,7 @@ def compiled(
             kernel = kernel_of(first, libraries, threads, started, cached=False)
             kernel.widths.compile(parts, kept.texts, cache, partial(libraries.load, lanes=lanes))
             return kernel, kept
+    announce(operations, libraries.find(lanes) is not None)
     with libraries.built(lanes, parts) as built:
         first = lanes, libraries.load(built.path, lanes)
         return kernel_of(first, libraries, threads, started, built.cached, built.note), kept
@@ -145,6 +149,14 @@ def double_reference(program: Program, names: tuple[str, ...]) -> ProcessorKerne
     kept = KeptPlan(program, planned, names, "", len(planned.functions), operations, None)
     libraries = KeptLibraries(kept, width, cache)
     return kernel_of((width.lanes, libraries.interpreter(planned)), libraries, 1, started, cached=False)
+
+
+def announce(operations: int, kept: bool) -> None:
+    """Say beforehand that compiling takes long, unless the library is kept; by the logger ``symphys``."""
+    seconds = PATIENCE[0] + PATIENCE[1] * operations
+    if seconds >= LONG and not kept:
+        text = "compiling %s operations takes about %.0f s of a processor; it is done once, and kept"
+        logging.getLogger("symphys").warning(text, f"{operations:,}", seconds)
 
 
 def kernel_of(

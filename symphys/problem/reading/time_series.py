@@ -76,12 +76,19 @@ def read_series(text: str, file: str) -> tuple[Array, dict[str, Array]]:
     for k, line in enumerate(lines[1:]):
         if len(line) != len(header):
             raise SeriesError(f"{file}, row {k + 2}: {len(line)} numbers, but the header has {len(header)} columns")
-        for column, (name, cell) in enumerate(zip(header, line, strict=True)):
-            values[k, column] = number(cell, f"{file}, row {k + 2}, column {quote(name)}")
+        for place, (name, cell) in enumerate(zip(header, line, strict=True)):
+            values[k, place] = number(cell, f"{file}, row {k + 2}, column {quote(name)}")
     time = values[:, header.index(TIME)]
     for k in np.flatnonzero(np.diff(time) <= 0)[:1]:
         raise SeriesError(f"{file}, row {k + 3}: the time {time[k + 1]:g} does not come after {time[k]:g}")
-    return time, {name: values[:, column] for column, name in enumerate(header) if name != TIME}
+    columns = {name: values[:, column] for column, name in enumerate(header) if name != TIME}
+    for name, column in columns.items():
+        with np.errstate(over="ignore"):
+            rates = np.abs(np.diff(column)) / np.diff(time)
+        for k in np.flatnonzero(~((rates <= LARGEST) & (np.diff(time) >= 1 / LARGEST)))[:1]:
+            text = f"{column[k]:g} becomes {column[k + 1]:g} within {time[k + 1] - time[k]:g} s"
+            raise SeriesError(f"{file}, row {k + 3}, column {quote(name)}: {text}, too fast to be computed with")
+    return time, columns
 
 
 def number(cell: str, where: str) -> float:

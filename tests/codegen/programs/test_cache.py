@@ -326,3 +326,16 @@ def test_what_was_left_goes_whatever_the_clock_says(tmp_path: Path, monkeypatch:
         (own.folder / ".new-left").touch()
         own.clear()
         assert [path.name for path in own.folder.iterdir()] == [".held.lock"]
+
+
+def test_a_long_compile_is_told_beforehand_once(
+    tmp_path: Path, monkeypatch: Patch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """With the seconds that its operations take; what is kept takes none."""
+    monkeypatch.setattr("symphys.codegen.toolchain.build.LONG", 2.0)
+    for _ in range(2):
+        compile_program(programs.pendulum(), cache=Cache(tmp_path / "cache"), threads=1)
+    (record,) = caplog.records
+    operations = int(record.getMessage().split()[1].replace(",", ""))
+    assert record.name == "symphys" and operations > 0
+    assert f"about {2 + 1e-4 * operations:.0f} s" in record.getMessage()

@@ -70,7 +70,7 @@ def trial(problem: Problem, text: str) -> Departure:
 
     work = len(problem.world().bodies) * problem.simulation.steps
     motion = own_motion(problem) if work <= MOST_WORK else None
-    replayed = Replay(mujoco, problem.world(), text, motion)
+    replayed = MujocoReplay(mujoco, problem.world(), text, motion)
     seconds, dt = min(SECONDS, problem.simulation.duration), problem.simulation.dt
     place, turn = (0.0, ""), (0.0, "")
     for k in range(round(seconds / dt)):
@@ -102,7 +102,7 @@ def own_motion(problem: Problem) -> Trajectory | None:
         return None
 
 
-class Replay:
+class MujocoReplay:
     """A model of MuJoCo that is driven as a motion was; without one, by commands of 0."""
 
     def __init__(self, mujoco: Any, world: World, text: str, motion: Trajectory | None) -> None:
