@@ -114,7 +114,7 @@ def test_other_settings_overwrite_nothing_in_either_order(
 ) -> None:
     """The file as it is, two settings, and all again: every run is kept, and the page and the table name them."""
     draw = write_batch_report
-    monkeypatch.setattr("symphys.report.making.batch.write_batch_report", lambda out: out / "index.html")
+    monkeypatch.setattr("symphys.report.making.batch.write_batch_report", lambda out, unmade: out / "index.html")
     asked = [(), ("--set", "ground.friction=0.3"), ("--set", "ground.friction=0.6")]
     for settings in asked:
         code, out, _ = run("solve", throw, "--solver", "least_squares", *settings, *QUICK)
