@@ -7,7 +7,7 @@ up to rounding, no point of its rim is the deepest, and the three are marked on 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, pi, sin
 
 import casadi as ca
@@ -89,16 +89,31 @@ def own_direction(normal: Expr, frame: tuple[Parabola, Parabola, Parabola], t: E
     return ca.dot(down, x), ca.dot(down, y)
 
 
+def without_spin(path: PredictedPath, axis: Expr, normal: Expr) -> PredictedPath:
+    """The path of a cylinder without its spin about its axis, unless it stands on a face.
+
+    Points of a rim that touch stay where they are as a wheel turns. Carried along, those at the top of a wheel that
+    turns by more than 1.2 rad a step would seem to go through the ground. On a face the points turn with the body.
+    """
+    lies = 1 - ca.dot(axis, normal) ** 2
+
+    def without(rate: Expr) -> Expr:
+        return rate - lies * axis * ca.dot(axis, rate)
+
+    turning = without(path.angular_velocity), without(path.angular_acceleration)
+    return replace(path, angular_velocity=turning[0], angular_acceleration=turning[1])
+
+
 def cylinder_plane(cylinder: Cylinder, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
     """Six points."""
     normal, frame = ca.vertcat(*plane.normal), axes(a, cylinder)
-    found = []
+    rolling, found = without_spin(a, frame[2].start, normal), []
     for sign in SIGNS:
         centre = placed(cylinder, (0.0, 0.0, sign * cylinder.half_length))
         rim = RimOnPlane(normal, plane.offset, cylinder.radius, a.path(centre), a.arm(centre), frame[2], frame[0])
         deepest = contact_along(rim, a.dt)
         down = own_direction(normal, frame, deepest.time)
-        beside = [ball_on_plane(a, rim_point(cylinder, sign, down, turn), 0.0, plane) for turn in BESIDE]
+        beside = [ball_on_plane(rolling, rim_point(cylinder, sign, down, turn), 0.0, plane) for turn in BESIDE]
         found += [deepest, *beside]
     return found
 
@@ -106,11 +121,14 @@ def cylinder_plane(cylinder: Cylinder, plane: Plane, a: PredictedPath, _: Predic
 def cylinder_terrain(cylinder: Cylinder, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
     """Six points, which the body carries through the step: chosen by the slope of the ground below each rim."""
     frame, surface, found = axes(a, cylinder), surface_of(terrain), list[Contact]()
+    centre = a.centre().start
+    rolling = without_spin(a, frame[2].start, upwards(surface(centre[:2])[1]))
     for sign in SIGNS:
         centre = placed(cylinder, (0.0, 0.0, sign * cylinder.half_length))
         place = a.path(centre).start
         for _round in range(2):
             down = own_direction(upwards(surface(place[:2])[1]), frame, ca.SX(0))
             place = a.path(rim_point(cylinder, sign, down, 0.0)).start
-        found += [ball_on_terrain(rim_point(cylinder, sign, down, turn), 0.0, terrain, a) for turn in (0.0, *BESIDE)]
+        points = [rim_point(cylinder, sign, down, turn) for turn in (0.0, *BESIDE)]
+        found += [ball_on_terrain(point, 0.0, terrain, rolling) for point in points]
     return found
