@@ -81,13 +81,14 @@ class Heightfield:
         """The height at a place [m]; casadi scalars or numbers in, a casadi scalar out."""
         parts = self._terms((y - self.origin[1]) / self.spacing[1], (x - self.origin[0]) / self.spacing[0])
         found = [combined(*part) for part in parts]
-        return total([1.0] * len(found), found)
+        return sum(found, 0 * x)  # a grid of zeros has no part
 
     def on_grid(self, rows: Array, columns: Array) -> Array:
         """(m, n) [m]: the heights at m places along y and n along x, on the grid's scale."""
         parts = self._terms(ca.DM(rows), ca.DM(columns))
         sides = [[np.array(ca.horzcat(*each)) for each in (along, across)] for along, _, across in parts]
-        return np.asarray(sum(along @ part[1] @ across.T for (along, across), part in zip(sides, parts, strict=True)))
+        found = (along @ part[1] @ across.T for (along, across), part in zip(sides, parts, strict=True))
+        return np.asarray(sum(found, np.zeros((len(rows), len(columns)))))
 
     def off_triangles(self, heights: Array | None = None) -> float:
         """How far it is from the triangles between heights over the same area, whichever way squares are cut [m].
