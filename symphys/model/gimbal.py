@@ -11,8 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
-from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 SINGULAR = 1e-5
@@ -43,6 +41,8 @@ class Screw:
 
 def locks(chain: Sequence[Screw]) -> bool:
     """Whether a chain, from one body with mass to the other, has a pose within its bounds in which it is singular."""
+    from scipy.optimize import minimize  # a start without such chains loads no scipy
+
     if len(chain) > 6 + sum(each.carried for each in chain):
         return True
     inner, rng = list(chain[1:-1]), np.random.default_rng(0)
@@ -63,6 +63,8 @@ def locks(chain: Sequence[Screw]) -> bool:
 
 def _least(chain: Sequence[Screw], q: Array) -> float:
     """The least singular value of the chain's screws, with a row for each rotor."""
+    from scipy.spatial.transform import Rotation
+
     points = [each.point for each in chain if each.point is not None]
     size = max((float(np.linalg.norm(a - points[0])) for a in points), default=0.0) or 1.0
     centre = points[0] if points else np.zeros(3)

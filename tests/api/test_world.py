@@ -57,7 +57,9 @@ def test_joints_move_alike() -> None:
     made = Problem.from_world(world, start, duration=0.3)
     commands = [f"{joint.name}.command" for joint in world.joints if joint.driven]
     states = [np.array(initial_state(*each)) for each in ((world, start), (made.world(), made.initial))]
-    assert np.allclose(*states, rtol=0, atol=1e-12)
+    layout = Layout(world)
+    poses = [name for name in layout.names() if not name.endswith(".unwrapped")]  # these tell whole turns only
+    assert all(np.allclose(*(x[layout[name]] for x in states), rtol=0, atol=1e-12) for name in poses)
     ends = []
     for each, x in zip((world, made.world()), states, strict=True):
         step = step_function(each, Scheme(dt=0.01, sweeps=5), commands)

@@ -27,7 +27,7 @@ def test_ctrl_c_is_not_swallowed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         if place == "a run":
             lose()
 
-    def write_batch_report(folder: Path) -> Path:
+    def write_batch_report(folder: Path, unmade: object) -> Path:
         made.append(folder)
         lose()
         return folder

@@ -16,6 +16,7 @@ import os
 import random
 import shutil
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -227,7 +228,7 @@ def make_world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Call
     monkeypatch.setattr(claims, "myself", myself)
     monkeypatch.setattr(claims, "machine", lambda: actor.machine if (actor := current()) else "later")
     monkeypatch.setattr(claims.Owner, "alive", property(alive))
-    monkeypatch.setattr(claims, "time", SimpleNamespace(monotonic=lambda: worlds[-1].clock))
+    monkeypatch.setattr(claims, "time", SimpleNamespace(monotonic=lambda: worlds[-1].clock, sleep=time.sleep))
 
     def make(seed: int) -> World:
         shutil.rmtree(tmp_path / "run", ignore_errors=True)

@@ -15,7 +15,7 @@ Without v this is the impulse that acts beside a over kick = (d + d_) / 2,
 
 so that one oscillator is exact at any step, and several on one body are leapfrog with heavier masses and with dampers
 on mean velocities, which keeps energy and is stable. Beyond w d of about 1, b is at least what keeps up to six of them
-stable on one body.
+stable on one body. From w d = 1.5 to 2.5 the law goes over to implicit Euler, which damps what a step cannot resolve.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+
+from symphys.maths.smoothing import clip
 
 Expr = Any
 """casadi SX, MX or DM"""
@@ -38,6 +40,8 @@ TERMS = 7
 """Of the power series."""
 LEAST = 1e-12
 """Of b, by which softness divides."""
+RESOLVED, UNRESOLVED = 1.5, 2.5
+"""[rad] w d up to which the law is exact, and from which on it is implicit Euler."""
 TOGETHER = 1 / 6
 """One over the number of equal oscillators on one body that are stable at any step."""
 
@@ -71,7 +75,7 @@ def response(omega: Expr, ratio: Expr, time: Expr) -> Response:
     """The exact solution over ``time`` [s]; ``ratio`` < 0 for backwards. By power series and doubling of the time."""
     angle = omega * time
     longest = ca.fmin(LONGEST, DAMPED / ca.fmax(ca.fabs(ratio), 1))
-    held = ca.fmin(angle, longest)
+    held = ca.fmin(ca.fmax(angle, 0), longest)
     x = held / 2**DOUBLINGS
     series = [ca.SX(1)]
     before = ca.SX(0)
@@ -96,8 +100,8 @@ class SpringLaw:
     Attributes:
         stiff: kick w^2 [1/s].
         b, c: of the mean velocity over the step, and over the step before.
-        end, end_before: of the same in the force -mass (w^2 e + end u + end_before u_) that goes on acting [1/s]. With
-            it the velocity at the end of the step is exact; the next step takes it off again.
+        end, end_before: of the same in the force impulse / kick - mass (end u + end_before u_) that goes on acting
+            [1/s^2]. With it the velocity at the end of the step is exact; the next step takes it off again.
     """
 
     stiff: Expr
@@ -119,4 +123,16 @@ def spring_law(forward: Response, backward: Response) -> SpringLaw:
     kept = forward.kept / backward.sigma
     pushed = d * forward.sigma + kept * before * backward.p / 2
     gained = (pushed / half - 1) / kick
-    return SpringLaw(stiff, b, c, 1 / half - gained * (1 + b), gained * (1 - c) - kept / half)
+    end, end_before = 1 / half - gained * (1 + b), gained * (1 - c) - kept / half
+
+    # beyond a step's reach: implicit Euler, which sweeps that have not settled do not drive apart
+    damper = forward.omega * (forward.omega * d + 2 * forward.ratio)
+    share = clip((forward.omega * d - RESOLVED) / (UNRESOLVED - RESOLVED), 0, 1, 0)
+    resolved = 1 - share
+    return SpringLaw(
+        stiff=stiff,
+        b=resolved * b + share * kick * damper,
+        c=resolved * c,
+        end=resolved * (end - b / kick),
+        end_before=resolved * (end_before - c / kick),
+    )

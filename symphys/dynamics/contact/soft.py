@@ -60,27 +60,31 @@ class SoftImpulse:
     Attributes:
         softness: gamma [1/kg].
         target: the velocity that its projection aims at [m/s].
-        slope, constant: the force at the end of the substep is slope u + constant [N], with u the velocity in its
-            middle.
+        lasts: 1 if a force goes on acting.
+        kick: [s]; slope, constant: that force is impulse / kick + slope u + constant [N], with u the velocity in the
+            middle of the substep.
         late: what surfaces that meet or part have got by the end of the substep beside its impulse [N s].
     """
 
     softness: Expr
     target: Expr
+    lasts: Expr
+    kick: Expr
     slope: Expr
     constant: Expr
     late: Expr
 
     def lasting(self, velocity: Expr, normal: Expr) -> Expr:
         """The normal force that goes on acting [N], from the velocity and the normal impulse after the sweeps."""
-        return ca.if_else(normal > 0, ca.fmax(self.slope * velocity + self.constant, 0), 0)
+        force = normal / self.kick + self.slope * velocity + self.constant
+        return ca.if_else(normal > 0, self.lasts * ca.fmax(force, 0), 0)
 
 
 def soft_impulse(law: Law, at: SoftApproach) -> SoftImpulse:
     """The law of a soft contact over a substep; where it is not active it does nothing."""
     omega, ratio, d, mass = 2 * ca.pi * law.frequency, law.damping, at.duration, 1 / at.inverse_mass
     lasted = at.force > 0
-    before = ca.if_else(lasted, 2 * at.lag, 0)
+    before = ca.if_else(lasted, 2 * ca.fmax(at.lag, 0), 0)
     kick, a = (d + before) / 2, at.acceleration
     backward = response(omega, -ratio, before)
     flight = ca.if_else(at.active, at.time, d)
@@ -113,8 +117,10 @@ def soft_impulse(law: Law, at: SoftApproach) -> SoftImpulse:
     return SoftImpulse(
         softness=at.inverse_mass / b,
         target=wanted / b,
+        lasts=lasts,
+        kick=kick,
         slope=ca.if_else(lasts, -mass * whole_law.end, 0),
-        constant=ca.if_else(lasts, -mass * (omega**2 * e + whole_law.end_before * base), 0),
+        constant=ca.if_else(lasts, -mass * whole_law.end_before * base, 0),
         late=ca.if_else(event, mass * late, 0),
     )
 

@@ -99,12 +99,12 @@ def lock_constraint(frames: JointFrames, motions: Motions, substep: SubstepTimes
     k, error = regular_mobility(terms, seen, same), errors(joint, now)
     softness, target, lasting = ca.SX(k.size1(), 1), ca.SX(k.size1(), 1), None
     if joint.soft:
-        omega, law = 2 * ca.pi * joint.frequency, _spring_law(joint, substep)
+        law = _spring_law(joint, substep)
         at_start = ca.diag(regular_mobility(frames.terms(motions, start, start), given, same))
         rate, due = _path_rates(frames, motions, terms, (given, seen))
         before = rate - 2 * substep.lag / substep.duration * (due - rate)
         softness, target = at_start / law.b, -(law.stiff * error + law.c * before) / law.b
-        lasting = LastingForce(-law.end / at_start, -(omega**2 * error + law.end_before * before) / at_start)
+        lasting = LastingForce(substep.kick, -law.end / at_start, -law.end_before * before / at_start)
     return LockConstraint(
         terms=terms,
         seen=seen,

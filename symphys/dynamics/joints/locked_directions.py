@@ -18,8 +18,12 @@ Expr = Any
 
 @dataclass(frozen=True)
 class LastingForce:
-    """The forces (n,) slope u + constant of springs and dampers at the end of a substep, from the velocities u (n,)."""
+    """The forces (n,) impulse / kick + slope u + constant of springs and dampers at the end of a substep.
 
+    They follow from the impulses and the velocities u (n,) after the sweeps.
+    """
+
+    kick: Expr
     slope: Expr
     constant: Expr
 
@@ -56,10 +60,11 @@ class LockConstraint:
         """(n,): displacements by the directions moved to impulses times a time that close what is then left open."""
         return -ca.mtimes(self.mass, self.error + moved)
 
-    def at_end(self, momenta: tuple[Any, ...]) -> JointImpulse:
-        """The force of a joint that is soft at the end of the substep, from the velocities after the sweeps."""
+    def at_end(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> JointImpulse:
+        """The force of a joint that is soft at the end of the substep, from what the sweeps found."""
         assert self.lasting is not None
-        return JointImpulse(self.lasting.slope * speeds(self.terms, self.seen, momenta) + self.lasting.constant)
+        moving = self.lasting.slope * speeds(self.terms, self.seen, momenta)
+        return JointImpulse(impulse.numbers / self.lasting.kick + moving + self.lasting.constant)
 
     def carried(self, impulse: JointImpulse) -> Expr:
         """(n,): what is stored of an impulse; also of a force."""

@@ -107,7 +107,7 @@ def _lasting_forces(
     for each, impulse in zip(constraints, given, strict=True):
         if isinstance(each.placed.constraint, LockConstraint) and each.placed.constraint.lasting is not None:
             moving = tuple(solved[i] for i in each.placed.carriers)
-            forces[each.name] = [_sprung(each.placed.constraint, moving)]
+            forces[each.name] = [_sprung(each.placed.constraint, moving, impulse)]
             continue
         constraint, impact, old = each.placed.constraint, of_body(struck, each.placed.bodies[0]), x[each.name]
         force = _lasting(constraint, impulse, own(old, each.k), impact, (kick, x["lag"], context.shortest_kick))
@@ -116,8 +116,8 @@ def _lasting_forces(
 
 
 @traced
-def _sprung(constraint: LockConstraint, momenta: tuple[Any, ...]) -> Expr:
-    return constraint.carried(constraint.at_end(momenta))
+def _sprung(constraint: LockConstraint, momenta: tuple[Any, ...], impulse: JointImpulse) -> Expr:
+    return constraint.carried(constraint.at_end(momenta, impulse))
 
 
 def of_body(struck: Struck, body: int) -> Expr:

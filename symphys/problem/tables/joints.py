@@ -7,7 +7,6 @@ from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from symphys.model.gimbal import Screw, locks
 from symphys.model.joints import (
@@ -121,6 +120,8 @@ def _crossed(joint: ParametricJoint, body: str | None, pose: Array, screws: list
 
 
 def _pose(frame: JointFrame) -> Array:
+    from scipy.spatial.transform import Rotation  # a start without such chains loads no scipy
+
     found = np.eye(4)
     found[:3, :3] = Rotation.from_quat(np.array(frame.orientation, float), scalar_first=True).as_matrix()
     found[:3, 3] = np.array(frame.point, float)

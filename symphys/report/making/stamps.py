@@ -29,6 +29,7 @@ OWN_PAGES = frozenset({RUN_PAGE, BATCH_PAGE})
 """What lies in a folder and is made from it."""
 PACKAGE = Path(__file__).parents[2]
 DRAWING = (
+    "archives.py",
     "errors.py",
     "files.py",
     "findings",

@@ -198,7 +198,8 @@ def test_several_turns_in_a_step_count(spin: float) -> None:
 def test_angles_wind_where_impacts_cut_steps() -> None:
     """A wheel that may meet two others, of which one falls onto the other: steps are cut at impacts."""
     below = [ball(name, position=(2, 0, z)) for name, z in (("first", 0.2), ("second", 0.7))]
-    world = make_world([ball("wheel", (0, 20, 0)), *below], [symphys.Plane.ground()], joints=[axle()])
+    bodies, ground = [ball("wheel", (0, 20, 0)), *below], symphys.Plane("ground", (0, 0, 1), -1.0)
+    world = make_world(bodies, [ground], joints=[axle()])
     found = symphys.simulate(Problem.from_world(world, duration=1.0, dt=0.01))
     np.testing.assert_allclose(found["axle.angle"].ravel(), 20 * found.time, atol=1e-9)
 
