@@ -52,7 +52,7 @@ CENTRES = 1, 1, 0, 0
 """Of the steps: 1 with loads about 0, 0 about those that were found."""
 LARGEST = 40
 """Velocities of a group that is solved at once."""
-FAR = 4.0
+FAR = 100.0
 """Of the energies from which a step may start: how large that of the step may be."""
 TINY = 1e-30
 """[J] the least that a step may reach, so that its slope is finite at rest."""
@@ -183,7 +183,7 @@ def _stepped(
         _given(each.lever, a, b, tuple(changes[k] for k in each.own))
         for each, (_, _, a, b) in zip(members, answers, strict=True)
     ]
-    share = _share(metric, tuple((each.own, each.lever, part) for each, part in zip(members, given, strict=True)), reach)
+    share = _share(tuple((each.lever, part) for each, part in zip(members, given, strict=True)), reach)
     for each, part in zip(members, given, strict=True):
         carriers = tuple(group.carriers[k] for k in each.own)
         states = tuple(momenta[i] for i in carriers)
@@ -328,14 +328,10 @@ def _reach(metric: tuple[Expr, ...], states: States, missed: Expr, count: int) -
 
 
 @traced
-def _share(metric: tuple[Expr, ...], parts: tuple[tuple[tuple[int, ...], Lever, Expr], ...], reach: Expr) -> Expr:
-    """Of a step, at most 1, which stays within reach."""
-    sizes = [each.shape[0] for each in metric]
-    starts = [0, *accumulate(sizes)]
-    change = ca.SX.zeros(starts[-1])
-    for own, lever, given in parts:
-        change[[j for k in own for j in range(starts[k], starts[k + 1])]] += ca.mtimes(lever.responses, given)
-    return ca.sqrt(reach / ca.fmax(reach, _energy(metric, change)))
+def _share(parts: tuple[tuple[Lever, Expr], ...], reach: Expr) -> Expr:
+    """Of a step, at most 1: so much that what each constraint does by itself stays within reach."""
+    energies = (ca.dot(ca.mtimes(lever.responses, x), ca.mtimes(lever.momenta, x)) for lever, x in parts)
+    return ca.sqrt(reach / ca.fmax(reach, sum(energies)))
 
 
 @traced
