@@ -301,6 +301,15 @@ class Push:
         """The displacements after a push."""
         return _given(self.constraint, along, impulse.numbers * self.constraint.normal)
 
+    def project(
+        self, along: tuple[TreeDisplacement, ...], old: JointImpulse
+    ) -> tuple[tuple[TreeDisplacement, ...], JointImpulse]:
+        """The displacements after ``_push``, and what all pushes come to."""
+        after, new = _push(
+            self.constraint, self.contact, self.lasts, self._moved(along), along, old.numbers, self.share
+        )
+        return after, JointImpulse(new)
+
     def linearised(
         self, along: tuple[TreeDisplacement, ...], old: JointImpulse, softness: Expr, centre: float
     ) -> tuple[Expr, Expr]:

@@ -52,6 +52,10 @@ CENTRES = 1, 1, 0, 0
 """Of the steps: 1 with loads about 0, 0 about those that were found."""
 LARGEST = 40
 """Velocities of a group that is solved at once."""
+FAR = 100.0
+"""Of the energies from which a step may start: how large that of the step may be."""
+TINY = 1e-30
+"""[J] the least that a step may reach, so that its slope is finite at rest."""
 
 
 @dataclass(frozen=True)
@@ -137,31 +141,78 @@ def solve_together(
         softness: of contacts; see ``contact_softness``.
         centres: of each step 1 if loads of that softness are counted from 0, 0 if from those that were found.
     """
-    momenta, impulses = list(start.momenta), list(start.impulses)
-    metric = _metric(trees, group.carriers, momenta)
-    members = []
-    for number in group.constraints:
-        placed = constraints[number]
-        carriers = tuple(dict.fromkeys(placed.carriers))
-        own = tuple(group.carriers.index(i) for i in carriers)
-        sides = tuple(carriers.index(i) for i in placed.carriers)
-        states, masses = tuple(momenta[i] for i in carriers), tuple(metric[k] for k in own)
-        lever = _lever(placed.constraint, impulses[number], states, sides, masses)
-        members.append(Member(number, placed, own, lever))
+    metric = _metric(trees, group.carriers, start.momenta)
+    members = [_member(group, number, constraints[number], metric, start) for number in group.constraints]
+    own = tuple(start.momenta[i] for i in group.carriers)
+    missed = _missed(metric, members, start)
+    reach = _reach(metric, own, missed, len(members))
+    best, now = start, start
     for centre in centres:
-        answers = []
-        for each in members:
-            states = tuple(momenta[i] for i in each.placed.carriers)
-            constraint, old = each.placed.constraint, impulses[each.number]
-            answers.append(_answer(constraint, each.lever, states, old, softness, centre))
-        parts = tuple((each.own, *answer[:2]) for each, answer in zip(members, answers, strict=True))
-        changes = _changes(metric, parts)
-        for each, (_, _, *answer) in zip(members, answers, strict=True):
-            carriers = tuple(group.carriers[k] for k in each.own)
-            states, change = tuple(momenta[i] for i in carriers), tuple(changes[k] for k in each.own)
-            moved, impulses[each.number] = _moved(each.lever, tuple(answer), change, states, impulses[each.number])
-            for i, state in zip(carriers, moved, strict=True):
-                momenta[i] = state
+        now = _stepped(group, metric, members, now, (softness, centre), reach)
+        after = _missed(metric, members, now)
+        best, missed = _better(group, (missed, best), (after, now)), _less(after, missed)
+    return best
+
+
+def _member(
+    group: Group, number: int, placed: PlacedConstraint, metric: tuple[Expr, ...], start: Iterate
+) -> Member:
+    carriers = tuple(dict.fromkeys(placed.carriers))
+    own = tuple(group.carriers.index(i) for i in carriers)
+    sides = tuple(carriers.index(i) for i in placed.carriers)
+    states, masses = tuple(start.momenta[i] for i in carriers), tuple(metric[k] for k in own)
+    lever = _lever(placed.constraint, start.impulses[number], states, sides, masses)
+    return Member(number, placed, own, lever)
+
+
+def _stepped(
+    group: Group,
+    metric: tuple[Expr, ...],
+    members: Sequence[Member],
+    now: Iterate,
+    soft: tuple[Expr, int],
+    reach: Expr,
+) -> Iterate:
+    """After a step of Newton's method, shortened to an energy of ``reach``."""
+    momenta, impulses = list(now.momenta), list(now.impulses)
+    answers = []
+    for each in members:
+        states = tuple(momenta[i] for i in each.placed.carriers)
+        answers.append(_answer(each.placed.constraint, each.lever, states, impulses[each.number], *soft))
+    changes = _changes(metric, tuple((each.own, *part[:2]) for each, part in zip(members, answers, strict=True)))
+    given = [
+        _given(each.lever, a, b, tuple(changes[k] for k in each.own))
+        for each, (_, _, a, b) in zip(members, answers, strict=True)
+    ]
+    share = _share(tuple((each.lever, part) for each, part in zip(members, given, strict=True)), reach)
+    for each, part in zip(members, given, strict=True):
+        carriers = tuple(group.carriers[k] for k in each.own)
+        states = tuple(momenta[i] for i in carriers)
+        moved, impulses[each.number] = _moved(each.lever, part, share, states, impulses[each.number])
+        for i, state in zip(carriers, moved, strict=True):
+            momenta[i] = state
+    return Iterate(tuple(momenta), tuple(impulses), tuple(impulses))
+
+
+def _missed(metric: tuple[Expr, ...], members: Sequence[Member], now: Iterate) -> Expr:
+    """[J] kinetic energy of what a projection of each constraint would change, all from the same velocities."""
+    found = []
+    for each in members:
+        carriers = tuple(dict.fromkeys(each.placed.carriers))
+        sides = tuple(carriers.index(i) for i in each.placed.carriers)
+        states, masses = tuple(now.momenta[i] for i in carriers), tuple(metric[k] for k in each.own)
+        found.append(_miss(each.placed.constraint, states, sides, now.impulses[each.number], masses))
+    return _sum(tuple(found))
+
+
+def _better(group: Group, first: tuple[Expr, Iterate], second: tuple[Expr, Iterate]) -> Iterate:
+    """The iterate that misses less."""
+    (missed, best), (after, now) = first, second
+    momenta, impulses = list(best.momenta), list(best.impulses)
+    for i in group.carriers:
+        momenta[i] = _chosen_state(after, missed, now.momenta[i], best.momenta[i])
+    for k in group.constraints:
+        impulses[k] = _chosen_impulse(after, missed, now.impulses[k], best.impulses[k])
     return Iterate(tuple(momenta), tuple(impulses), tuple(impulses))
 
 
@@ -265,10 +316,65 @@ def _changes(metric: tuple[Expr, ...], parts: tuple[tuple[tuple[int, ...], Expr,
 
 
 @traced
+def _given(lever: Lever, a: Expr, b: Expr, changes: tuple[Expr, ...]) -> Expr:
+    """(k,): the change of an impulse."""
+    return a - ca.mtimes(b, ca.mtimes(lever.rates, ca.vertcat(*changes)))
+
+
+@traced
+def _reach(metric: tuple[Expr, ...], states: States, missed: Expr, count: int) -> Expr:
+    """[J] what no step goes beyond: energies of the velocities, and of all projections were they to add up."""
+    velocities = ca.vertcat(*(_flat(state) for state in states))
+    return FAR * (_energy(metric, velocities) + count * missed) + TINY
+
+
+@traced
+def _share(parts: tuple[tuple[Lever, Expr], ...], reach: Expr) -> Expr:
+    """Of a step, at most 1: so much that what each constraint does by itself stays within reach."""
+    energies = (ca.dot(ca.mtimes(lever.responses, x), ca.mtimes(lever.momenta, x)) for lever, x in parts)
+    return ca.sqrt(reach / ca.fmax(reach, sum(energies)))
+
+
+@traced
 def _moved(
-    lever: Lever, answer: tuple[Expr, ...], changes: tuple[Expr, ...], momenta: States, old: AnyImpulse
+    lever: Lever, given: Expr, share: Expr, momenta: States, old: AnyImpulse
 ) -> tuple[States, AnyImpulse]:
-    a, b = answer
-    given = a - ca.mtimes(b, ca.mtimes(lever.rates, ca.vertcat(*changes)))
-    after = ca.vertcat(*(_flat(state) for state in momenta)) + ca.mtimes(lever.responses, given)
-    return tuple(_cut(after, momenta)), old.plus(old.like(given))
+    after = ca.vertcat(*(_flat(state) for state in momenta)) + share * ca.mtimes(lever.responses, given)
+    return tuple(_cut(after, momenta)), old.plus(old.like(share * given))
+
+
+@traced
+def _miss(
+    constraint: VelocityConstraint, states: States, sides: tuple[int, ...], old: AnyImpulse, metric: tuple[Expr, ...]
+) -> Expr:
+    after, _ = constraint.project(tuple(states[k] for k in sides), old)
+    by_carrier = dict(zip(sides, after, strict=True))
+    change = ca.vertcat(*(_flat(by_carrier[k]) - _flat(state) for k, state in enumerate(states)))
+    return _energy(metric, change)
+
+
+def _energy(metric: tuple[Expr, ...], velocities: Expr) -> Expr:
+    """[J] twice the kinetic energy."""
+    return ca.dot(velocities, ca.mtimes(ca.diagcat(*metric), velocities))
+
+
+@traced
+def _sum(energies: tuple[Expr, ...]) -> Expr:
+    return sum(energies)
+
+
+@traced
+def _less(one: Expr, other: Expr) -> Expr:
+    return ca.fmin(one, other)
+
+
+@traced
+def _chosen_state(after: Expr, missed: Expr, now: State, best: State) -> State:
+    (chosen,) = _cut(ca.if_else(after < missed, _flat(now), _flat(best)), (best,))
+    return chosen
+
+
+@traced
+def _chosen_impulse(after: Expr, missed: Expr, now: AnyImpulse, best: AnyImpulse) -> AnyImpulse:
+    taken = ca.if_else(after < missed, 1, 0)
+    return best.times(1 - taken).plus(now.times(taken))
