@@ -155,9 +155,11 @@ class Scheme:
             up to 2.4 times the work of a step without any; without any, gradients of a ball that rolls into a cushion
             are wrong at any step size. None: 2 where a body may be hit off its centre, as boxes are, else 1.
         energy_cap: no impact raises the kinetic energy, which Newton's restitution with friction can.
-        load_sharing: points of one body that lie in a plane share their load linearly, as on an elastic foundation, and
-            what several faces, wheels or feet carry is shared by least squares; without it the share of four corners
-            depends on all that was before, and so does friction as they turn.
+        load_sharing: points of one body that lie in a plane share their load linearly, as on an elastic foundation;
+            without it the share of four corners depends on all that was before, and so does friction as they turn.
+        newton_start: all constraints on a few bodies are solved together by Newton's method before the sweeps. What
+            several faces, wheels or feet carry is then shared by least squares, and impacts on points close together
+            settle; without it the order of the sweeps decides.
         impact_friction: let friction at an impact aim at the velocity at the instant of impact.
     """
 
@@ -171,6 +173,7 @@ class Scheme:
     cuts: int | None = None
     energy_cap: bool = True
     load_sharing: bool = True
+    newton_start: bool = True
 
 
 def make_world(

@@ -93,8 +93,7 @@ class Member:
 
 def open_groups(context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State]) -> list[Group]:
     """Those whose loads may be open, or whose points may lie close together."""
-    return []
-    if context.sample or not context.settings.scheme.load_sharing:
+    if context.sample or not context.settings.scheme.newton_start:
         return []
     members: dict[int, set[int]] = {k: {k} for k, state in enumerate(states) if state is not None}
     for each in constraints:
@@ -154,9 +153,7 @@ def solve_together(
     return best
 
 
-def _member(
-    group: Group, number: int, placed: PlacedConstraint, metric: tuple[Expr, ...], start: Iterate
-) -> Member:
+def _member(group: Group, number: int, placed: PlacedConstraint, metric: tuple[Expr, ...], start: Iterate) -> Member:
     carriers = tuple(dict.fromkeys(placed.carriers))
     own = tuple(group.carriers.index(i) for i in carriers)
     sides = tuple(carriers.index(i) for i in placed.carriers)
@@ -336,9 +333,7 @@ def _share(parts: tuple[tuple[Lever, Expr], ...], reach: Expr) -> Expr:
 
 
 @traced
-def _moved(
-    lever: Lever, given: Expr, share: Expr, momenta: States, old: AnyImpulse
-) -> tuple[States, AnyImpulse]:
+def _moved(lever: Lever, given: Expr, share: Expr, momenta: States, old: AnyImpulse) -> tuple[States, AnyImpulse]:
     after = ca.vertcat(*(_flat(state) for state in momenta)) + share * ca.mtimes(lever.responses, given)
     return tuple(_cut(after, momenta)), old.plus(old.like(share * given))
 

@@ -75,6 +75,11 @@ class SimulationTable(SchemaTable):
         description="points of a body that lie in a plane share their load linearly; without it the share depends on "
         "all that was before",
     )
+    newton_start: bool = Field(
+        default=DEFAULT.newton_start,
+        description="all constraints on a few bodies are solved together before the sweeps: what several faces, wheels "
+        "or feet carry is shared by least squares, and impacts on points close together settle",
+    )
 
 
 class WorldTable(SchemaTable):
