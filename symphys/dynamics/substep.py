@@ -126,7 +126,7 @@ def advance(
 
     # 8. what is stored: persistent forces (20), velocities (21)
     values: State = {"lag": half}
-    momenta, rotors = _with_late_impulses(constraints, impulses, momenta), Rotors()
+    (whole, momenta), rotors = _with_late_impulses(constraints, impulses, momenta), Rotors()
     reactions = _store_forces(context, constraints, impulses, solved.momenta, kick, values)
     if world.joints:
         struck, forces = lasting_forces(context, constraints, joints, by_joints, solved.momenta, x, kick)
@@ -137,7 +137,7 @@ def advance(
         values |= _kept(context, joints, forces) | angles
     values |= _moving_bodies(context, motions, momenta, reactions, poses, rotors)
     changes = zip(solved.impulses, solved.last, strict=True)
-    return Substep(values, tuple(constraints), tuple(contacts), impulses, tuple(changes))
+    return Substep(values, tuple(constraints), tuple(contacts), whole, tuple(changes))
 
 
 def _poses(
@@ -267,19 +267,20 @@ def _lagging(context: StepContext, x: State, bodies: Sequence[int]) -> tuple[tup
 
 def _with_late_impulses(
     constraints: Sequence[PlacedConstraint], impulses: Sequence[ContactImpulse], momenta: Momenta
-) -> Momenta:
-    """The momenta with what soft contacts that begin or end have given by the end of the substep."""
-    given = [(each, impulse) for each, impulse in zip(constraints, impulses, strict=True) if each.constraint.law.soft]
-    found = [opened(each, k) if given else each for k, each in enumerate(momenta)]
-    for each, impulse in given:
-        moved = _late(each.constraint, impulse, tuple(found[i] for i in each.bodies))
-        for i, after in zip(each.bodies, moved, strict=True):
+) -> tuple[tuple[ContactImpulse, ...], Momenta]:
+    """Impulses and momenta with what soft contacts that begin or end have given by the end of the substep."""
+    whole, soft = list(impulses), [k for k, each in enumerate(constraints) if each.constraint.law.soft]
+    found = [opened(each, k) if soft else each for k, each in enumerate(momenta)]
+    for k in soft:
+        bodies = constraints[k].bodies
+        whole[k], moved = _late(constraints[k].constraint, impulses[k], tuple(found[i] for i in bodies))
+        for i, after in zip(bodies, moved, strict=True):
             found[i] = after
-    return tuple(found)
+    return tuple(whole), tuple(found)
 
 
 @traced
-def _late(constraint: ContactConstraint, impulse: ContactImpulse, momenta: Momenta) -> Momenta:
+def _late(constraint: ContactConstraint, impulse: ContactImpulse, momenta: Momenta) -> tuple[ContactImpulse, Momenta]:
     """Friction of surfaces that slide comes late by the same share."""
     assert constraint.soft is not None
     late = ca.if_else(impulse.normal > 0, constraint.soft.late, 0)
@@ -288,11 +289,12 @@ def _late(constraint: ContactConstraint, impulse: ContactImpulse, momenta: Momen
         ca.sqrt(ca.dot(impulse.tangent, impulse.tangent) + TINY_SQUARE),
     )
     share = ca.if_else(given > SLIDES * most, late / ca.fmax(impulse.normal, TINY_SQUARE), 0)
-    push, found = constraint.impulse_normal * late + share * impulse.tangent, []
+    more, found = replace(ZERO, normal=late, tangent=share * impulse.tangent), []
+    push = more.linear(constraint.impulse_normal)
     for term, m in zip(constraint.terms, momenta, strict=True):
         turned = m.angular + term.sign * ca.cross(term.impulse_arm, push)
         found.append(Momentum(m.velocity + term.sign * term.inverse_mass * push, turned))
-    return tuple(found)
+    return impulse.plus(more), tuple(found)
 
 
 @traced
