@@ -56,10 +56,15 @@ class LockConstraint:
         """(n,): displacements by the directions moved to impulses times a time that close what is then left open."""
         return -ca.mtimes(self.mass, self.error + moved)
 
-    def at_end(self, momenta: tuple[Any, ...]) -> JointImpulse:
-        """The force of a joint that is soft at the end of the substep, from the velocities after the sweeps."""
+    def at_end(self, impulse: JointImpulse) -> JointImpulse:
+        """The force of a joint that is soft at the end of the substep.
+
+        It follows from the velocities that belong to the impulse: what sweeps leave open of them, a stiff spring would
+        make large.
+        """
         assert self.lasting is not None
-        return JointImpulse(self.lasting.slope * speeds(self.terms, self.seen, momenta) + self.lasting.constant)
+        velocities = self.target - self.softness * impulse.numbers
+        return JointImpulse(self.lasting.slope * velocities + self.lasting.constant)
 
     def carried(self, impulse: JointImpulse) -> Expr:
         """(n,): what is stored of an impulse; also of a force."""

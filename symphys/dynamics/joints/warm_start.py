@@ -50,16 +50,12 @@ def lasting_forces(
     contacts: Sequence[PlacedConstraint],
     joints: Sequence[JointConstraint],
     given: Sequence[JointImpulse],
-    solved: AllVelocities,
     x: State,
     kick: Expr,
 ) -> tuple[Struck, State]:
-    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last.
-
-    ``solved``: the velocities after the sweeps.
-    """
+    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last."""
     struck = _struck(context, contacts, joints, given)
-    return struck, _lasting_forces(context, joints, given, struck, solved, x, kick)
+    return struck, _lasting_forces(context, joints, given, struck, x, kick)
 
 
 def _struck(
@@ -95,7 +91,6 @@ def _lasting_forces(
     constraints: Sequence[JointConstraint],
     given: Sequence[JointImpulse],
     struck: Struck,
-    solved: AllVelocities,
     x: State,
     kick: Expr,
 ) -> State:
@@ -106,8 +101,7 @@ def _lasting_forces(
     forces = dict[str, list[Expr]]()
     for each, impulse in zip(constraints, given, strict=True):
         if isinstance(each.placed.constraint, LockConstraint) and each.placed.constraint.lasting is not None:
-            moving = tuple(solved[i] for i in each.placed.carriers)
-            forces[each.name] = [_sprung(each.placed.constraint, moving)]
+            forces[each.name] = [_sprung(each.placed.constraint, impulse)]
             continue
         constraint, impact, old = each.placed.constraint, of_body(struck, each.placed.bodies[0]), x[each.name]
         force = _lasting(constraint, impulse, own(old, each.k), impact, (kick, x["lag"], context.shortest_kick))
@@ -116,8 +110,8 @@ def _lasting_forces(
 
 
 @traced
-def _sprung(constraint: LockConstraint, momenta: tuple[Any, ...]) -> Expr:
-    return constraint.carried(constraint.at_end(momenta))
+def _sprung(constraint: LockConstraint, impulse: JointImpulse) -> Expr:
+    return constraint.carried(constraint.at_end(impulse))
 
 
 def of_body(struck: Struck, body: int) -> Expr:
