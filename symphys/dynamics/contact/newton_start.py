@@ -11,6 +11,10 @@ Each constraint says how its projection answers a change of velocities: d impuls
 matrix M and the responses H to impulses, (M + M H B J) d velocities = M H a: a system as large as the group's
 velocities, however many points there are. A rigid constraint would have an infinite B. With ``COMPLIANCE`` loads that
 are open are those of least sum of squares; the last steps, about the loads that were found, take back what it gave way.
+
+Such steps need not converge: bodies may be squeezed between two surfaces, and torsion, rolling and what friction does
+to a coupled contact are left to the sweeps. So each step stays within a reach of energy, and the sweeps begin with the
+iterate that misses least: from which projections of all constraints, each by itself, would change the least energy.
 """
 
 from __future__ import annotations
@@ -170,7 +174,7 @@ def _stepped(
     soft: tuple[Expr, int],
     reach: Expr,
 ) -> Iterate:
-    """After a step of Newton's method, shortened to an energy of ``reach``."""
+    """After a step of Newton's method, shortened so that it stays within ``reach`` [J]."""
     momenta, impulses = list(now.momenta), list(now.impulses)
     answers = []
     for each in members:
@@ -192,7 +196,7 @@ def _stepped(
 
 
 def _missed(metric: tuple[Expr, ...], members: Sequence[Member], now: Iterate) -> Expr:
-    """[J] kinetic energy of what a projection of each constraint would change, all from the same velocities."""
+    """[J] twice the energy of what a projection of each constraint would change, all from the same velocities."""
     found = []
     for each in members:
         carriers = tuple(dict.fromkeys(each.placed.carriers))
@@ -320,7 +324,7 @@ def _given(lever: Lever, a: Expr, b: Expr, changes: tuple[Expr, ...]) -> Expr:
 
 @traced
 def _reach(metric: tuple[Expr, ...], states: States, missed: Expr, count: int) -> Expr:
-    """[J] what no step goes beyond: energies of the velocities, and of all projections were they to add up."""
+    """[J] which no step goes beyond: from the energy of the velocities, and of all projections were they to add up."""
     velocities = ca.vertcat(*(_flat(state) for state in states))
     return FAR * (_energy(metric, velocities) + count * missed) + TINY
 

@@ -50,16 +50,12 @@ def lasting_forces(
     contacts: Sequence[PlacedConstraint],
     joints: Sequence[JointConstraint],
     given: Sequence[JointImpulse],
-    solved: AllVelocities,
     x: State,
     kick: Expr,
 ) -> tuple[Struck, State]:
-    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last.
-
-    ``solved``: the velocities after the sweeps.
-    """
+    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last."""
     struck = _struck(context, contacts, joints, given)
-    return struck, _lasting_forces(context, joints, given, struck, solved, x, kick)
+    return struck, _lasting_forces(context, joints, given, struck, x, kick)
 
 
 def _struck(
@@ -95,7 +91,6 @@ def _lasting_forces(
     constraints: Sequence[JointConstraint],
     given: Sequence[JointImpulse],
     struck: Struck,
-    solved: AllVelocities,
     x: State,
     kick: Expr,
 ) -> State:
