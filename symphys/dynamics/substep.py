@@ -129,7 +129,7 @@ def advance(
     (whole, momenta), rotors = _with_late_impulses(constraints, impulses, momenta), Rotors()
     reactions = _store_forces(context, constraints, impulses, solved.momenta, kick, values)
     if world.joints:
-        struck, forces = lasting_forces(context, constraints, joints, by_joints, x, kick)
+        struck, forces = lasting_forces(context, constraints, joints, by_joints, solved.momenta, x, kick)
         angles = unwrapped_angles(context, jointed, closed, duration)
         add_joint_forces(context, forces | angles, poses, reactions)
         momenta = keep_momentum(context, momenta, closed.made, struck, duration)

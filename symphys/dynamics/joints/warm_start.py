@@ -50,12 +50,16 @@ def lasting_forces(
     contacts: Sequence[PlacedConstraint],
     joints: Sequence[JointConstraint],
     given: Sequence[JointImpulse],
+    solved: AllVelocities,
     x: State,
     kick: Expr,
 ) -> tuple[Struck, State]:
-    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last."""
+    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last.
+
+    ``solved``: the velocities after the sweeps.
+    """
     struck = _struck(context, contacts, joints, given)
-    return struck, _lasting_forces(context, joints, given, struck, x, kick)
+    return struck, _lasting_forces(context, joints, given, struck, solved, x, kick)
 
 
 def _struck(
@@ -91,6 +95,7 @@ def _lasting_forces(
     constraints: Sequence[JointConstraint],
     given: Sequence[JointImpulse],
     struck: Struck,
+    solved: AllVelocities,
     x: State,
     kick: Expr,
 ) -> State:
