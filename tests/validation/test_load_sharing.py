@@ -22,7 +22,7 @@ FEET = [f"b-ground:{k}.force" for k in range(8)]
 @cache
 def lab(dt: float = 0.01, load_sharing: bool = True) -> Lab:
     world = make_world([block("b", HALVES)], [Plane.ground()], Law(FRICTION))
-    return Lab(world, Scheme(dt=dt, load_sharing=load_sharing))
+    return Lab(world, Scheme(dt=dt, load_sharing=load_sharing, newton_start=load_sharing))
 
 
 def loads(states: dict[str, Array], k: int) -> Array:
