@@ -21,7 +21,15 @@ from symphys.dynamics.joints.joint_impulse import JointImpulse
 from symphys.dynamics.joints.loop_closure import Displacements, TreeDisplacement, close_loops, displaced
 from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import gathered, opened, repeat, traced
-from symphys.dynamics.unknowns import AllVelocities, GeneralizedVelocities, Iterate, PlacedConstraint, Velocities
+from symphys.dynamics.unknowns import (
+    AllVelocities,
+    GeneralizedVelocities,
+    Iterate,
+    Linearisation,
+    PlacedConstraint,
+    Velocities,
+)
+from symphys.maths.smoothing import either
 from symphys.model.joints import kinematic_trees
 
 Expr = Any
@@ -311,14 +319,14 @@ class Push:
         return after, JointImpulse(new)
 
     def linearised(
-        self, along: tuple[TreeDisplacement, ...], old: JointImpulse, softness: Expr, centre: float
+        self, along: tuple[TreeDisplacement, ...], old: JointImpulse, by: Linearisation
     ) -> tuple[Expr, Expr]:
         """(a (1,), B (1, 1)); see ``newton_start``."""
-        del centre
         free, mass = _free(self.constraint, self.contact, self._moved(along), old.numbers, self.share)
-        acts = self.constraint.near * self.constraint.separates * ca.logic_or(self.lasts, free >= 0)
-        gives = 1 - acts + acts * mass * softness
-        return (acts * free - old.numbers) / gives, acts * self.share * mass / gives
+        acts = self.constraint.near * self.constraint.separates * either(self.lasts, by.within(free, mass))
+        pushed = self.constraint.near * ca.if_else(ca.logic_or(self.lasts, free >= 0), free, 0)
+        gives = 1 - acts + acts * mass * by.softness
+        return (pushed - old.numbers) / gives, acts * self.share * mass / gives
 
     def _moved(self, along: tuple[TreeDisplacement, ...]) -> Displacements:
         return tuple(displaced(jacobian, own) for jacobian, own in zip(self.jacobians, along, strict=True))

@@ -7,6 +7,8 @@ from typing import Any, Protocol
 
 import casadi as ca
 
+from symphys.maths.smoothing import ramp
+
 Expr = Any
 """casadi SX"""
 
@@ -49,6 +51,26 @@ AnyImpulse = Any
 """``ContactImpulse`` of a contact, ``JointImpulse`` of a joint."""
 
 
+@dataclass(frozen=True)
+class Linearisation:
+    """How the constraints of a group are linearised; see ``newton_start``.
+
+    Attributes:
+        softness: which rigid contacts get [1/kg]; other rigid constraints ``COMPLIANCE``.
+        centre: 1 if what is given at that softness counts from 0, 0 if from what was given so far.
+        blur: [J^0.5] by how much an impulse over the root of its effective mass has to lie beyond a bound before the
+            bound counts in full; below it a part of it counts. 0 where the group is solved.
+    """
+
+    softness: Expr
+    centre: float
+    blur: Expr
+
+    def within(self, distance: Expr, mass: Expr) -> Expr:
+        """1 if an impulse is inside a bound by ``distance`` [N s], 0 if beyond it, and between near it."""
+        return ramp(distance, ca.sqrt(mass) * self.blur)
+
+
 class VelocityConstraint(Protocol):
     """What a sweep projects. Implementations are frozen dataclasses."""
 
@@ -64,14 +86,13 @@ class VelocityConstraint(Protocol):
         """(m,): the velocities that the projection looks at."""
         ...
 
-    def linearised(self, momenta: AllVelocities, old: AnyImpulse, softness: Expr, centre: float) -> tuple[Expr, Expr]:
+    def linearised(self, momenta: AllVelocities, old: AnyImpulse, by: Linearisation) -> tuple[Expr, Expr]:
         """(a (k,), B (k, m)): the k numbers of its impulse change by a - B d rates.
 
         Args:
             momenta: of the bodies.
             old: the accumulated impulse.
-            softness: which rigid contacts get [1/kg]; other rigid constraints ``COMPLIANCE``.
-            centre: 1 if what is given at that softness counts from 0, 0 if from ``old``.
+            by: what is common to all constraints.
         """
         ...
 

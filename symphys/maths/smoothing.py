@@ -17,6 +17,9 @@ TINY_SQUARE = 1e-24
 TINY_WIDTH_SQUARE = 1e-120
 """Added under the square root of ``positive``, so that its second derivative exists at x = w = 0."""
 
+TINY_RAMP = 1e-18
+"""Added to the width of ``ramp``, so that its slope is finite."""
+
 
 def positive(x: Expr, width: Expr) -> Expr:
     """max(x, 0); for width w > 0 (x + sqrt(x^2 + w^2)) / 2, which lies above it by at most w / 2, at x = 0.
@@ -30,6 +33,11 @@ def positive_slope(x: Expr, width: Expr) -> Expr:
     """The slope of ``positive``; 0 at x = 0 where it is exact."""
     smooth = (1 + x / ca.sqrt(x * x + width * width + TINY_WIDTH_SQUARE)) / 2
     return ca.if_else(width > 0, smooth, x > 0)
+
+
+def ramp(x: Expr, width: Expr) -> Expr:
+    """From 0 to 1 as x goes from -``width`` to ``width``, in a straight line; a step where the width is 0."""
+    return ca.fmin(ca.fmax((1 + x / (width + TINY_RAMP)) / 2, 0), 1)
 
 
 def at_least(x: Expr, low: Expr, width: Expr) -> Expr:

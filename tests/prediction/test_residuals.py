@@ -68,10 +68,7 @@ def recorded(noise: Any = 0.001) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def residuals() -> RecordingResiduals:
-    """By sweeps alone: where Newton's start changes sides a difference of 1e-5 goes across a kink."""
-    tables = recorded()
-    tables["simulation"]["newton_start"] = False
-    return residuals_of(problem_of_tables(tables), threads=1)
+    return residuals_of(problem_of_tables(recorded()), threads=1)
 
 
 def moved(residuals: RecordingResiduals) -> tuple[np.ndarray, np.ndarray]:

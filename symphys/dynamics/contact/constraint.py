@@ -23,6 +23,7 @@ from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.coupling import Coupling
 from symphys.dynamics.contact.soft import SoftImpulse
 from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.unknowns import Linearisation
 from symphys.maths.smoothing import length, onto_disc, positive, positive_slope
 from symphys.model.world import Law
 
@@ -180,11 +181,9 @@ class ContactConstraint:
 
     rates = slip
 
-    def linearised(
-        self, momenta: tuple[Any, ...], old: ContactImpulse, softness: Expr, centre: float
-    ) -> tuple[Expr, Expr]:
+    def linearised(self, momenta: tuple[Any, ...], old: ContactImpulse, by: Linearisation) -> tuple[Expr, Expr]:
         """See ``newton_start``."""
-        return linearised(self, self.slip(momenta), old, softness, centre)
+        return linearised(self, self.slip(momenta), old, by)
 
     def project(self, momenta: tuple[Any, ...], old: ContactImpulse) -> tuple[tuple[Any, ...], ContactImpulse]:
         """One projection of each of its impulses, one after the other."""
@@ -243,33 +242,35 @@ def _tangent(contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal
     return onto_disc(wanted, contact.law.friction * normal, contact.tangent_mass * contact.smoothing, contact.smoothing)
 
 
-def linearised(
-    contact: ContactConstraint, slip: Expr, old: ContactImpulse, softness: Expr, centre: float
-) -> tuple[Expr, Expr]:
+def linearised(contact: ContactConstraint, slip: Expr, old: ContactImpulse, by: Linearisation) -> tuple[Expr, Expr]:
     """(a (4,), B (4, 3)): load and friction change by a - B du with the slip u.
 
     Args:
         contact: the contact.
         slip: (3,) u [m/s].
         old: what it has given so far.
-        softness: of a rigid contact here [1/kg].
-        centre: 1 if loads of that softness are counted from 0, 0 if from ``old``.
+        by: what is common to all constraints.
     """
     mass, width = contact.normal_mass, contact.normal_mass * contact.width
     kept = old.normal + mass * (contact.target - contact.softness * old.normal - ca.dot(contact.normal, slip))
-    normal, rise = contact.near * positive(kept, width), contact.near * positive_slope(kept, width)
-    gives = 1 - rise * (1 - mass * (contact.softness + softness))
-    press = (normal - old.normal - rise * mass * softness * centre * old.normal) / gives
+    normal, rise = contact.near * positive(kept, width), contact.near * _slope(kept, width, mass, by)
+    gives = 1 - rise * (1 - mass * (contact.softness + by.softness))
+    press = (normal - old.normal - rise * mass * by.softness * by.centre * old.normal) / gives
     by_slip = rise * mass / gives * contact.normal.T
     # a change of load that its own projection does not make widens the disc of friction
-    friction, widens, sliding = _friction(contact, slip, old, normal, (softness, centre))
+    friction, widens, sliding = _friction(contact, slip, old, normal, by)
     friction += widens * (press - (normal - old.normal))
     sliding += ca.mtimes(widens, by_slip)
     return contact.near * ca.vertcat(press, friction), contact.near * ca.vertcat(by_slip, sliding)
 
 
+def _slope(x: Expr, width: Expr, mass: Expr, by: Linearisation) -> Expr:
+    """The slope of ``positive``."""
+    return ca.if_else(width > 0, positive_slope(x, width), by.within(x, mass))
+
+
 def _friction(
-    contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal: Expr, soft: tuple[Expr, float]
+    contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal: Expr, by: Linearisation
 ) -> tuple[Expr, Expr, Expr]:
     """(a (3,), its slope (3,) by the load, B (3, 3)) of friction alone, with the disc of a load ``normal``.
 
@@ -279,11 +280,12 @@ def _friction(
     wanted = old.tangent + mass * _across(contact.slip_target - slip, n)
     radius, size, width = contact.law.friction * normal, length(wanted), mass * contact.smoothing
     reach = ca.if_else(smooth, radius + positive(size - radius, width) + 1e-30, ca.fmax(size, radius))
-    falls = ca.if_else(smooth, positive_slope(size - radius, width), size > radius)
+    falls = _slope(size - radius, width, mass, by)
     share, along = radius / reach, wanted / size
     stretch = share * (1 - size * falls / reach)
     grows = contact.law.friction * size / reach * (1 - radius * (1 - falls) / reach)
-    gives, counted = mass * soft[0], mass * soft[0] * soft[1]
+    gives = mass * by.softness
+    counted = gives * by.centre
     change = share * wanted - old.tangent
     ahead = along * ca.dot(along, change - counted * stretch * old.tangent) / (1 - stretch + gives)
     beside = change - counted * share * old.tangent

@@ -14,7 +14,11 @@ are open are those of least sum of squares; the last steps, about the loads that
 
 Such steps need not converge: bodies may be squeezed between two surfaces, and torsion, rolling and what friction does
 to a coupled contact are left to the sweeps. So each step stays within a reach of energy, and the sweeps begin with the
-iterate that misses least: from which projections of all constraints, each by itself, would change the least energy.
+iterates weighted by what they miss: the energy that projections of all constraints, each by itself, would change.
+
+What the start gives is continuous. A constraint near its bound would make the step jump as it changes sides, so its
+slope goes from one to the other over a width that shrinks with what the iterate misses (Chen, Qi and Sun, Global and
+superlinear convergence of the smoothing Newton method, Math. Comp. 67, 1998, have such a Jacobian).
 """
 
 from __future__ import annotations
@@ -22,6 +26,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import accumulate
 from typing import Any
 
@@ -40,6 +45,7 @@ from symphys.dynamics.unknowns import (
     AnyImpulse,
     GeneralizedVelocities,
     Iterate,
+    Linearisation,
     Momentum,
     PlacedConstraint,
     VelocityConstraint,
@@ -58,6 +64,10 @@ LARGEST = 40
 """Velocities of a group that is solved at once."""
 FAR = 100.0
 """Of the energies from which a step may start: how large that of the step may be."""
+BLUR = 0.03
+"""Of the root of what an iterate misses: over how much of it a constraint's slope goes from one side to the other."""
+EVEN = 1e-22
+"""Of the energies at hand: what two iterates may both miss so that they count alike."""
 TINY = 1e-30
 """[J] the least that a step may reach, so that its slope is finite at rest."""
 
@@ -147,14 +157,14 @@ def solve_together(
     metric = _metric(trees, group.carriers, start.momenta)
     members = [_member(group, number, constraints[number], metric, start) for number in group.constraints]
     own = tuple(start.momenta[i] for i in group.carriers)
-    missed = _missed(metric, members, start)
-    reach = _reach(metric, own, missed, len(members))
-    best, now = start, start
+    missed = [_missed(metric, members, start)]
+    reach = _reach(metric, own, missed[0], len(members))
+    iterates = [start]
     for centre in centres:
-        now = _stepped(group, metric, members, now, (softness, centre), reach)
-        after = _missed(metric, members, now)
-        best, missed = _better(group, (missed, best), (after, now)), _less(after, missed)
-    return best
+        by = Linearisation(softness, centre, _blur(missed[-1]))
+        iterates.append(_stepped(group, metric, members, iterates[-1], by, reach))
+        missed.append(_missed(metric, members, iterates[-1]))
+    return _weighted(group, iterates, _weights(tuple(missed), reach))
 
 
 def _member(group: Group, number: int, placed: PlacedConstraint, metric: tuple[Expr, ...], start: Iterate) -> Member:
@@ -171,7 +181,7 @@ def _stepped(
     metric: tuple[Expr, ...],
     members: Sequence[Member],
     now: Iterate,
-    soft: tuple[Expr, int],
+    by: Linearisation,
     reach: Expr,
 ) -> Iterate:
     """After a step of Newton's method, shortened so that it stays within ``reach`` [J]."""
@@ -179,7 +189,7 @@ def _stepped(
     answers = []
     for each in members:
         states = tuple(momenta[i] for i in each.placed.carriers)
-        answers.append(_answer(each.placed.constraint, each.lever, states, impulses[each.number], *soft))
+        answers.append(_answer(each.placed.constraint, each.lever, states, impulses[each.number], by))
     changes = _changes(metric, tuple((each.own, *part[:2]) for each, part in zip(members, answers, strict=True)))
     given = [
         _given(each.lever, a, b, tuple(changes[k] for k in each.own))
@@ -206,14 +216,13 @@ def _missed(metric: tuple[Expr, ...], members: Sequence[Member], now: Iterate) -
     return _sum(tuple(found))
 
 
-def _better(group: Group, first: tuple[Expr, Iterate], second: tuple[Expr, Iterate]) -> Iterate:
-    """The iterate that misses less."""
-    (missed, best), (after, now) = first, second
-    momenta, impulses = list(best.momenta), list(best.impulses)
+def _weighted(group: Group, iterates: Sequence[Iterate], weights: tuple[Expr, ...]) -> Iterate:
+    """Their mean. All have their velocities from their impulses, and so has it."""
+    momenta, impulses = list(iterates[0].momenta), list(iterates[0].impulses)
     for i in group.carriers:
-        momenta[i] = _chosen_state(after, missed, now.momenta[i], best.momenta[i])
+        momenta[i] = _mean_state(weights, tuple(each.momenta[i] for each in iterates))
     for k in group.constraints:
-        impulses[k] = _chosen_impulse(after, missed, now.impulses[k], best.impulses[k])
+        impulses[k] = _mean_impulse(weights, tuple(each.impulses[k] for each in iterates))
     return Iterate(tuple(momenta), tuple(impulses), tuple(impulses))
 
 
@@ -292,10 +301,10 @@ def _flat(state: State) -> Expr:
 
 @traced
 def _answer(
-    constraint: VelocityConstraint, lever: Lever, momenta: States, old: AnyImpulse, softness: Expr, centre: int
+    constraint: VelocityConstraint, lever: Lever, momenta: States, old: AnyImpulse, by: Linearisation
 ) -> tuple[Expr, Expr, Expr, Expr]:
     """M H B J, M H a, a and B."""
-    a, b = constraint.linearised(momenta, old, softness, centre)
+    a, b = constraint.linearised(momenta, old, by)
     return ca.mtimes(ca.mtimes(lever.momenta, b), lever.rates), ca.mtimes(lever.momenta, a), a, b
 
 
@@ -363,17 +372,26 @@ def _sum(energies: tuple[Expr, ...]) -> Expr:
 
 
 @traced
-def _less(one: Expr, other: Expr) -> Expr:
-    return ca.fmin(one, other)
+def _blur(missed: Expr) -> Expr:
+    return BLUR * ca.sqrt(missed + TINY)
 
 
 @traced
-def _chosen_state(after: Expr, missed: Expr, now: State, best: State) -> State:
-    (chosen,) = _cut(ca.if_else(after < missed, _flat(now), _flat(best)), (best,))
-    return chosen
+def _weights(missed: tuple[Expr, ...], reach: Expr) -> tuple[Expr, ...]:
+    """Of the iterates: as one over the square of what they miss."""
+    counted = [each + EVEN * reach + TINY for each in missed]
+    least = reduce(ca.fmin, counted)
+    weights = [(least / each) ** 2 for each in counted]
+    return tuple(each / sum(weights) for each in weights)
 
 
 @traced
-def _chosen_impulse(after: Expr, missed: Expr, now: AnyImpulse, best: AnyImpulse) -> AnyImpulse:
-    taken = ca.if_else(after < missed, 1, 0)
-    return best.times(1 - taken).plus(now.times(taken))
+def _mean_state(weights: tuple[Expr, ...], states: States) -> State:
+    (found,) = _cut(sum(weight * _flat(state) for weight, state in zip(weights, states, strict=True)), states[:1])
+    return found
+
+
+@traced
+def _mean_impulse(weights: tuple[Expr, ...], impulses: tuple[AnyImpulse, ...]) -> AnyImpulse:
+    first, *others = (impulse.times(weight) for weight, impulse in zip(weights, impulses, strict=True))
+    return reduce(lambda a, b: a.plus(b), others, first)

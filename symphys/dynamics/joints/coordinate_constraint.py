@@ -16,7 +16,7 @@ import casadi as ca
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
 from symphys.dynamics.tracing.decorator import traced
-from symphys.dynamics.unknowns import COMPLIANCE, GeneralizedVelocities
+from symphys.dynamics.unknowns import COMPLIANCE, GeneralizedVelocities, Linearisation
 from symphys.maths.smoothing import at_least, at_most, positive_slope
 
 Expr = Any
@@ -101,25 +101,28 @@ class CoordinateConstraint:
 
     rates = rate
 
-    def linearised(
-        self, momenta: tuple[Any, ...], old: JointImpulse, softness: Expr, centre: float
-    ) -> tuple[Expr, Expr]:
+    def linearised(self, momenta: tuple[Any, ...], old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
         """(a (1,), B (1, 1)); see ``newton_start``."""
-        del softness
         wanted = self.keep * old.numbers - self.offset - self.slope * self.rate(momenta)
-        new, follows = self.bounded(wanted), self._follows(wanted)
+        new, follows = self.bounded(wanted), self._follows(wanted, by)
         gives = 1 - follows * self.keep + COMPLIANCE
-        return (new - old.numbers - COMPLIANCE * centre * follows * old.numbers) / gives, follows * self.slope / gives
+        return (
+            new - old.numbers - COMPLIANCE * by.centre * follows * old.numbers
+        ) / gives, follows * self.slope / gives
 
-    def _follows(self, impulse: Expr) -> Expr:
+    def _follows(self, impulse: Expr, by: Linearisation) -> Expr:
         """The slope of ``bounded``."""
         slope = ca.SX(1)
         if self.low is not None:
-            slope *= positive_slope(impulse - self.low, self.width)
+            slope *= self._inside(impulse - self.low, by)
             impulse = at_least(impulse, self.low, self.width)
         if self.high is not None:
-            slope *= positive_slope(self.high - impulse, self.width)
+            slope *= self._inside(self.high - impulse, by)
         return slope
+
+    def _inside(self, distance: Expr, by: Linearisation) -> Expr:
+        smooth = positive_slope(distance, self.width)
+        return ca.if_else(self.width > 0, smooth, by.within(distance, ca.fabs(self.slope)))
 
     def answer(self, rate: Expr, old: Expr, less: Expr | None = None) -> tuple[Expr, Expr]:
         """The impulse after a projection, and its change; ``less`` is known last, so it is taken off last."""

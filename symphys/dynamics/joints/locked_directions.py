@@ -10,7 +10,7 @@ import casadi as ca
 from symphys.dynamics.articulated.factorisation import factorise
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
-from symphys.dynamics.unknowns import COMPLIANCE
+from symphys.dynamics.unknowns import COMPLIANCE, Linearisation
 
 Expr = Any
 """casadi SX"""
@@ -86,13 +86,10 @@ class LockConstraint:
         """(n,): velocities along the directions."""
         return speeds(self.terms, self.seen, momenta)
 
-    def linearised(
-        self, momenta: tuple[Any, ...], old: JointImpulse, softness: Expr, centre: float
-    ) -> tuple[Expr, Expr]:
+    def linearised(self, momenta: tuple[Any, ...], old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
         """(a (n,), B (n, n)); see ``newton_start``."""
-        del softness
         soft = COMPLIANCE / ca.diag(self.mass)
-        miss = self.rates(momenta) - self.target + (self.softness + centre * soft) * old.numbers
+        miss = self.rates(momenta) - self.target + (self.softness + by.centre * soft) * old.numbers
         stiff = ca.diag(1 / (self.softness + soft))
         return -ca.mtimes(stiff, miss), stiff
 
