@@ -4,10 +4,14 @@ Rounding grows along a motion as any change does. Gradients of a robot's 200 ste
 of their norm in the median, and by 96 times at worst, where those of a thrown ball are right to five digits. Which it
 is depends on the motion, so the first rows that a solve asks for are computed in double precision too. That needs no
 compiler run: the functions of a large program go through an interpreter.
+
+Of a single time step, the gradients of that step are compared. What rounding becomes over a chain of steps is not seen
+there.
 """
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -56,6 +60,17 @@ class PrecisionCheck:
             return UNCHECKED.format(why=refused)
         error = largest_error(gradient[:rows], exact)
         return WARNING.format(error=in_words(error)) if error > MAX_ERROR else ""
+
+
+def warn(subject: str, doubt: str) -> None:
+    """Give a RuntimeWarning, at the line that called the method that calls this, if there is a doubt.
+
+    Args:
+        subject: the name of the problem.
+        doubt: of a kernel's gradients, or empty.
+    """
+    if doubt:
+        warnings.warn(f"{subject}: {doubt}", RuntimeWarning, stacklevel=3)
 
 
 def first_rows(values: ArrayLike, rows: int) -> Array:
