@@ -1,4 +1,4 @@
-"""Whether gradients in single precision are worth their name: the first ones, compared with double precision.
+"""Comparison of the first gradients in single precision with those in double precision.
 
 Rounding grows along a motion as any change does. Gradients of a robot's 200 steps in single precision were off by 60 %
 of their norm in the median, and by 96 times at worst, where those of a thrown ball are right to five digits. Which it
@@ -25,11 +25,11 @@ from symphys.codegen.toolchain.warm_start import ProgramSource
 Array = NDArray[np.float64]
 
 MAX_ERROR = 0.1
-"""Of a gradient's length: the largest error of single precision that is not reported."""
+"""Largest error of a gradient, as a share of its length, that is not reported."""
 ROWS = 4
-"""Rows that are compared, at most: they fit into one block of the processor."""
+"""Largest number of rows that are compared: they fit into one block of the processor."""
 SMALL = 1e-3
-"""Of the longest gradient: what a shorter one is compared with, so that rounding of nearly nothing is no error."""
+"""Shortest length that errors are compared with, as a share of the longest gradient: a row of nearly 0 has rounding."""
 WARNING = (
     "gradients in single precision are off by {error} of their length here: use the backend simd or cuda, or a solver "
     "without gradients"
@@ -80,7 +80,7 @@ def first_rows(values: ArrayLike, rows: int) -> Array:
 
 
 def largest_error(found: Array, exact: Array) -> float:
-    """Of gradients (rows, n) by their lengths, where ``exact`` is finite; inf where ``found`` is not."""
+    """Largest error of gradients (rows, n) by their lengths, of finite rows of ``exact``; inf if ``found`` is not."""
     known = np.isfinite(exact).all(axis=1)
     if not known.any():
         return 0.0
@@ -94,7 +94,7 @@ def largest_error(found: Array, exact: Array) -> float:
 
 
 def in_words(error: float) -> str:
-    """``60 %``, ``96 times``."""
+    """A relative error in words: ``60 %``, ``96 times``."""
     if not np.isfinite(error):
         return "any multiple"
     return f"{100 * error:.0f} %" if error < 2 else f"{error:.0f} times"
