@@ -1,100 +1,63 @@
 """Thousands of broken files: each is read or becomes a message, within a time and a memory, never a traceback.
 
-    python benchmarks/mutated_files.py problem recording run robot --count 1000 --seed 1
+    python benchmarks/mutated_files.py problem shipped recording run journal robot --count 1000 --seed 1
 
-Problem files, recordings (CSV and NPZ), run folders and robots (URDF, MJCF) are broken in one to three places. The same
-seed breaks the same places. A process of its own tries a hundred files at a time: one that dies, or takes longer than
-10 s for a file, is reported with the number of the file, and the next process goes on behind it.
+Problem files (one of all sorts, and those that are shipped), recordings (CSV and NPZ), run folders, their journals and
+robots (URDF, MJCF) are broken in one to three places. The same seed breaks the same places. A process of its own tries
+some thousand files at a time: one that dies, or takes longer than 10 s for a file, is reported with the number of the
+file, and the next process goes on behind it.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import multiprocessing
 import random
 import re
 import resource
+import shutil
 import signal
 import tempfile
 import time
 import traceback
 import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+import mutated_robots
 import numpy as np
 from mutated_texts import MODELS, PROBLEM, RECORDED
+from mutations import EXTREMES, cut, flip, mutated, replacing
 
 LONGEST = 10
 """[s] of a processor for one file."""
 MEMORY = 2 * 2**30
 """[bytes] of data that a process may have."""
-BATCH = 100
+BATCH = 2500
+"""Files of one process: it takes seconds to start."""
 NUMBER = re.compile(rb'(?<![\w"])-?\d+\.?\d*(?:[eE][-+]?\d+)?')
-LINE = re.compile(rb"[^\n]*\n")
 VALUES = (
-    b"nan", b"inf", b"-inf", b"1e308", b"-1e308", b"1e150", b"1e100", b"-1", b"0", b"1e30", b"1e-30", b"1e-308",
-    b"999999999", b"9223372036854775808", b"-0.0", b"true", b'"x"', b"[]", b"{}", b"[1, 2]", b"[[1e308, -1e308]]",
-    b"", b"1_0", b"0x10", b"1e8", b"99999", b"9" * 400, b"1979-05-27", b'"\\u0000"', b"null", b'"1e400"',
+    *EXTREMES, b"-1e308", b"1e150", b"1e100", b"1e-308", b"9223372036854775808", b"true", b'"x"', b"[]", b"{}",
+    b"[1, 2]", b"[[1e308, -1e308]]", b"1_0", b"1979-05-27", b'"\\u0000"', b"null", b'"1e400"',
 )  # fmt: skip
-
-
-def flip(text: bytes, dice: random.Random) -> bytes:
-    """Another byte at one place."""
-    place = dice.randrange(len(text))
-    return text[:place] + bytes([dice.randrange(256)]) + text[place + 1 :]
-
-
-def cut(text: bytes, dice: random.Random) -> bytes:
-    """Without a piece, or without the end."""
-    place = dice.randrange(len(text))
-    return text[:place] + (b"" if dice.random() < 0.3 else text[place + dice.randrange(1, 60) :])
-
-
-def spoil_number(text: bytes, dice: random.Random) -> bytes:
-    """Another value in place of a number."""
-    return changed(text, dice, NUMBER, lambda _: dice.choice(VALUES))
-
-
-def swap_lines(text: bytes, dice: random.Random) -> bytes:
-    """One line with what another has."""
-    other = dice.choice(LINE.findall(text) or [b"\n"])
-    return changed(text, dice, LINE, lambda _: other)
-
-
-def lose_line(text: bytes, dice: random.Random) -> bytes:
-    """Without one line."""
-    return changed(text, dice, LINE, lambda _: b"")
-
-
-def double_line(text: bytes, dice: random.Random) -> bytes:
-    """With one line twice."""
-    return changed(text, dice, LINE, lambda match: match[0] * 2)
-
-
-def changed(
-    text: bytes, dice: random.Random, what: re.Pattern[bytes], change: Callable[[re.Match[bytes]], bytes]
-) -> bytes:
-    """The text with one match changed."""
-    found = list(what.finditer(text))
-    if not found:
-        return text
-    match = dice.choice(found)
-    return text[: match.start()] + change(match) + text[match.end() :]
-
-
-CHANGES = (flip, cut, spoil_number, spoil_number, spoil_number, swap_lines, lose_line, double_line)
-
-
-def mutated(text: bytes, dice: random.Random, changes: Any = CHANGES) -> bytes:
-    """A text broken in one to three places."""
-    for _ in range(dice.choice((1, 1, 2, 3))):
-        text = dice.choice(changes)(text, dice) or b" "
-    return text
+LINE = re.compile(rb"[^\n]*\n")
+MEMBER = re.compile(rb'("[^"]*")(:)("[^"]*"|[^",{}]+)')
+"""Name, colon and value of a member of a JSON object."""
+SPOIL_NUMBER = replacing(NUMBER, lambda _, dice: dice.choice(VALUES))
+CHANGES = (
+    flip,
+    cut,
+    *[SPOIL_NUMBER] * 3,
+    replacing(LINE, lambda match, dice: dice.choice(LINE.findall(match.string))),
+    replacing(LINE, lambda *_: b""),
+    replacing(LINE, lambda match, _: match[0] * 2),
+)
 
 
 def repacked(content: bytes, dice: random.Random) -> bytes:
@@ -109,7 +72,7 @@ def repacked(content: bytes, dice: random.Random) -> bytes:
                 head = member.index(b"\n") + 1
                 where = dice.choice(("head", "head", "all", "shape"))
                 if where == "head":
-                    member = mutated(member[:head], dice, (flip, spoil_number)) + member[head:]
+                    member = mutated(member[:head], dice, (flip, SPOIL_NUMBER)) + member[head:]
                 elif where == "shape":
                     wild = dice.choice((b"(10000000000000000000000000000000,)", b"(-1,)", b"()", b"(4, 0)", b"(2, 2)"))
                     member = re.sub(rb"\([\d, ]*\)", wild, member[:head]) + member[head:]
@@ -137,8 +100,28 @@ class Problems:
         """Load one."""
         from symphys.problem import load_problem
 
-        self.file.write_bytes(mutated(PROBLEM.encode(), dice))
+        self.file.write_bytes(mutated(PROBLEM.encode(), dice, CHANGES))
         load_problem(self.file).world()
+
+
+class ShippedProblems:
+    """The problem files of the package, beside the files that they include."""
+
+    def __init__(self, folder: Path) -> None:
+        """Files are written into a copy of their folder."""
+        import symphys.problems
+
+        self.folder = folder / "problems"
+        shutil.copytree(Path(symphys.problems.__path__[0]), self.folder)
+        self.texts = [path.read_bytes() for path in sorted(self.folder.glob("*.toml"))]
+
+    def __call__(self, dice: random.Random) -> None:
+        """Load one."""
+        from symphys.problem import load_problem
+
+        file = self.folder / "broken.toml"
+        file.write_bytes(mutated(dice.choice(self.texts), dice, CHANGES))
+        load_problem(file).world()
 
 
 class Recordings:
@@ -159,7 +142,7 @@ class Recordings:
         kind = dice.choice(("csv", "npz", "npz packed"))
         name = "a." + kind[:3]
         if kind == "csv":
-            content = mutated(self.text, dice)
+            content = mutated(self.text, dice, CHANGES)
         else:
             content = mutated(self.arrays, dice, (flip, cut)) if kind == "npz" else repacked(self.arrays, dice)
         (self.folder / name).write_bytes(content)
@@ -168,19 +151,36 @@ class Recordings:
         load_problem(file)
 
 
+def solved(folder: Path) -> Path:
+    """Solve the problem of all sorts below a folder, and return the folder of the run."""
+    import symphys
+
+    file = folder / "all.toml"
+    file.write_text(PROBLEM)
+    symphys.solve(file, "gradient", folder=folder / "out", backend="casadi", iterations=2)
+    (result,) = folder.rglob("result.json")
+    return result.parent
+
+
+def list_runs(root: Path) -> None:
+    """List the runs below a folder, and the best of them, as the command line does."""
+    from symphys.cli.finding.best import best
+    from symphys.cli.finding.ls import ls
+
+    with contextlib.redirect_stdout(io.StringIO()):
+        for command in (ls, best):
+            command.main([str(root)], standalone_mode=False)
+
+
 class Runs:
     """Run folders: one of their files is broken; the run is read, listed and its page made."""
 
     def __init__(self, folder: Path) -> None:
         """Solve one problem."""
-        import symphys
-
-        file = folder / "all.toml"
-        file.write_text(PROBLEM)
-        symphys.solve(file, "gradient", folder=folder / "out", backend="casadi", iterations=2)
-        (result,) = folder.rglob("result.json")
-        self.root, self.folder = folder / "out", result.parent
-        self.files = {path: path.read_bytes() for path in sorted(self.folder.iterdir()) if path.is_file()}
+        self.root, self.folder = folder / "out", solved(folder)
+        kinds = (".json", ".npz", ".csv", ".toml", ".jsonl")
+        self.files = {path: path.read_bytes() for path in sorted(self.folder.iterdir()) if path.suffix in kinds}
+        self.broken = next(iter(self.files))
 
     def __call__(self, dice: random.Random) -> None:
         """Read one."""
@@ -188,17 +188,48 @@ class Runs:
         from symphys.report.pages.run import write_light_report
         from symphys.results.discovery import read_all
 
-        chosen = dice.choice(
-            [path for path in self.files if path.suffix in (".json", ".npz", ".csv", ".toml", ".jsonl")]
-        )
-        for path, content in self.files.items():
-            if path == chosen:
-                packed = path.suffix == ".npz" and dice.random() < 0.7
-                content = repacked(content, dice) if packed else mutated(content, dice)
-            path.write_bytes(content)
+        self.broken.write_bytes(self.files[self.broken])
+        self.broken = dice.choice([*self.files])
+        content = self.files[self.broken]
+        if self.broken.suffix != ".npz":
+            content = mutated(content, dice, CHANGES)
+        else:
+            content = repacked(content, dice) if dice.random() < 0.7 else mutated(content, dice, (flip, cut))
+        self.broken.write_bytes(content)
         read_all(self.root)
-        list(symphys.results(self.root))
+        symphys.results(self.root)
+        list_runs(self.root)
         write_light_report(self.folder)
+
+
+class Journals:
+    """Journals of run folders, most of whose broken lines have a right checksum: the runs are listed."""
+
+    def __init__(self, folder: Path) -> None:
+        """Solve one problem."""
+        from symphys.results.table.journal import NAME
+
+        solved(folder)
+        self.root = folder / "out"
+        self.journal = self.root / NAME
+        self.line = self.journal.read_bytes()
+
+    def __call__(self, dice: random.Random) -> None:
+        """List one."""
+        from symphys.results.table.journal import BODY, MARK
+
+        body = mutated(self.line[BODY:].rstrip(b"\n"), dice, (*CHANGES, replacing(MEMBER, spoilt_member)))
+        checksum = zlib.crc32(body) if dice.random() < 0.9 else dice.randrange(2**32)
+        lines = [MARK + b'%08x",' % checksum + body + b"\n", self.line]
+        self.journal.write_bytes(b"".join(dice.sample(lines, dice.choice((1, 2)))))
+        list_runs(self.root)
+
+
+def spoilt_member(match: re.Match[bytes], dice: random.Random) -> bytes:
+    """A member of a JSON object with another name, or with another value."""
+    if dice.random() < 0.2:
+        return dice.choice((b'"run"', b'"fault"', b'"solved"', b'"\\u001b[2J"')) + match[2] + match[3]
+    return match[1] + match[2] + (dice.choice((*VALUES, b'"\\u001b[2J"', b"false", b'"solved"')) or b"null")
 
 
 class Robots:
@@ -214,12 +245,10 @@ class Robots:
 
     def __call__(self, dice: random.Random) -> None:
         """Read one."""
-        import mutated_robots
-
         import symphys
 
         name = dice.choice(sorted(MODELS))
-        (self.folder / name).write_bytes(mutated_robots.mutated(MODELS[name], dice))
+        (self.folder / name).write_bytes(mutated(MODELS[name], dice, mutated_robots.CHANGES))
         robot = symphys.load_robot(self.folder / name, self_collision=False)
         robot.text()
         robot.problem()
@@ -227,8 +256,10 @@ class Robots:
 
 KINDS: dict[str, Callable[[Path], Callable[[random.Random], None]]] = {
     "problem": Problems,
+    "shipped": ShippedProblems,
     "recording": Recordings,
     "run": Runs,
+    "journal": Journals,
     "robot": Robots,
 }
 
@@ -256,6 +287,10 @@ def outcome(attempt: Callable[[random.Random], None], kind: str, number: int) ->
 def work(pipe: Connection, kind: str, numbers: range) -> None:
     """Try files, and send what became of each."""
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    if kind == "recording":  # it takes half of the time, and is the same for all
+        from symphys.problem import load
+
+        load.check_overlap = lambda *_: None
     with tempfile.TemporaryDirectory() as name:
         attempt = KINDS[kind](Path(name))
         outcome(attempt, kind, 0)  # imports what is imported late

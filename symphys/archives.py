@@ -20,9 +20,9 @@ from symphys.suggest import quote
 PlainArray = NDArray[np.generic]
 GIB = 2**30
 MOST_BYTES = GIB
-"""That the arrays of one file may take together."""
+"""Largest memory of the arrays of one file together."""
 NUMBER, TEXT = 8, 100
-"""[bytes] An entry takes at least as many once it is a float, or a text of Python's beside its letters."""
+"""[bytes] Memory of an entry, at least, as a float; and as a Python text, without its letters."""
 CHUNK, PACKED_CHUNK = 2**20, 2**12
 """[bytes] Read at once of members that are stored or deflated, and of others, whose libraries do not bound what they
 unpack: 4 KiB of these become 100 MB at most."""

@@ -7,8 +7,7 @@ import os
 import shlex
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import programs
@@ -28,7 +27,7 @@ def logged(folder: Path, log: Path, gate: Path, real: Sequence[str]) -> str:
     """A PATH whose gcc logs the process that calls it and its arguments, waits for a gate, and does as the real one."""
     folder.mkdir()
     version = f'if [ "$1" = --version ]; then exec {shlex.join(real)} --version; fi\n'
-    wait = f"n=0; while [ ! -e {gate} ] && [ $n -lt 1500 ]; do n=$((n + 1)); sleep 0.02; done\n"
+    wait = f"n=0; while [ ! -e {gate} ] && [ $n -lt 90000 ]; do n=$((n + 1)); sleep 0.02; done\n"
     (folder / "gcc").write_text(
         f'#!/bin/sh\n{version}echo "$PPID $@" >> {log}\n{wait}exec {shlex.join(real)} "$@"\n', "utf-8"
     )
@@ -44,14 +43,6 @@ def waits(process: subprocess.Popen[str]) -> bool:
     return False
 
 
-def until(done: Callable[[], bool]) -> None:
-    """Wait, at most half a minute."""
-    end = time.monotonic() + 30
-    while not done():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
 def building(folder: Path, compiler: str, **places: str) -> subprocess.Popen[str]:
     """A process that builds the pendulum with a compiler, into a cache in the folder.
 
@@ -65,25 +56,3 @@ def building(folder: Path, compiler: str, **places: str) -> subprocess.Popen[str
     }
     command = [sys.executable, "-c", BUILD]
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def wait_for(path: Path) -> None:
-    """Until a file says something."""
-    end = time.monotonic() + 30
-    while not (path.exists() and path.read_text("utf-8").endswith("\n")):
-        assert time.monotonic() < end
-        time.sleep(0.05)
-
-
-def assert_gone(started: Path) -> None:
-    """Every process whose number is in the file ends soon."""
-    end = time.monotonic() + 5
-    while any(alive(int(number)) for number in started.read_text("utf-8").split()):
-        assert time.monotonic() < end
-        time.sleep(0.05)
-
-
-def alive(number: int) -> bool:
-    """Whether a process runs; one that nobody has waited for yet does not."""
-    done = subprocess.run(["ps", "-o", "stat=", "-p", str(number)], capture_output=True, text=True, check=False)
-    return bool(done.stdout.strip()) and not done.stdout.startswith("Z")

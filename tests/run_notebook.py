@@ -12,7 +12,7 @@ from typing import Any
 import nbclient
 import nbformat
 
-SECONDS = 120
+SECONDS = 1800
 
 
 def shown(output: dict[str, Any]) -> tuple[list[str], str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from symphys.api.transcriptions import linearized, recorded, transcribed
 from symphys.api.values import by_name, vector
 from symphys.codegen.backends import require_backend
+from symphys.codegen.backends.precision import warn
 from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.problem.loading import Source, load
@@ -78,7 +78,7 @@ class CompiledRollout:
         """Both, at the cost of the gradient."""
         batch, single = rows(Z, self.n)
         found = self._evaluator.gradient(batch, self.smoothing)
-        self._warn()
+        warn(self.problem.name, self._made.backend.doubt())
         return np.asarray(first(found.merit, single)), np.asarray(first(found.gradient, single))
 
     def residuals(self, Z: ArrayLike) -> Array:
@@ -92,7 +92,7 @@ class CompiledRollout:
         self._require_squares()
         batch, single = rows(Z, self.n)
         jacobian = self._evaluator.jacobian(batch, self.smoothing).jacobian
-        self._warn()
+        warn(self.problem.name, self._made.backend.doubt())
         return np.asarray(first(jacobian, single))
 
     def evaluate(self, Z: ArrayLike) -> Values:
@@ -138,12 +138,6 @@ class CompiledRollout:
     def trajectory(self, z: ArrayLike) -> Trajectory:
         """The motion of one z (n,); NotFinite if there is none."""
         return self._made.simulate(np.asarray(z, float), self.smoothing)
-
-    def _warn(self) -> None:
-        """RuntimeWarning where gradients in single precision were found to be far off."""
-        told = self._made.backend
-        if told.precision == "single" and (doubt := told.later()):
-            warnings.warn(f"{self.problem.name}: {doubt}", RuntimeWarning, stacklevel=3)
 
     def _require_squares(self) -> None:
         if not self._made.shooting.squares:

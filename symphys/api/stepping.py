@@ -31,7 +31,8 @@ def compile_step(
         sensors: names of those that are observed. None: those of these controllers, or else all; without any, the
             positions, orientations and velocities of all bodies are observed.
         smoothing: of the contacts [m/s]; 0 is the exact contact law.
-        backend: what evaluates: "auto", "simd", "simd32", "cuda", "cuda32" or "casadi".
+        backend: what evaluates: "auto", "simd", "simd32", "cuda", "cuda32" or "casadi". The first adjoints of a step in
+            single precision are compared with double precision; those of a chain of steps are not, and may be far off.
         threads: that share a batch; None: one for each processor.
 
     Raises:

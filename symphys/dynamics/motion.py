@@ -21,7 +21,7 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 MAX_TURN = 4.0
-"""[rad] largest angle by which the paths of a body's points turn in a step: parabolas leave circles beyond it."""
+"""[rad] Largest angle by which the paths of a body's points turn in a step: beyond it parabolas leave the circles."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class PredictedMotion(PredictedPath):
         return ca.SX(0) if self.massless else self.mass
 
     def predicted_path(self) -> PredictedPath:
-        """The motion without its inertia; it turns by ``MAX_TURN`` in the step at most."""
+        """The motion without its inertia, which turns by at most ``MAX_TURN`` in the step."""
         path = PredictedPath(**{field.name: getattr(self, field.name) for field in fields(PredictedPath)})
         return replace(path, angular_velocity=self.path_turn[0], angular_acceleration=self.path_turn[1])
 
@@ -119,7 +119,7 @@ class PredictedMotion(PredictedPath):
 
 
 def bounded_turn(angular_velocity: Expr, dt: Expr) -> tuple[Expr, Expr]:
-    """(3,): an angular velocity, shortened to ``MAX_TURN`` in the time ``dt`` [s]; 1 if it is longer, else 0."""
+    """An angular velocity (3,) shortened to ``MAX_TURN`` in the time ``dt`` [s], and 1 if it was longer, else 0."""
     square = dt * dt * ca.dot(angular_velocity, angular_velocity)
     fast = square > MAX_TURN**2
     return angular_velocity * ca.if_else(fast, MAX_TURN / ca.sqrt(ca.fmax(square, MAX_TURN**2)), 1), fast
@@ -231,7 +231,7 @@ def _middle(inertia: Expr, q: Expr, w: Expr | None, momentum: Expr, t: Expr) -> 
 
 
 def _inertias(inertia: Expr, middle: Expr) -> tuple[Expr, Expr]:
-    """At the orientation ``middle``: inverse inertia and inertia."""
+    """Inverse inertia and inertia at the orientation ``middle``."""
     if isotropic(inertia):
         return 1 / inertia, inertia_matrix(inertia)
     turned = rotation.matrix(middle)
@@ -239,6 +239,6 @@ def _inertias(inertia: Expr, middle: Expr) -> tuple[Expr, Expr]:
 
 
 def _turning(inverse: Expr, angular_velocity: Expr) -> Expr:
-    """(3, 3): how fast an inverse inertia changes as its body turns [1/(kg m^2 s)]."""
+    """The time derivative (3, 3) of an inverse inertia as its body turns [1/(kg m^2 s)]."""
     changing: Expr = ca.mtimes(rotation.cross_matrix(angular_velocity), inverse)
     return changing + changing.T

@@ -42,7 +42,7 @@ def iterate(
 ) -> Iterate:
     """The solution after all sweeps; in clusters of unequal bodies with a line search after some of them.
 
-    Groups whose loads may be open begin where Newton's method takes them.
+    Groups whose loads statics may leave undetermined start from the solution of Newton's method.
     """
     world, sweeps, motions = context.world, context.settings.scheme.sweeps, trees.motions
     for group in open_groups(context, constraints, start.momenta):

@@ -68,7 +68,7 @@ def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
 
 
 def _with_unit_orientations(context: StepContext, x: State) -> State:
-    """The state with orientations of length 1: an optimiser that has states as variables leaves them at any length."""
+    """The state with orientations of length 1; optimisers that have states as variables leave them at any length."""
     names = [f"{body.name}.orientation" for body in context.world.bodies]
     return x | {name: _normalised(x[name]) for name in names}
 

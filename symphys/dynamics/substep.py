@@ -51,7 +51,7 @@ Expr = Any
 
 NONE = ca.SX(0)
 SLIDES = 0.999
-"""Of the largest friction: from there on surfaces slide."""
+"""Surfaces count as sliding from this share of the largest friction on."""
 ZERO_MOMENTUM = Momentum(ca.SX.zeros(3), ca.SX.zeros(3))
 
 
@@ -184,7 +184,7 @@ def _moving_bodies(
 
 
 def _kept(context: StepContext, joints: Sequence[JointConstraint], forces: State) -> State:
-    """What is stored of the forces of joints."""
+    """The forces of joints that are stored: all of them with a warm start, else commands alone."""
     warm = context.settings.scheme.warm_start
     kept = forces if warm else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
     return kept | commanded(context, joints, forces)
@@ -268,7 +268,7 @@ def _lagging(context: StepContext, x: State, bodies: Sequence[int]) -> tuple[tup
 def _with_late_impulses(
     constraints: Sequence[PlacedConstraint], impulses: Sequence[ContactImpulse], momenta: Momenta
 ) -> tuple[tuple[ContactImpulse, ...], Momenta]:
-    """Impulses and momenta with what soft contacts that begin or end have given by the end of the substep."""
+    """Add the late impulses of soft contacts that begin or end in the substep; see ``SoftImpulse.late``."""
     whole, soft = list(impulses), [k for k, each in enumerate(constraints) if each.constraint.law.soft]
     found = [opened(each, k) if soft else each for k, each in enumerate(momenta)]
     for k in soft:
@@ -281,13 +281,11 @@ def _with_late_impulses(
 
 @traced
 def _late(constraint: ContactConstraint, impulse: ContactImpulse, momenta: Momenta) -> tuple[ContactImpulse, Momenta]:
-    """Friction of surfaces that slide comes late by the same share."""
+    """Impulse and momenta with the late normal impulse; friction of surfaces that slide grows in proportion."""
     assert constraint.soft is not None
     late = ca.if_else(impulse.normal > 0, constraint.soft.late, 0)
-    most, given = (
-        constraint.law.friction * impulse.normal,
-        ca.sqrt(ca.dot(impulse.tangent, impulse.tangent) + TINY_SQUARE),
-    )
+    most = constraint.law.friction * impulse.normal
+    given = ca.sqrt(ca.dot(impulse.tangent, impulse.tangent) + TINY_SQUARE)
     share = ca.if_else(given > SLIDES * most, late / ca.fmax(impulse.normal, TINY_SQUARE), 0)
     more, found = replace(ZERO, normal=late, tangent=share * impulse.tangent), []
     push = more.linear(constraint.impulse_normal)

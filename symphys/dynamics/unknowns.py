@@ -13,7 +13,7 @@ Expr = Any
 """casadi SX"""
 
 COMPLIANCE = 1e-6
-"""Of rigid constraints in ``newton_start``, of their inverse effective masses."""
+"""Compliance of rigid constraints in ``newton_start``, as a share of their inverse effective masses."""
 
 
 @dataclass(frozen=True)

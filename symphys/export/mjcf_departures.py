@@ -72,7 +72,7 @@ def departures(start: StartState) -> list[Departure]:
 
 
 def shorter_step(dt: float, count: int) -> Iterator[Departure]:
-    """That a step is written in parts."""
+    """The departure of a time step that is cut into parts."""
     if count > 1:
         text = f"{dt / count:g} s in place of {dt:g} s, at which MuJoCo does not hold these motors, springs or contacts"
         yield Departure("approximated", ("time step",), text)

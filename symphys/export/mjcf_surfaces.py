@@ -15,9 +15,9 @@ MJCF_PLACEMENT = {"centre": "pos", "orientation": "quat"}
 APART = {"contype": "1", "conaffinity": "0"}
 """Of a geom that touches another in an explicit pair only: affinity with none. Readers see that it is no picture."""
 IMPEDANCE = 0.01
-"""Of contacts that give way: they are springs and dampers beside the other forces, a hundredth too soft."""
+"""Impedance of soft contacts: so small that they add to other forces as springs and dampers do, 1 % too soft."""
 FRICTION_RATIO = 100.0
-"""Of the impedance of friction to that of contacts: friction does not give way with them."""
+"""Impedance of friction over that of contacts, so that friction is not soft with them."""
 
 
 def text(numbers: Iterable[Any]) -> str:
@@ -85,7 +85,7 @@ def pairs(world: World, step: float, stiffer: Mapping[tuple[str, str], float]) -
 
 
 def softness(law: Law, step: float, factor: float) -> dict[str, str]:
-    """Of a contact that gives way: stiffness and damping by mass, MuJoCo's direct form; friction stops within steps."""
+    """Attributes of a soft contact: stiffness and damping by mass, MuJoCo's direct form; friction acts within steps."""
     if not law.soft:
         return {}
     rate, stop = 2 * pi * float(law.frequency), IMPEDANCE / step

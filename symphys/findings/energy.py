@@ -24,7 +24,7 @@ DRIFTED_LIMITS = (1e-3, 5e-2)
 """The same, added up over the motion."""
 
 JUMP_LIMITS = (2e-2, 0.1)
-"""Of a body's size, or of a radian."""
+"""Change of place that is noticeable, and that is too large, as a share of a body's size or of a radian."""
 
 
 def largest_energy(trust: Examination) -> float:
@@ -58,16 +58,8 @@ def jump_findings(trust: Examination) -> list[Finding]:
         "it there at once, as a coupling or a limit that is not kept, or bodies that begin inside each other."
     )
     doubt = f"{where} jumps by {show(trust.jump_size, 3)}, which no velocity explains"
-    return [
-        Finding(
-            ENERGY,
-            level,
-            "Change of place that no velocity explains",
-            show(trust.jump_size, 3),
-            meaning,
-            doubt * (level == BAD),
-        )
-    ]
+    what = "Change of place that no velocity explains"
+    return [Finding(ENERGY, level, what, show(trust.jump_size, 3), meaning, doubt * (level == BAD))]
 
 
 def balance_finding(trust: Examination) -> Finding:

@@ -1,4 +1,4 @@
-"""What stands in the way of an answer: targets in conflict, costs that hold them back, too many equations, bounds."""
+"""Obstacles to an answer: targets in conflict, costs that hold targets back, too many equations, bounds."""
 
 from __future__ import annotations
 

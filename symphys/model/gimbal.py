@@ -1,4 +1,4 @@
-"""Gimbal lock: whether joints between two bodies, with frames without mass between them, can come to have no inertia.
+"""Gimbal lock: poses in which joints with massless frames between two bodies have a coordinate without inertia.
 
 A chain of joints is singular where its screws are linearly dependent: the rates of its frames are then free, and no
 inertia answers. Three hinges through one point are where their axes lie in one plane.
@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 SINGULAR = 1e-5
 """Least singular value of unit screws that counts as 0."""
 TRIALS, REFINED = 60, 3
-"""Poses that are looked at, and how many of them a search begins from."""
+"""Random poses that are tried, and from how many of them a search for the least singular value begins."""
 REACH = 1.0
-"""[m] of a slide without limits."""
+"""[m] How far a slide without limits is moved."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 STEEPEST = 3.0
-"""Times the lower of the slopes to both neighbours: the largest slope at a height between them."""
+"""Largest slope at a height, as a multiple of the smaller of the slopes to its neighbours."""
 SIDES = (-1, 1)
 
 

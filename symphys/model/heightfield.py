@@ -24,13 +24,13 @@ Expr = Any
 PIECES = (1, -4, 6, -4)
 """A cubic B-spline on the knots -2, -1, 0, 1, 2 is the sum of these times max(t - knot, 0)^3 / 6, up to t = 2."""
 VALUE, SLOPE = (1 / 6, 4 / 6, 1 / 6), (-1 / 2, 0, 1 / 2)
-"""Of a cubic B-spline at the heights before, at and after its middle."""
+"""Values and slopes of a cubic B-spline at the heights before, at and after its middle."""
 ROUNDING = 1e-12
-"""Times the largest height: where less would be taken off a slope the spline stays as it is."""
+"""Smallest change of a slope that is made, as a share of the largest height."""
 FINER = 4
-"""Parts of a spacing at which a surface is compared with triangles."""
+"""Number of parts of a spacing at whose ends a surface is compared with triangles."""
 MOST_COMPARED = 1_000_000
-"""Places at which it is at most, about."""
+"""Largest number of places at which it is compared, roughly."""
 
 
 @dataclass(frozen=True)

@@ -145,7 +145,7 @@ class CheckpointKeeper:
     """Writes a checkpoint now and then, so that a run whose process is killed goes on from there."""
 
     def __init__(self, claim: Claim, log: Log, every: float) -> None:
-        """The first is due after so many seconds, ``every``, and so is each that follows one."""
+        """Write none before ``every`` [s] have passed, at the beginning and after each checkpoint."""
         self.claim, self.log, self.every = claim, log, every
         self.due = monotonic() + every
 
@@ -182,33 +182,36 @@ def write_result(job: Job, claim: Claim, result: Result) -> None:
 
 
 def stop_at_limit(job: Job, message: str) -> Result:
-    """Write that a limit ended the run's process, with the best point of its checkpoint, from where it can go on.
+    """Write that a limit ended the run's process, with the best point of its checkpoint, from where it can go on."""
 
-    A folder that says how the run ended is left as it is, and so is one that another process works in.
-    """
-    result = interruption(job, message, None)
-    with contextlib.suppress(files.FileError), claimed(job.folder.path) as claim:
-        found = standing(job)
-        if found.result and over(job, found):
-            return found.result
-        if found.stands in (Stands.NEW, Stands.CHANGED, Stands.DAMAGED):
-            job.folder.begin(job.config, job.problem.text)
+    def stopped() -> Result:
         checkpoint = job.folder.checkpoint()
-        result = interruption(job, message, checkpoint)
         if rows := checkpoint_rows(checkpoint):
             job.folder.write_trace(rows)
-        write_result(job, claim, result)
-    return result
+        return interruption(job, message, checkpoint)
+
+    return write_end(job, stopped) or interruption(job, message, None)
 
 
 def give_up(job: Job, message: str, again: bool) -> Result:
-    """Write that the run failed, unless its folder says how it ended, or is another process's; see ``failure``."""
-    result = failure(job, message, again)
+    """Write that the run failed; see ``failure``."""
+    failed = failure(job, message, again)
+    return write_end(job, lambda: failed) or failed
+
+
+def write_end(job: Job, make: Callable[[], Result]) -> Result | None:
+    """Write how a run ended whose process is gone, and return what its folder says.
+
+    A folder that says how the run ended is left as it is. One that another process works in, or that cannot be read,
+    is not touched: None. What ``make`` returns is the result even where it cannot be written.
+    """
+    result = None
     with contextlib.suppress(files.FileError), claimed(job.folder.path) as claim:
         found = standing(job)
         if found.result and over(job, found):
             return found.result
         if found.stands in (Stands.NEW, Stands.CHANGED, Stands.DAMAGED):
             job.folder.begin(job.config, job.problem.text)
+        result = make()
         write_result(job, claim, result)
     return result

@@ -77,7 +77,7 @@ def peak_memory() -> int | None:
     try:
         lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
         return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
-    except (OSError, StopIteration, ValueError, IndexError):
+    except (OSError, StopIteration):  # no Linux, or one whose /proc does not say it
         pass
     try:
         import resource
@@ -98,7 +98,7 @@ def working_copy() -> dict[str, Any]:
         here = Path.cwd()
         git = next((folder / ".git" for folder in (here, *here.parents) if (folder / ".git").exists()), None)
         commit = commit_of(git) if git else ""
-    except (OSError, ValueError):  # a folder that is gone, or may not be looked into
+    except OSError:  # a folder that is gone, or may not be looked into: its commit is not known
         return {}
     return {"commit": commit} if commit else {}
 
@@ -137,12 +137,15 @@ def line_of(path: Path) -> str:
 
 
 def read(path: Path, most: int) -> str:
-    """The text of a regular file of so many bytes at most; empty if there is none."""
+    """The text of a regular file of so many bytes at most; empty if there is none.
+
+    Most of the files that are looked for are missing, as each reference is kept in one of three places.
+    """
     try:
         files.check_regular(path)
         with path.open("rb") as file:
             content = file.read(most + 1)
-    except (OSError, ValueError):
+    except (OSError, ValueError):  # ValueError: the path, read from another file, has a null character
         return ""
     return content.decode(errors="replace") if len(content) <= most else ""
 

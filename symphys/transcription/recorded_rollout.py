@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from symphys.codegen import Kernel, KernelUnavailable, processors
 from symphys.codegen.backends import PRECISIONS, build_kernel
+from symphys.codegen.backends.precision import warn
 from symphys.errors import SymphysError
 from symphys.expression import Formula, FormulaError, parse
 from symphys.problem import Problem
@@ -28,10 +29,12 @@ class RecordedRollout:
     """A kernel for batches Z (B, n): the value of each row, and quantities at the ends of all N steps.
 
     Attributes:
+        name: of the problem.
         quantities: by name, the numbers in one: 3 of a position.
         steps: N.
     """
 
+    name: str
     quantities: Mapping[str, int]
     steps: int
     smoothing: float
@@ -47,7 +50,9 @@ class RecordedRollout:
         """(B, n) the adjoint of Z, from those of the values (B,) and of the quantities (B, N, k) by name."""
         parts = [np.asarray(quantities[name], float).reshape(len(Z), -1) for name in self.quantities]
         seeds = np.ascontiguousarray(np.concatenate([np.asarray(value, float)[:, None], *parts], axis=1))
-        return self._kernel.gradient(Z, seeds, (self.smoothing,))[1]
+        adjoint = self._kernel.gradient(Z, seeds, (self.smoothing,))[1]
+        warn(self.name, self._kernel.doubt)
+        return adjoint
 
 
 def record_rollout(
@@ -80,7 +85,7 @@ def record_rollout(
     except KernelUnavailable as error:
         raise SymphysError(f"quantities need a kernel: {error}") from None
     sizes = {name: program.outputs[name].size // rollout.steps for name in formulas}
-    return RecordedRollout(sizes, rollout.steps, smoothing, kernel)
+    return RecordedRollout(problem.name, sizes, rollout.steps, smoothing, kernel)
 
 
 def parsed(rollout: Rollout, text: str) -> Formula:

@@ -13,8 +13,9 @@ from typing import Any
 
 import pytest
 from thread_engine import Threads
+from waiting import FOREVER
 
-from symphys.batches import BatchLimits, BatchResult, following, run_on
+from symphys.batches import BatchLimits, BatchResult, following, limits, run_on
 from symphys.batches.engines import EngineError, driver, open_engine
 from symphys.batches.engines.board import BEGUN, NOTE, OVER, Board
 from symphys.batches.engines.driver import DriverTask, drive
@@ -92,7 +93,7 @@ def test_ctrl_c_stops_drivers_where_they_can_go_on(run: Any, make_job: MakeJob, 
     stopped = threading.Event()
 
     def slow(problem: Any, exact: bool) -> Any:
-        stopped.wait(10)
+        stopped.wait(FOREVER)
         while not (boards(tmp_path)[0] / "stop").exists():
             stopped.wait(0.01)
         return transcribe(problem, exact)
@@ -116,17 +117,24 @@ def test_ctrl_c_stops_drivers_where_they_can_go_on(run: Any, make_job: MakeJob, 
     assert rest.accepted and (recorder.counted("resumed"), recorder.counted("started")) == (1, 2)
 
 
-def test_the_time_of_a_batch_ends_it(run: Any, make_job: MakeJob, tmp_path: Path) -> None:
+def test_the_time_of_a_batch_ends_it(
+    run: Any, make_job: MakeJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The time is up as soon as a run has begun."""
+    begun: list[object] = []
+    monkeypatch.setattr(limits, "monotonic", lambda: len(begun))
+
     def slow(problem: Any, exact: bool) -> Any:
+        begun.append(problem)
         while not (boards(tmp_path)[0] / "stop").exists():
             threading.Event().wait(0.01)
         return transcribe(problem, exact)
 
     jobs = [make_job(seed, iterations=5) for seed in range(2)]
-    batch, _ = run(jobs, transcribe=slow, limits=BatchLimits(budget=0.2))
+    batch, _ = run(jobs, transcribe=slow, limits=BatchLimits(budget=0.5))
     assert (batch.spent, batch.interrupted) == (True, False)
     (halfway,) = [result for result in batch.results if result]
-    assert halfway.interrupted and "0.2 s of the batch are used up" in halfway.advice
+    assert halfway.interrupted and "0.5 s of the batch are used up" in halfway.advice
 
 
 def test_a_run_that_kills_its_drivers_is_given_up_and_the_same_command_tries_it_again(

@@ -6,7 +6,6 @@ No test waits for a time: the clock of the limits jumps once the run has come to
 from __future__ import annotations
 
 import importlib
-import os
 import signal
 import subprocess
 import sys
@@ -18,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from waiting import assert_gone, wait_for
 
 from symphys.batches import BatchLimits, limits, pool, run_batch
 from symphys.batches.process_tree import end_tree
@@ -45,7 +45,7 @@ def hang(*_):
     re.match("(a+)+$", "a" * 64 + "b")
 
 def compile_for_ever():
-    shell = "touch %s; sleep 100000 & echo $! > %s; wait" % (MARK, MARK.with_name("compiler"))
+    shell = "sleep 100000 & echo $! > %s; touch %s; wait" % (MARK.with_name("compiler"), MARK)
     subprocess.run(["sh", "-c", shell], start_new_session=True)
 
 def transcribe(problem, exact=False):
@@ -146,12 +146,7 @@ def test_compilers_end_with_the_run_that_they_are_for(
     monkeypatch.setenv("HANGS_AT", "compiling")
     ended = limited(job, recorder, hanging.transcribe, BatchLimits(timeout=LONG))
     assert ended.interrupted and "building and compiling" in ended.advice
-    compiler = int(hanging.MARK.with_name("compiler").read_text())
-    until = time.monotonic() + 60  # whoever inherits it has to take note of its end
-    while Path(f"/proc/{compiler}").exists() and time.monotonic() < until:
-        time.sleep(0.01)
-    with pytest.raises(ProcessLookupError):
-        os.kill(compiler, 0)
+    assert_gone(hanging.MARK.with_name("compiler"))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="processes are ended, their descendants are not known")
@@ -159,12 +154,7 @@ def test_a_tree_of_processes_ends_to_its_leaves(tmp_path: Path) -> None:
     shell = f"setsid sh -c 'sleep 100000 & echo $! > {tmp_path}/leaf; wait' & wait"
     with subprocess.Popen(["sh", "-c", shell]) as root:
         leaf = tmp_path / "leaf"
-        while not (leaf.exists() and leaf.read_text().endswith("\n")):
-            time.sleep(0.01)
+        wait_for(leaf)
         end_tree(root.pid)
         assert root.wait() == -signal.SIGKILL
-    until = time.monotonic() + 60
-    while Path(f"/proc/{leaf.read_text().strip()}").exists() and time.monotonic() < until:
-        time.sleep(0.01)
-    with pytest.raises(ProcessLookupError):
-        os.kill(int(leaf.read_text()), 0)
+    assert_gone(leaf)

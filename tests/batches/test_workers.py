@@ -8,15 +8,15 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+from waiting import FOREVER
 
-from symphys.batches import BatchLimits, run_batch
+from symphys.batches import BatchLimits, limits, run_batch
 from symphys.batches import pool as pools
 from symphys.problem import load_problem
 from symphys.results.result import read_result
@@ -120,18 +120,18 @@ def test_workers_that_do_not_start_leave_the_work_to_this_process(
     assert len([note for note in recorder.notes if "do not start: the last died with exit code 3" in note]) == 1
 
 
-def test_the_time_of_a_batch_ends_it_in_good_order(make_job: Callable[..., Job], recorder: Any) -> None:
-    """Where its runs are in this process, after an iteration."""
+def test_the_time_of_a_batch_ends_it_in_good_order(
+    make_job: Callable[..., Job], recorder: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where its runs are in this process, after an iteration; the clock goes on by one second with each."""
     jobs = [make_job(seed, iterations=5) for seed in range(2)]
-
-    def wait(*_: object) -> None:
-        time.sleep(0.3)
-
-    recorder.advanced = wait
-    batch = run_batch(jobs, 1, recorder, transcribe, multi_start=True, limits=BatchLimits(budget=0.4))
+    seconds: list[object] = []
+    monkeypatch.setattr(limits, "monotonic", lambda: len(seconds))
+    recorder.advanced = lambda *row: seconds.append(row)
+    batch = run_batch(jobs, 1, recorder, transcribe, multi_start=True, limits=BatchLimits(budget=1.5))
     assert (batch.spent, batch.interrupted, batch.accepted) == (True, False, False)
     first, second = batch.results
-    assert first and first.interrupted and "0.4 s of the batch" in first.advice and second is None
+    assert first and first.interrupted and "1.5 s of the batch" in first.advice and second is None
     del recorder.advanced
     assert run_batch(jobs, 1, recorder, transcribe).accepted
 
@@ -212,13 +212,13 @@ def test_runs_that_another_command_is_at_are_waited_for_and_taken_from_there(
     def work() -> None:
         with claimed(jobs[1].folder.path) as claim:
             held.set()
-            waited.wait(30)
+            waited.wait(FOREVER)
             with_claim(jobs[1], claim, lambda row: None, TranscriptionCache(transcribe))
 
     held, waited = threading.Event(), threading.Event()
     thread = threading.Thread(target=work)
     thread.start()
-    held.wait(30)
+    held.wait(FOREVER)
     recorder.note = lambda text: (other.notes.append(text), waited.set())
     batch = run_batch(jobs, processes, recorder, transcribe)
     thread.join()

@@ -38,7 +38,6 @@ DIRECTIVE = re.compile(r"\{(?!code|sourcecode)[a-z:-]+\}")
 """Any of MyST, whose build checks them, but those that would hide code from these tests."""
 PLAIN_COMMANDS = {"pip", "apt-get", "cd", "git", "eval", "export", "python", "python3"}
 SECONDS = 1800.0
-"""Longer than a block takes on a slow machine: what hangs ends."""
 CROQUET = ("docs/first_problem.md", "README.md")
 
 

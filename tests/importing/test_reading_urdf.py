@@ -131,6 +131,20 @@ def test_a_negative_mass_is_refused(tmp_path: Path) -> None:
         source_of(tmp_path, ARM.replace('value="2"', 'value="-2"', 1))
 
 
+@pytest.mark.parametrize(
+    ("old", "new"), [('value="2"', 'value="1e308"'), ('ixz="0"', 'ixz="1e308"'), ('xyz="0 0 0.1"', 'xyz="0 0 1e308"')]
+)
+def test_masses_inertias_and_centres_beyond_what_can_be_computed_are_refused(
+    tmp_path: Path, old: str, new: str
+) -> None:
+    """Also where MuJoCo refuses the numbers and those of the file are taken; links without mass are such."""
+    for mass in ("0.1", "0"):
+        text = ARM.replace('ixx="0.1"', f'ixx="{mass}"', 1)
+        assert old in text
+        with pytest.raises(ImportProblem, match=r'<link name="base"> inertial: mass|infinite or beyond 1e\+12'):
+            source_of(tmp_path, text.replace(old, new, 1))
+
+
 @pytest.mark.parametrize("first", [0.1, 0.0])
 def test_inertias_are_turned_with_their_frames(tmp_path: Path, first: float) -> None:
     """By a quarter about x: what was about y is about z; also where MuJoCo refuses the numbers."""

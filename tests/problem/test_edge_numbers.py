@@ -7,8 +7,9 @@ import re
 from pathlib import Path
 
 import pytest
-from mutated_files import CHANGES, KINDS, mutated, outcome
+from mutated_files import CHANGES, KINDS, outcome
 from mutated_texts import PROBLEM
+from mutations import mutated
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem
@@ -59,4 +60,4 @@ def test_every_change_changes_something() -> None:
     """Else the thousands would be copies of what works."""
     dice, text = random.Random(1), PROBLEM.encode()
     assert all(change(text, dice) != text for change in CHANGES)
-    assert len({mutated(text, dice) for _ in range(20)}) > 15
+    assert len({mutated(text, dice, CHANGES) for _ in range(20)}) > 15

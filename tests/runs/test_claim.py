@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from waiting import FOREVER, until
 
 from symphys.files import FileError
 from symphys.runs import claim as claims
@@ -177,10 +178,7 @@ def test_a_held_claim_is_touched(folder: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(claims, "HEART", claims.Heart())
     with claimed(folder) as claim:
         os.utime(claim.path, (1, 1))
-        end = time.monotonic() + 5
-        while claim.path.lstat().st_mtime == 1 and time.monotonic() < end:
-            time.sleep(0.01)
-        assert claim.path.lstat().st_mtime > 1
+        until(lambda: claim.path.lstat().st_mtime > 1)
 
 
 HOLD = """
@@ -208,7 +206,7 @@ print(json.dumps(seen))
 def test_of_many_processes_one_is_in_at_a_time(folder: Path) -> None:
     command = [sys.executable, "-c", HOLD, str(folder)]
     started = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(3)]
-    found = [json.loads(each.communicate(timeout=60)[0]) for each in started]
+    found = [json.loads(each.communicate(timeout=FOREVER)[0]) for each in started]
     assert [each["in"] for each in found] == [25] * 3
     assert sum(each["both"] for each in found) == 0
 

@@ -79,6 +79,7 @@ class Description:
         seconds: until it could evaluate.
         note: what the user should know, such as why it is not the backend that was wanted; or empty.
         later: what was decided while it evaluated, to be asked when that is over; or empty.
+        doubt: what the user should know of the gradients computed so far; or empty.
         flags: with which the compiler was called.
         finish: waits for what is still being compiled.
     """
@@ -92,6 +93,7 @@ class Description:
     seconds: float = 0.0
     note: str = ""
     later: Callable[[], str] = field(default=nothing, repr=False, compare=False)
+    doubt: Callable[[], str] = field(default=nothing, repr=False, compare=False)
     flags: tuple[str, ...] = ()
     finish: Callable[[], object] = field(default=nothing, repr=False, compare=False)
 

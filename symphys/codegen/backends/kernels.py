@@ -109,5 +109,6 @@ def described(kernel: Kernel, seconds: float, precision: str | None = None, note
         seconds=seconds,
         note=joined(report.note, note),
         later=lambda: kernel.chosen,
+        doubt=lambda: kernel.doubt,
         finish=kernel.widths.finish if isinstance(kernel, ProcessorKernel) else nothing,
     )

@@ -1,13 +1,17 @@
-"""Whether gradients in single precision are worth their name: the first ones, compared with double precision.
+"""Comparison of the first gradients in single precision with those in double precision.
 
 Rounding grows along a motion as any change does. Gradients of a robot's 200 steps in single precision were off by 60 %
 of their norm in the median, and by 96 times at worst, where those of a thrown ball are right to five digits. Which it
 is depends on the motion, so the first rows that a solve asks for are computed in double precision too. That needs no
 compiler run: the functions of a large program go through an interpreter.
+
+Of a single time step, the gradients of that step are compared. What rounding becomes over a chain of steps is not seen
+there.
 """
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -21,11 +25,11 @@ from symphys.codegen.toolchain.warm_start import ProgramSource
 Array = NDArray[np.float64]
 
 MAX_ERROR = 0.1
-"""Of a gradient's length: the largest error of single precision that is not reported."""
+"""Largest error of a gradient, as a share of its length, that is not reported."""
 ROWS = 4
-"""Rows that are compared, at most: they fit into one block of the processor."""
+"""Largest number of rows that are compared: they fit into one block of the processor."""
 SMALL = 1e-3
-"""Of the longest gradient: what a shorter one is compared with, so that rounding of nearly nothing is no error."""
+"""Shortest length that errors are compared with, as a share of the longest gradient: a row of nearly 0 has rounding."""
 WARNING = (
     "gradients in single precision are off by {error} of their length here: use the backend simd or cuda, or a solver "
     "without gradients"
@@ -58,6 +62,17 @@ class PrecisionCheck:
         return WARNING.format(error=in_words(error)) if error > MAX_ERROR else ""
 
 
+def warn(subject: str, doubt: str) -> None:
+    """Give a RuntimeWarning, at the line that called the method that calls this, if there is a doubt.
+
+    Args:
+        subject: the name of the problem.
+        doubt: of a kernel's gradients, or empty.
+    """
+    if doubt:
+        warnings.warn(f"{subject}: {doubt}", RuntimeWarning, stacklevel=3)
+
+
 def first_rows(values: ArrayLike, rows: int) -> Array:
     """The first rows of (batch, n), or one (n,) for all."""
     array = np.asarray(values, float)
@@ -65,7 +80,7 @@ def first_rows(values: ArrayLike, rows: int) -> Array:
 
 
 def largest_error(found: Array, exact: Array) -> float:
-    """Of gradients (rows, n) by their lengths, where ``exact`` is finite; inf where ``found`` is not."""
+    """Largest error of gradients (rows, n) by their lengths, of finite rows of ``exact``; inf if ``found`` is not."""
     known = np.isfinite(exact).all(axis=1)
     if not known.any():
         return 0.0
@@ -79,7 +94,7 @@ def largest_error(found: Array, exact: Array) -> float:
 
 
 def in_words(error: float) -> str:
-    """``60 %``, ``96 times``."""
+    """A relative error in words: ``60 %``, ``96 times``."""
     if not np.isfinite(error):
         return "any multiple"
     return f"{100 * error:.0f} %" if error < 2 else f"{error:.0f} times"

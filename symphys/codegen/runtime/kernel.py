@@ -21,7 +21,7 @@ from symphys.codegen.toolchain.report import BuildReport
 Outputs = dict[str, NDArray[np.float64]]
 """name -> (batch, size)"""
 GradientCheck = Callable[[Array, tuple[Any, ...]], str]
-"""Of gradients (batch, n) and the arguments of the call that gave them: what the user should know, or empty."""
+"""Takes gradients (batch, n) and the arguments of their call; returns a warning for the user, or nothing."""
 
 
 class Kernel(ABC):
@@ -29,9 +29,9 @@ class Kernel(ABC):
 
     threads = 1
     check: GradientCheck | None = None
-    """Called with the first gradients; what it says is the kernel's ``doubt``."""
+    """Is called with the first gradients, and returns the kernel's ``doubt``."""
     doubt = ""
-    """What the user should know of the gradients, or empty."""
+    """A warning for the user about the gradients, or empty."""
 
     def __init__(self, program: Program, report: BuildReport, seeded: Sequence[str]) -> None:
         """``seeded``: names of the outputs that are differentiated."""

@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # what writes C is imported where it is called: a second star
 WORTH = 20_000
 """Operations of a kernel that takes long to compile, some seconds."""
 LONG = 30.0
-"""[s] of compiling that is told beforehand."""
+"""[s] Compiling that takes at least this long is announced."""
 
 
 def compile_program(

@@ -97,7 +97,7 @@ def update_configuration(
 ) -> tuple[tuple[FinalPose, ...], tuple[JointCorrection, ...], RotorCorrection, Columns]:
     """Where the bodies of a tree come to, and what joints did to their displacements and to those of rotors.
 
-    Last by how much the coordinates of each link went on (count,) [rad] or [m].
+    The last result is how far the coordinates of each link moved (count,) [rad] or [m].
 
     ``along``: displacements along the tree's numbers; ``by_loops``: what of them joints that close loops did.
     """

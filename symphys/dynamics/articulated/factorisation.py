@@ -13,9 +13,9 @@ Expr = Any
 Sparse = dict[int, Expr]
 """Entries of a vector by index; what is not there is zero."""
 ROUNDING = 1e-15
-"""Of an entry of the diagonal: a pivot that elimination leaves less of is rounding. Joints far apart may leave 0."""
+"""Smallest pivot as a share of its entry on the diagonal: a smaller one is rounding, as of joints far apart."""
 TINY = 1e-60
-"""[kg m^2] or [kg], the same where that entry is 0 itself."""
+"""[kg m^2] or [kg] Smallest pivot where that entry is 0."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Factorisation:
     pivots: Expr
 
     def matrix(self) -> Expr:
-        """(n, n): what was factored."""
+        """The matrix (n, n) that was factored."""
         unit = ca.SX.eye(self.pivots.size1())
         return ca.mtimes(unit + self.lower, ca.mtimes(ca.diag(1 / self.pivots), unit + self.upper.T))
 

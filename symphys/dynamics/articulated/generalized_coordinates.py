@@ -141,7 +141,7 @@ def _counted(
 
 @traced
 def mass_matrix(coordinates: GeneralizedCoordinates) -> Expr:
-    """(n, n): by the generalized velocities of a tree, in which root and branches are decoupled."""
+    """The mass matrix (n, n) of a tree by its generalized velocities, in which root and branches are decoupled."""
     places, parts = numbering(coordinates.tree), coordinates.matrix
     n = coordinates.tree.kinematic_tree.size
     found = ca.SX(n, n)

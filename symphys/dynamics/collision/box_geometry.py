@@ -25,9 +25,9 @@ TINY_CHANGE = 1e-15
 STEP_UP = 0.0015
 """[m] the highest step onto which a box slides: less of an overlap with a top does not count as one with its side."""
 THIN = 0.1
-"""Of the shortest edge of both boxes: the same, for small ones."""
+"""That step is at most this share of the shortest edge of both boxes."""
 FLUSH = 1e-6
-"""[m] the same in directions that are not upright: less of an overlap is the tolerance of a contact."""
+"""[m] Smallest overlap that counts in directions that are not upright; less is within the tolerance of a contact."""
 UPRIGHT = 0.7
 """Cosine of the angle from the vertical within which a direction of separation belongs to a top."""
 
@@ -137,10 +137,11 @@ class Nearing:
 def nearing(
     a: MovingBox, b: MovingBox, faces: list[Parabola], edges: list[Parabola], dt: Expr, radius: Expr = 0.0
 ) -> Nearing:
-    """How two boxes, the first of them grown by ``radius``, come to overlap; the first of equal directions.
+    """Find when and along which direction two boxes come to overlap, the first of them grown by ``radius``.
 
-    Which direction is the last is decided on the way that the true velocities lead, without weight, which what carries
-    a box cancels. An overlap that is smaller than a tolerance does not count. So a box that slides on a top meets no
+    The direction is the one along which they overlap last, the first of equals. It is found on the straight paths along
+    the true velocities, without weight, since the support of a box cancels its weight. An overlap that is smaller than
+    a tolerance does not count. So a box that slides on a top meets no
     side of a block whose top is as high, lower, or higher by up to ``STEP_UP``: there it comes onto the top.
     """
     directions, still = [*faces, *edges], (a.centre - b.centre).start
@@ -176,19 +177,19 @@ def tolerances(a: MovingBox, b: MovingBox, directions: list[Parabola]) -> list[E
 
 
 def leans_little(direction: Expr, gravity: Expr) -> Expr:
-    """1 if a direction (3,) is near the vertical; never without gravity."""
+    """1 if a direction (3,) is near the vertical, which there is only with gravity."""
     lean = ca.dot(direction, gravity)
     return lean * lean > UPRIGHT * UPRIGHT * ca.dot(direction, direction) * ca.dot(gravity, gravity)
 
 
 def shortest(halves: list[Expr]) -> Expr:
-    """The least of half sizes, but for those of a line, which are 0."""
+    """The smallest half size that is not 0, as those of a line are."""
     wide = [ca.SX(half) for half in halves if not is_zero(half)]
     return ca.mmin(ca.vertcat(*wide))
 
 
 def overlaps_from(start: Expr, end: Expr) -> Expr:
-    """The share of the step after which a distance that changes evenly is negative: 0 if it is from the start."""
+    """The share of the step after which a distance that changes linearly is negative; 0 if it is negative at once."""
     return ca.if_else(start > 0, crossed(start, end), 0)
 
 
@@ -207,7 +208,7 @@ def places(
     apart: Expr,
     radius: Expr,
 ) -> list[tuple[Expr, Expr]]:
-    """Along each direction at time t: how far the first box is from the second, and how near is overlapping [m].
+    """For each direction the distance between the centres at time t and the distance below which boxes overlap [m].
 
     ``apart``: (3,) from the second centre to the first then [m].
     """

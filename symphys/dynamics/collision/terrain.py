@@ -27,9 +27,9 @@ CONVEX = 0.1
 FOUND = 0.1
 """How far from perpendicular a line to the surface may be, as a share of its length, and count as a distance."""
 LONGEST = 10.0
-"""Of the height over the surface: the longest step of that search, whose end lies within once the height."""
+"""Longest step of that search, as a multiple of the height over the surface."""
 SHORT = 0.1
-"""[m] a step that is always taken: what is near the surface needs no bound."""
+"""[m] A step of this length is always allowed, since points near the surface need no bound."""
 TINY_AREA = 1e-12
 """[m^2] below which squares of lengths count as zero there."""
 Surface = Callable[[Expr], tuple[Expr, Expr, Expr]]

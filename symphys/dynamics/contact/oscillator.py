@@ -30,20 +30,20 @@ from symphys.maths.smoothing import clip
 Expr = Any
 """casadi SX, MX or DM"""
 
-LONGEST = 2.5
-"""[rad] largest w d of the exact solution: less than half a turn."""
-DAMPED = 15.0
-"""Largest z w d of it, since the solution backwards grows like exp(2 z w d)."""
+MAX_ANGLE = 2.5
+"""[rad] Largest w d for which the exact solution is computed: less than half a turn."""
+MAX_DAMPING = 15.0
+"""Largest z w d for which it is computed, since the solution backwards grows like exp(2 z w d)."""
 DOUBLINGS = 7
-"""From the time of the power series to the whole."""
+"""Doublings of the time that lead from the power series to the whole time."""
 TERMS = 7
-"""Of the power series."""
-LEAST = 1e-12
-"""Of b, by which softness divides."""
+"""Terms of the power series."""
+LEAST_B = 1e-12
+"""Smallest b, by which the softness of a constraint divides."""
 RESOLVED, UNRESOLVED = 1.5, 2.5
 """[rad] w d up to which the law is exact, and from which on it is implicit Euler."""
-TOGETHER = 1 / 6
-"""One over the number of equal oscillators on one body that are stable at any step."""
+INVERSE_COUNT = 1 / 6
+"""One over the number of equal oscillators on one body that are stable at any duration of the step."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Response:
 def response(omega: Expr, ratio: Expr, time: Expr) -> Response:
     """The exact solution over ``time`` [s]; ``ratio`` < 0 for backwards. By power series and doubling of the time."""
     angle = omega * time
-    longest = ca.fmin(LONGEST, DAMPED / ca.fmax(ca.fabs(ratio), 1))
+    longest = ca.fmin(MAX_ANGLE, MAX_DAMPING / ca.fmax(ca.fabs(ratio), 1))
     held = ca.fmin(ca.fmax(angle, 0), longest)
     x = held / 2**DOUBLINGS
     series = [ca.SX(1)]
@@ -116,8 +116,8 @@ def spring_law(forward: Response, backward: Response) -> SpringLaw:
     d, before, share = forward.time, backward.time, forward.sigma / backward.sigma
     kick, half = (d + before) / 2, d / 2
     q = (d * forward.p + before * backward.p * share) / 2
-    stiff, exact = kick * forward.omega**2, ca.fmax(kick / q - 1, LEAST)
-    heavier = ca.fmax(stiff * d / 4 - TOGETHER - exact, 0)
+    stiff, exact = kick * forward.omega**2, ca.fmax(kick / q - 1, LEAST_B)
+    heavier = ca.fmax(stiff * d / 4 - INVERSE_COUNT - exact, 0)
     b, c = exact + heavier, 1 - kick * share / q - heavier
     # v_end = pushed (a - w^2 e) + kept u_, with a = ((1 + b) u - (1 - c) u_) / kick + w^2 e
     kept = forward.kept / backward.sigma

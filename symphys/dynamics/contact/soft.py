@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision.time_of_impact import TOUCH
-from symphys.dynamics.contact.oscillator import LEAST, response, spring_law
+from symphys.dynamics.contact.oscillator import LEAST_B, response, spring_law
 from symphys.maths.smoothing import clip
 from symphys.model.world import Law
 
@@ -21,11 +21,11 @@ Expr = Any
 """casadi SX, MX or DM"""
 
 NEWTON_STEPS = 4
-"""For the instant at which surfaces part."""
+"""Newton steps towards the instant at which surfaces part."""
 NO_FORCE = 1e-30
-"""[m] over stiffness."""
-SHORTEST = 1e-9
-"""Of a substep: the shortest contact, since mean velocities divide by it."""
+"""[m] Force over stiffness that stands for none where it divides."""
+SHORTEST_CONTACT = 1e-9
+"""Shortest contact as a share of a substep, since mean velocities divide by it."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def soft_impulse(law: Law, at: SoftApproach) -> SoftImpulse:
     # how long the surfaces push
     whole = response(omega, ratio, d - flight)
     touching = _time_in_contact(omega, ratio, whole, meeting, (e, a))
-    held = response(omega, ratio, ca.fmax(touching, SHORTEST * d))
+    held = response(omega, ratio, ca.fmax(touching, SHORTEST_CONTACT * d))
     meets = ca.logic_and(at.time > 0, e >= 0)
     event = ca.logic_and(at.active, ca.logic_or(meets, touching < whole.time))
 
@@ -111,7 +111,7 @@ def soft_impulse(law: Law, at: SoftApproach) -> SoftImpulse:
     late = parting + a * left - mean - d / 2 * a
 
     whole_law = spring_law(held, backward)
-    b = ca.if_else(event, ca.fmax(whole_law.b * touching / d, LEAST), whole_law.b)
+    b = ca.if_else(event, ca.fmax(whole_law.b * touching / d, LEAST_B), whole_law.b)
     wanted = ca.if_else(event, given + b * mean, -(whole_law.stiff * e + whole_law.c * base))
     lasts = ca.logic_and(at.active, ca.logic_not(event))
     return SoftImpulse(

@@ -136,7 +136,7 @@ class JointPath:
 
 
 def joint_paths(context: StepContext, x: State, paths: Sequence[PredictedMotion]) -> list[JointPath]:
-    """Of all joints, in a substep from x."""
+    """The paths of all joints in a substep from x."""
     found = []
     for joint in context.world.joints:
         frames = joint_frames(joint, tuple(paths[i] for i in joint.bodies))
@@ -149,7 +149,7 @@ def joint_paths(context: StepContext, x: State, paths: Sequence[PredictedMotion]
 def joint_constraints(
     context: StepContext, x: State, trees: KinematicTrees, paths: Sequence[PredictedMotion], duration: Expr, kick: Expr
 ) -> tuple[list[JointPath], list[JointConstraint], list[PlacedConstraint]]:
-    """(their paths, what the sweeps project, what the position pass closes) of all joints over a substep from x."""
+    """The paths of all joints over a substep from x, the constraints of the sweeps, and those of the position pass."""
     settings, substep = context.settings, SubstepTimes(duration, kick)
     projected, fitted = list[JointConstraint](), list[PlacedConstraint]()
     places, along = _places(context.world, trees), joint_paths(context, x, paths)
@@ -217,7 +217,7 @@ def _places(world: World, trees: KinematicTrees) -> dict[int, tuple[int, Expr]]:
 
 
 def locks_at(context: StepContext, trees: KinematicTrees) -> list[tuple[PlacedConstraint, JointImpulse]]:
-    """The constraints, without impulse, of joints that close loops, at the instant of an impact; soft ones give way."""
+    """The constraints, without impulse, of rigid joints that close loops, at the instant of an impact."""
     found, exact = [], tree_joints(context.world.joints)
     for index, joint in enumerate(context.world.joints):
         if index in exact or joint.soft:

@@ -92,7 +92,7 @@ class CoordinateTerms:
 
 @traced
 def lock_constraint(frames: JointFrames, motions: Motions, substep: SubstepTimes, same: bool) -> LockConstraint:
-    """The locked directions of a joint, rigid or soft: each then a spring and damper on its own effective mass."""
+    """The locked directions of a joint; of a soft one each is a spring and damper on its own effective mass."""
     joint, start, middle = frames.joint, ca.SX(0), substep.duration / 2
     now = frames.placed(start)
     terms, seen, given = frames.terms(motions, middle, start), locked(joint, frames.placed(middle)), locked(joint, now)
@@ -140,7 +140,7 @@ def regular_mobility(terms: tuple[BodyTerm, ...], seen: Directions, same: bool) 
 
 
 def _spring_law(joint: Joint, substep: SubstepTimes) -> SpringLaw:
-    """What a soft joint gives along each of its locked directions."""
+    """The law of a soft joint along each of its locked directions."""
     omega, ratio = 2 * ca.pi * joint.frequency, joint.damping
     return spring_law(response(omega, ratio, substep.duration), response(omega, -ratio, 2 * substep.lag))
 
@@ -148,7 +148,7 @@ def _spring_law(joint: Joint, substep: SubstepTimes) -> SpringLaw:
 def _path_rates(
     frames: JointFrames, motions: Motions, terms: tuple[BodyTerm, ...], directions: tuple[Directions, Directions]
 ) -> tuple[Expr, Expr]:
-    """(n,) each: rates along directions at the start of the substep, and at its middle if forces stay as they were."""
+    """Rates (n,) along directions at the start of the substep, and at its middle under the forces of the last one."""
     start, (given, seen) = ca.SX(0), directions
     before = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
     due = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
@@ -227,7 +227,7 @@ def motor_constraint(
 
 
 def commanded_torque(motor: TorqueMotor | AffineMotor, given: Expr, smoothing: Expr = 0, width: Expr = 0) -> Expr:
-    """What a motor gives by its command alone [N m], [N]; ``width`` of the bounds of its force."""
+    """The torque or force of a motor by its command alone [N m], [N]; ``width`` smooths the bounds of its force."""
     if isinstance(motor, TorqueMotor):
         return clip(given, -motor.torque, motor.torque, smoothing)
     for end, held in zip(motor.command_range or (), (at_least, at_most), strict=False):

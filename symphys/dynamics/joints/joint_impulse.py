@@ -26,7 +26,7 @@ class JointImpulse:
         return int(self.numbers.shape[0])
 
     def like(self, numbers: Expr) -> JointImpulse:
-        """One of these numbers (n,)."""
+        """A joint impulse of other numbers (n,)."""
         return JointImpulse(numbers)
 
     def plus(self, other: JointImpulse) -> JointImpulse:

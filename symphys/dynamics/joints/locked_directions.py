@@ -61,7 +61,7 @@ class LockConstraint:
         return -ca.mtimes(self.mass, self.error + moved)
 
     def at_end(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> JointImpulse:
-        """The force of a joint that is soft at the end of the substep, from what the sweeps found."""
+        """The force of a soft joint at the end of the substep, from momenta and impulse after the sweeps."""
         assert self.lasting is not None
         moving = self.lasting.slope * speeds(self.terms, self.seen, momenta)
         return JointImpulse(impulse.numbers / self.lasting.kick + moving + self.lasting.constant)
@@ -86,8 +86,16 @@ class LockConstraint:
         """(n,): velocities along the directions."""
         return speeds(self.terms, self.seen, momenta)
 
+<<<<<<< HEAD
     def linearised(self, momenta: tuple[Any, ...], old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
         """(a (n,), B (n, n)); see ``newton_start``."""
+=======
+    def linearised(
+        self, momenta: tuple[Any, ...], old: JointImpulse, softness: Expr, centre: float
+    ) -> tuple[Expr, Expr]:
+        """The impulse change a (n,) and its slope B (n, n) by the velocities; see ``newton_start``."""
+        del softness
+>>>>>>> w-clean
         soft = COMPLIANCE / ca.diag(self.mass)
         miss = self.rates(momenta) - self.target + (self.softness + by.centre * soft) * old.numbers
         stiff = ca.diag(1 / (self.softness + soft))

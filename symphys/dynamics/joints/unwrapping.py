@@ -1,4 +1,4 @@
-"""Angles of joints through whole turns: what a step does to a coordinate says how often it has gone round."""
+"""Angles of joints that count whole turns, tracked from step to step."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ Expr = Any
 def unwrapped_angles(context: StepContext, paths: Sequence[JointPath], closed: Corrected, duration: Expr) -> State:
     """``Joint.unwrapped`` of all joints that turn, at the end of a substep of ``duration`` [s].
 
-    Where a coordinate began and by how much it went on tell its angle to third order in the step. Poses tell it exactly
-    but for whole turns, of which that much leaves one, however far a step turns.
+    The coordinate at the start plus its change in the step is its angle to third order in the step. Poses give the
+    angle exactly up to whole turns, whose number follows from this estimate, however far a step turns.
     """
     found = State()
     for index, (joint, path) in enumerate(zip(context.world.joints, paths, strict=True)):
@@ -42,7 +42,7 @@ def _gone_on(values: tuple[Expr, ...], moved: Expr) -> Expr:
 
 @traced
 def _turned(frames: JointFrames, turning: tuple[Expr, ...], duration: Expr) -> Expr:
-    """(count,) [rad]: by how much coordinates went on as the bodies turned, the first against the second."""
+    """The change (count,) [rad] of the coordinates as the first body turned against the second."""
     middle, zero = frames.placed(duration / 2), ca.SX.zeros(3)
     angular = turning[0] if len(turning) == 1 else turning[0] - turning[1]
     return ca.vertcat(*(free(each, middle).forwards(zero, angular) for each in frames.joint.kind.coordinates))

@@ -54,7 +54,7 @@ def lasting_forces(
     x: State,
     kick: Expr,
 ) -> tuple[Struck, State]:
-    """Which components an impact struck; and the forces of ``joints``, which gave ``given``, that last.
+    """Which components an impact struck, and the lasting forces of ``joints`` from their impulses ``given``.
 
     ``solved``: the velocities after the sweeps.
     """
@@ -166,7 +166,7 @@ def _stacked(parts: tuple[Expr, ...]) -> Expr:
 def add_joint_forces(context: StepContext, forces: State, poses: Poses, total: Total) -> None:
     """Adds to ``total`` what joint forces do to bodies at these poses: those at which the next step begins.
 
-    ``forces`` has what a state keeps of joints, its ``unwrapped`` angles too.
+    ``forces`` has the entries of joints in a state, their ``unwrapped`` angles too.
     What the joints of trees lock is left out: it does nothing along the free motions of the tree.
     """
     exact = tree_joints(context.world.joints)

@@ -48,7 +48,7 @@ def half_step_function(
 
 
 def _commanded(context: StepContext, x: State) -> State:
-    """The state with what commands of torques give in this step in place of what they gave in the last one."""
+    """The state with the torques that are commanded in this step in place of those of the last one."""
     values, bodies = dict(x), context.world.bodies
     for joint in context.world.joints:
         given = context.input(f"{joint.name}.command")

@@ -21,7 +21,7 @@ Motion = tuple[Expr, Expr]
 
 @dataclass(frozen=True)
 class Reading:
-    """A joint in a state; k coordinates, in rad where they turn, through whole turns, and in m where they slide.
+    """A joint in a state with k coordinates: angles [rad], which count whole turns, and displacements [m].
 
     Attributes:
         value, rate: (k,).

@@ -1,12 +1,12 @@
 """The time step of a model for MuJoCo, and how stiff its motors may be at that step.
 
-MuJoCo takes the forces of springs and of contacts that give way as they are at the begin of a step, and so it does with
-a motor that is at its bound. All of a motor's torque T over a step h changes the rate of a coordinate of inertia I by
-T h / I. Where that is more than twice the speed error at which the motor begins to give way, T / kv, it swings between
-its bounds for ever. So kv is at most 2 I / h, and the step is cut into parts until such a motor gives way by no more
-than a tenth of its largest velocity.
+MuJoCo takes the forces of springs, of soft contacts and of motors at their bounds as they are at the beginning of a
+step. All of a motor's torque T over a step h changes the rate of a coordinate of inertia I by T h / I. Where that is
+more than twice the speed error at which the motor leaves its bound, T / kv, it swings between its bounds for ever. So
+kv is at most 2 I / h, and the step is cut into parts until such a motor gives all of its torque at a speed error of at
+most a tenth of its largest velocity.
 
-I is what a coordinate shows at the start while all others are free: 1 / (M^-1) of the trees' mass matrix M.
+I is the inertia of a coordinate at the start while all others are free: 1 / (M^-1) of the trees' mass matrix M.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ Array = NDArray[np.float64]
 Inertias = Mapping[tuple[str, int], float]
 """[kg m^2] or [kg] of each coordinate, by its joint and number there; of joints in trees only."""
 STIFFEST, SOFTEST = 0.01, 0.1
-"""Of a motor's largest velocity: how far off it gives all of its torque, at best, and at worst."""
+"""Velocity error at which a motor gives all of its torque, as a share of its largest velocity: wanted, and allowed."""
 WITHIN, WITHIN_CONTACT = 1.0, 0.125
 """Largest h omega of a spring, and of a contact that gives way: a body may have several, whose damping adds up."""
 MOST_PARTS = 50
-"""Of a time step."""
+"""Largest number of parts of a time step."""
 
 
 def parts(start: StartState, found: Inertias, dt: float) -> int:
-    """In how many parts a step of ``dt`` [s] is written."""
+    """The number of parts into which a step of ``dt`` [s] is cut."""
     longest = min(_longest(start, found), default=math.inf)
     return max(1, min(MOST_PARTS, math.ceil(dt / longest - 1e-9))) if longest > 0 else MOST_PARTS
 
@@ -45,10 +45,10 @@ def steepness(motor: Servo | VelocityMotor, inertia: float, step: float) -> floa
 
 
 def inertias(start: StartState) -> Inertias:
-    """Of all coordinates at the start, the others being free."""
+    """The inertia of each coordinate at the start while all others are free."""
     world, links = start.world, links_of(start.world)
     columns: list[Array] = []
-    """(B, 6): what a coordinate's rate of 1 does to each body: velocity of its centre of mass, and turning."""
+    """Twists (6,) of the coordinates at the world's origin: velocity and angular velocity at a rate of 1."""
     owners: dict[int, tuple[str, int]] = {}
     above: dict[int | None, frozenset[int]] = {None: frozenset()}
     for link in links:
@@ -91,7 +91,7 @@ def _freedoms(start: StartState, joint: int | None, body: int) -> Iterator[tuple
 
 
 def _armature(joints: tuple[Joint, ...], owner: tuple[str, int] | None) -> float:
-    """Of what turns with a coordinate."""
+    """The armature of a coordinate's joint [kg m^2] or [kg]."""
     return next((float(joint.armature) for joint in joints if owner and joint.name == owner[0]), 0.0)
 
 

@@ -1,4 +1,4 @@
-"""A model for MuJoCo tried out: the first second of the problem's own motion there and here, if MuJoCo is installed."""
+"""Trial of a model: the first second of the problem's motion in MuJoCo, if it is installed, against the motion here."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from symphys.transcription import transcribe
 SECONDS = 1.0
 """[s] that are compared at most."""
 MOST_WORK = 20_000
-"""Bodies times steps: more take minutes to simulate without a kernel, and MuJoCo's motion alone is looked at."""
+"""Bodies times steps; larger models take minutes without a kernel, so that only MuJoCo's motion is checked."""
 
 
 def tried_model(problem: Problem, approximate: bool) -> MjcfModel:
-    """The model with what a trial found in its first lines; as it is where MuJoCo is not installed."""
+    """The model with the result of a trial in its first lines; without a trial where MuJoCo is not installed."""
     model = problem_model(problem, approximate)
     if importlib.util.find_spec("mujoco") is None:
         return model
@@ -43,8 +43,8 @@ def tried_model(problem: Problem, approximate: bool) -> MjcfModel:
 def stiffer(world: World, text: str) -> dict[tuple[str, str], float]:
     """Factors for contacts that give way, by the names of their surfaces.
 
-    Here the mass behind such a contact is that of the bodies themselves. MuJoCo takes what it finds where all
-    coordinates are 0, the joints with it, and its compiler says how much.
+    Here the mass behind such a contact is that of the bodies themselves. MuJoCo takes the mass that its compiler
+    computes where all coordinates are 0, joints included.
     """
     soft = {(pair.first, pair.second) for pair in world.pairs if pair.law.soft}
     if not soft:
@@ -65,7 +65,7 @@ def stiffer(world: World, text: str) -> dict[tuple[str, str], float]:
 
 
 def trial(problem: Problem, text: str) -> Departure:
-    """How far MuJoCo's motion is off, under the commands and forces of the problem's own motion."""
+    """The distance of MuJoCo's motion from the problem's own, under the same commands and forces."""
     import mujoco
 
     work = len(problem.world().bodies) * problem.simulation.steps
@@ -106,7 +106,7 @@ class MujocoReplay:
     """A model of MuJoCo that is driven as a motion was; without one, by commands of 0."""
 
     def __init__(self, mujoco: Any, world: World, text: str, motion: Trajectory | None) -> None:
-        """At the start."""
+        """Begin at the start of the motion."""
         self._step, self._motion = mujoco.mj_step, motion
         self._model = mujoco.MjModel.from_xml_string(text)
         self._data = mujoco.MjData(self._model)
@@ -120,7 +120,7 @@ class MujocoReplay:
         ]
 
     def advance(self, k: int, dt: float) -> None:
-        """Over step ``k`` of the motion, which takes ``dt`` [s]."""
+        """Advance by step ``k`` of the motion, which takes ``dt`` [s]."""
         if self._motion is not None:
             for body, name in self._bodies:
                 self._data.body(name).xfrc_applied[:3] = self._motion.force[k, body]
@@ -137,7 +137,7 @@ class MujocoReplay:
         return not restarts and bool(np.isfinite(self._data.qpos).all())
 
     def gaps(self, k: int) -> Iterator[tuple[str, float, float]]:
-        """By body: how far [m] and turned [rad] it is from instant ``k`` of the motion."""
+        """Each body's name, distance [m] and angle [rad] from instant ``k`` of the motion."""
         for body, name in self._bodies if self._motion is not None else ():
             here = self._data.body(name)
             far = float(np.linalg.norm(here.xipos - self._motion.position[k, body]))  # type: ignore[union-attr]

@@ -28,7 +28,7 @@ FEWEST = 5
 FEWEST_DRAWS = 100
 """Draws that an interval needs."""
 NO_INFORMATION = 1e-10
-"""Of the information of all recordings: what a draw has less of along a direction is none."""
+"""A draw with less than this share of the information of all recordings along a direction has none there."""
 CHUNK = 256
 """Draws that are solved at once, so that memory does not grow with them."""
 

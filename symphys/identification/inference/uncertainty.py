@@ -41,9 +41,9 @@ LEVEL = 0.95
 SUSPICIOUS = 1e-8
 """Singular values below this share of the largest are compared with the rounding of the derivatives."""
 NUDGE = 8 * EPS
-"""Of numbers: how far away the Jacobian is evaluated once more to see its rounding."""
+"""Relative change of all numbers at which the Jacobian is evaluated once more, to see its rounding."""
 MOST_NOISE = 1e-9
-"""Of the longest column: rounding is no larger. A larger change is the other side of a kink."""
+"""Largest rounding, as a share of the longest column; a larger change comes from a kink."""
 
 
 @dataclass(frozen=True, eq=False)

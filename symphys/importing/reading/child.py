@@ -20,6 +20,7 @@ from symphys.importing.problem import ImportProblem
 from symphys.importing.reading.checking import read_bytes
 from symphys.importing.reading.folders import Folders
 from symphys.importing.reading.mending import (
+    LARGEST,
     add_couplings,
     add_motors,
     bound,
@@ -43,8 +44,6 @@ FINITE_WORDS = (
 )
 FINITE = FINITE_WORDS.split()
 """Arrays of a compiled model that must be numbers."""
-LARGEST = 1e12
-"""A number of a model beyond which it is a mistake."""
 
 
 def main(folder: Path) -> None:

@@ -19,6 +19,8 @@ from symphys.importing.wording import counted, listed
 Array = NDArray[np.float64]
 LEAST = 1e-14
 """[kg], [kg m^2] MuJoCo refuses moving bodies with less."""
+LARGEST = 1e12
+"""A number of a model beyond which it is a mistake."""
 HARMLESS = (1e-3, 1e-6)
 """[kg], [kg m^2] What a link has in the compiled model whose own numbers MuJoCo refuses."""
 
@@ -98,6 +100,9 @@ def keep_inertials(spec: Any, folders: Folders, findings: list[Finding]) -> dict
         if own.mass < 0 or not np.isfinite(own.inertia).all():
             text = f"must not be negative, and the inertia must be finite; it is {own.mass:g}"
             raise ImportProblem(str(folders.file), text, f'<link name="{body.name}"> mass')
+        if max(own.mass, np.abs(own.centre).max(), np.abs(own.inertia).max()) > LARGEST:
+            text = f"mass, centre and inertia must be at most {LARGEST:g} in size"
+            raise ImportProblem(str(folders.file), text, f'<link name="{body.name}"> inertial')
         moments = np.linalg.eigvalsh(own.inertia)
         if not body.explicitinertial:
             none += [body.name] if body.geoms else []

@@ -13,7 +13,7 @@ from symphys.importing.tables.reading import BALL, FREE, HINGE, SLIDE, ModelRead
 from symphys.model.gimbal import Screw, locks
 
 ROTOR, LEAST_ROTOR = 0.1, 1e-6
-"""Of a body's largest moment of inertia, and at least [kg m^2]: the armature that is added against gimbal lock."""
+"""The armature that is added against gimbal lock: a share of a body's largest moment of inertia, at least [kg m^2]."""
 KINDS = {BALL: "ball", SLIDE: "slide", HINGE: "hinge"}
 
 
@@ -150,6 +150,6 @@ def spring_of(reading: ModelReading, joint: int, dof: int) -> dict[str, float]:
 
 
 def limits_of(reading: ModelReading, joint: int) -> list[float] | None:
-    """The range from the reference pose; None where nothing holds it."""
+    """The limits, measured from the reference pose; None where there are none."""
     low, high = range_of(reading, joint)
     return numbers([low, high]) if isfinite(low) or isfinite(high) else None

@@ -48,7 +48,7 @@ def place(library: Any, model: Any, data: Any) -> None:
 
 
 def range_of(reading: ModelReading, joint: int) -> tuple[float, float]:
-    """The range of a hinge or slider from the reference pose; infinite where nothing holds it."""
+    """The limits of a hinge or slider, measured from the reference pose; infinite where there are none."""
     model = reading.model
     if not model.jnt_limited[joint] or reading.off("LIMIT"):
         return -np.inf, np.inf
@@ -140,7 +140,7 @@ def begin(reading: ModelReading, joints: list[dict[str, Any]]) -> None:
 
 
 def wanted(reading: ModelReading, joint: int) -> float:
-    """Where the model itself begins, from the reference pose."""
+    """The coordinate at which the model itself begins, measured from the reference pose."""
     if reading.key is None:
         return 0.0
     at = int(reading.model.jnt_qposadr[joint])

@@ -92,7 +92,7 @@ class Joint:
 
     @property
     def unwrapped(self) -> str | None:
-        """Where the state keeps its angles to within half a turn: poses tell the rest. None where nothing turns."""
+        """The state's entry for its angles to within half a turn, which poses make exact; None if nothing turns."""
         return f"{self.name}.{UNWRAPPED}" if self.kind.winds else None
 
     @property

@@ -9,14 +9,14 @@ from typing import Any
 from symphys.problem.reading.faults import Faults, Place
 
 LARGEST = 1e150
-"""In size; its square is finite."""
+"""Largest absolute value of a number; its square is finite."""
 TOO_LARGE = f"is too large to be computed with; numbers are from {-LARGEST:g} to {LARGEST:g}"
 OWN = ("solver", "recording")
-"""Tables whose numbers are passed on to libraries, or have a range of their own."""
+"""Tables that are not checked: their numbers go to libraries, or have a range of their own."""
 APART = ("axis", "axes", "normal", "mass", "density", "inertia", "noise")
-"""Keys of directions, whose length is of no account, and those with a range of their own."""
+"""Keys that are not checked: directions, whose length does not matter, and numbers with a range of their own."""
 MOST = 3
-"""Faults of one table that are named."""
+"""Largest number of faults of one table that are named."""
 
 
 def check_range(data: Mapping[str, Any], faults: Faults) -> None:
@@ -43,5 +43,5 @@ def _beyond(place: Place, value: Any) -> Iterator[tuple[Place, float]]:
 
 
 def _shown(value: float) -> str:
-    """A number in a few letters."""
+    """A number in a few characters."""
     return f"{value:g}" if isinstance(value, float) or abs(value) < 2**1000 else "an integer of over 300 digits"

@@ -24,7 +24,7 @@ TIME = "time"
 LEAST_ROWS, MOST_ROWS = 2, 1000
 """Each row is looked at in every evaluation of a formula."""
 MOST_BYTES = 10**7
-"""Of the arrays of an NPZ file; a thousand rows of a thousand columns."""
+"""[bytes] Largest memory of the arrays of an NPZ file: a thousand rows of a thousand columns."""
 
 
 class SeriesError(ValueError):

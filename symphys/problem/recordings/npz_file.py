@@ -13,7 +13,7 @@ from symphys.suggest import quote
 
 Array = NDArray[np.float64]
 MOST_BYTES = 2**29
-"""That the arrays of one recording may take: some 67 million numbers."""
+"""[bytes] Largest memory of the arrays of one recording: some 67 million numbers."""
 
 
 def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -> tuple[RecordedColumns, Array | None]:

@@ -97,7 +97,7 @@ SETTINGS: Any = {
 
 
 CLOSE, LEAST = 1e-9, 1e-50
-"""Numbers on an axis count as one where they differ by less than such a share of their size, or by so little at all."""
+"""Numbers on an axis count as equal where they differ by less than this share of their size, or by less than this."""
 
 
 @dataclass(frozen=True)

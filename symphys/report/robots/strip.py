@@ -29,7 +29,7 @@ TALLEST, LOWEST = 2.4, 0.75
 FAR, FAR_ON_RAILS = 2.0, 6.0
 """The section shown is fixed where all fits into so many sizes of the bodies: free ones, and those on the world."""
 POINT = 1e-6
-"""All is shown, too, where the bodies are so small a share of it."""
+"""The whole view is shown, too, where the bodies are less than this share of it."""
 MARGIN = 0.06
 EDGE = 0.14
 """[in] Numbers are at least so far from the sides of a picture, so that those of neighbours do not meet."""

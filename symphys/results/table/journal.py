@@ -9,6 +9,7 @@ same.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
@@ -81,7 +82,7 @@ class Journal:
             self.append({place: Kept(stamp, row)})
 
     def append(self, found: Mapping[str, Kept]) -> bool:
-        """Add lines by one write; whether that could be done."""
+        """Add lines by one write; whether that could be done. What could not be added is read from the folders."""
         text = b"".join(line(place, kept) for place, kept in found.items())
         try:
             handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
@@ -95,17 +96,18 @@ class Journal:
             os.close(handle)
 
     def read(self) -> tuple[dict[str, Kept], int]:
-        """The last row of every run, and how many lines the file has; nothing where it cannot be read."""
+        """The last row of every run, and how many lines the file has.
+
+        Rows that it does not give, as the file is missing, damaged or cannot be read, are read from the folders.
+        """
         found: dict[str, Kept] = {}
         count = 0
-        try:
+        with contextlib.suppress(OSError):
             files.check_regular(self.path)
             with self.path.open("rb") as file:
                 for each in file:
                     count += 1
                     found.update(entry(each))
-        except OSError:
-            pass
         return found, count
 
     def rewrite(self, found: Mapping[str, Kept]) -> None:
@@ -142,8 +144,8 @@ def entry(text: bytes) -> Iterable[tuple[str, Kept]]:
         match json.loads(b"{" + body):
             case {"rows": int(rows), "run": str(run), "stamp": [int(time), int(size)], "row": dict(row)}:
                 return [(run, Kept((time, size), row))] if rows == ROWS and sound(row) else []
-    except (ValueError, RecursionError):
-        pass
+    except (ValueError, RecursionError):  # a right checksum of what is no JSON, or is nested too deep
+        return []
     return []
 
 

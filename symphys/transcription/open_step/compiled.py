@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
 from symphys.codegen.backends.calls import row_by_row
+from symphys.codegen.backends.precision import warn
 from symphys.problem import ALIVE, Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.open_step.opening import Opening, opened
@@ -53,6 +54,9 @@ class StepResult(NamedTuple):
 
 class Evaluated(Protocol):
     """What computes rows: a kernel, or casadi's virtual machine."""
+
+    doubt: str
+    """See ``Kernel.doubt``."""
 
     def forward(self, rows: Array, parameters: Sequence[float]) -> Mapping[str, Array]:
         """(B, m) -> results by name."""
@@ -191,6 +195,9 @@ class CompiledStep:
             observation: (B, o).
             cost: (B,).
             inputs: (B, i).
+
+        Warns:
+            RuntimeWarning: the first adjoints in single precision are far off those in double precision.
         """
         states = matrix("state", state, self.state_size)
         rows = self._rows(states, matrix("action", action, self.action_size), inputs)
@@ -204,6 +211,7 @@ class CompiledStep:
         }
         whole = np.concatenate([seeds[name] for name in RESULTS], axis=1)
         _, slopes = self._evaluated.gradient(rows, np.ascontiguousarray(whole), (self.smoothing,))
+        warn(self.problem.name, self._evaluated.doubt)
         x, u, p, now, then, z = np.split(slopes, np.cumsum([nx, nu, np_, 1, 1]), axis=1)
         back = np.concatenate([x, p, now + then, z[:, :n]], axis=1)
         back[:, nx:] += later[:, nx:]

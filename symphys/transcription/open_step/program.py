@@ -168,6 +168,8 @@ def sensed_size(rollout: Rollout, sensors: Sequence[str]) -> int:
 class VirtualMachineOpenStep:
     """The same on casadi's virtual machine, row by row: for machines without a compiler."""
 
+    doubt = ""
+
     def __init__(self, rollout: Rollout, sensors: Sequence[str]) -> None:
         """Build the function of one step."""
         sizes = row_sizes(rollout)

@@ -187,7 +187,7 @@ class Tangent:
         return tuple(joints[k] for k in sorted(tree_joints(joints)))
 
     def _turned(self, old: Parts, new: Parts) -> dict[str, Expr]:
-        """Of other joints that turn: by how much they did from one pose to the other, by half a turn at most."""
+        """Changes of angle of the other joints from one pose to the other, by half a turn at most."""
         found, world = dict[str, Expr](), self.rollout.world
         for joint in world.joints:
             if joint.unwrapped is None or joint in self._in_trees:

@@ -12,6 +12,7 @@ from toys import require
 
 import symphys
 from symphys.codegen.backends.precision import largest_error
+from symphys.codegen.runtime import widths
 from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.runtime.kernel import ProcessorKernel
 from symphys.problem import Problem, load_problem
@@ -57,6 +58,30 @@ def test_gradients_that_are_far_off_are_doubted(factor: float, words: str, monke
     rollout = symphys.compile(problem(), backend="simd32")
     with pytest.warns(RuntimeWarning, match=f"single precision are off by {words} of their length"):
         rollout.gradient(rollout.z())
+
+
+def test_adjoints_of_a_step_and_of_quantities_are_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
+    require("simd32")
+    doctored(monkeypatch, 0.6)
+    step = symphys.compile_step("cart_pole", backend="simd32")
+    state, observation, _ = step.start(2)
+    action = np.ones((2, step.action_size))
+    after = step(state, action)
+    with pytest.warns(RuntimeWarning, match="cart_pole: gradients in single precision are off by 60 %"):
+        step.pull(state, action, np.ones_like(after.state), np.zeros_like(observation), np.ones(2))
+    thrown = symphys.compile(problem(), backend="simd32")
+    recording, Z = thrown.recording("ball.position"), thrown.z()[None]
+    value, found = recording.forward(Z)
+    with pytest.warns(RuntimeWarning, match="ball_throw: gradients in single precision are off by 60 %"):
+        recording.pull(Z, np.ones_like(value), {name: np.ones_like(each) for name, each in found.items()})
+
+
+def test_what_else_a_kernel_notes_is_no_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That an interpreter evaluates says nothing of gradients."""
+    require("simd32")
+    monkeypatch.setattr(widths.Widths, "note", "an interpreter evaluates")
+    rollout = symphys.compile(problem(1.1), backend="simd32")
+    rollout.gradient(rollout.z())  # warnings are errors
 
 
 @pytest.mark.parametrize("solver", ["least_squares", "ipopt"])

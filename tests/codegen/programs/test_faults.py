@@ -6,12 +6,12 @@ import shlex
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import programs
 import pytest
-from compilers import assert_gone, building, fake, wait_for
+from compilers import building, fake
+from waiting import FOREVER, assert_gone, wait_for
 
 from symphys.codegen import Cache, KernelUnavailable, compile_program
 from symphys.codegen.toolchain import processor
@@ -82,19 +82,17 @@ def test_a_compiler_without_memory(tmp_path: Path, monkeypatch: Patch) -> None:
 
 @UNIX
 def test_a_compiler_that_hangs_is_stopped_with_all_that_it_started(tmp_path: Path, monkeypatch: Patch) -> None:
-    monkeypatch.setenv("CC", fake(tmp_path, f"sleep 60 & echo $! >> {tmp_path}/started; wait"))
+    monkeypatch.setenv("CC", fake(tmp_path, f"sleep 100000 & echo $! >> {tmp_path}/started; wait"))
     monkeypatch.setattr("symphys.codegen.toolchain.compiler.LIMIT", 0.5)
-    began = time.monotonic()
     with pytest.raises(KernelUnavailable, match=r"fakecc did not end within 0\.5 s and was stopped"):
         compile_program(programs.pendulum(), cache=Cache(tmp_path / "cache"))
-    assert time.monotonic() - began < 20
     assert_gone(tmp_path / "started")
 
 
 @UNIX
 def test_a_version_that_does_not_come(tmp_path: Path, monkeypatch: Patch) -> None:
     path = Path(fake(tmp_path, ""))
-    path.write_text("#!/bin/sh\nexec sleep 60\n", "utf-8")
+    path.write_text("#!/bin/sh\nexec sleep 100000\n", "utf-8")
     monkeypatch.setenv("CC", str(path))
     monkeypatch.setattr("symphys.codegen.toolchain.compiler.ANSWER", 0.5)
     with pytest.raises(KernelUnavailable, match="did not end within"):
@@ -103,21 +101,20 @@ def test_a_version_that_does_not_come(tmp_path: Path, monkeypatch: Patch) -> Non
 
 @UNIX
 def test_the_first_failure_ends_the_others(tmp_path: Path) -> None:
-    slow = ["sh", "-c", f"sleep 60 & echo $! >> {tmp_path}/started; wait"]
-    began = time.monotonic()
+    slow = ["sh", "-c", f"sleep 100000 & echo $! >> {tmp_path}/started; wait"]
+    fails = ["sh", "-c", f"while [ ! -s {tmp_path}/started ]; do sleep 0.02; done; exit 7"]
     with pytest.raises(KernelUnavailable, match="sh failed with code 7"):
-        run_all([slow, ["sh", "-c", "sleep 0.5; exit 7"], slow], 60, at_once=2)
-    assert time.monotonic() - began < 20
+        run_all([slow, fails, slow], 2 * FOREVER, at_once=2)
     assert_gone(tmp_path / "started")
 
 
 @UNIX
 def test_ctrl_c_ends_the_compilers(tmp_path: Path) -> None:
-    script = fake(tmp_path, f"sleep 60 & echo $! >> {tmp_path}/started; wait")
+    script = fake(tmp_path, f"sleep 100000 & echo $! >> {tmp_path}/started; wait")
     process = building(tmp_path, script)
     wait_for(tmp_path / "started")
     process.send_signal(signal.SIGINT)
-    assert "KeyboardInterrupt" in process.communicate(timeout=20)[1]
+    assert "KeyboardInterrupt" in process.communicate(timeout=FOREVER)[1]
     assert_gone(tmp_path / "started")
 
 
@@ -135,16 +132,14 @@ class Finalized:
         os.kill(os.getpid(), signal.SIGINT)
         [None for _ in range(1000)]
 
-run_all(Struck([["sleep", "15"]]), 60, at_once=1)
+run_all(Struck([["sleep", "100000"]]), 100000, at_once=1)
 """
 
 
 @UNIX
 def test_ctrl_c_is_not_lost_in_a_finalizer() -> None:
-    began = time.monotonic()
-    found = subprocess.run([sys.executable, "-c", STRUCK], capture_output=True, text=True, timeout=60, check=False)
+    found = subprocess.run([sys.executable, "-c", STRUCK], capture_output=True, text=True, timeout=FOREVER, check=False)
     assert found.returncode and "Exception ignored" not in found.stderr
-    assert time.monotonic() - began < 10
 
 
 @pytest.mark.parametrize(

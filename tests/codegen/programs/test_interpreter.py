@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from heaps import heap
 from operations import alone, every_operation
 from repeats import thorough
 from toys import require
+from waiting import until
 
 import symphys
 from symphys.codegen import Cache, Program, compile_program
@@ -171,8 +171,6 @@ def test_a_process_that_ends_leaves_the_kernel_to_the_next(how: str, tmp_path: P
     code = ENDS_AT_ONCE.format(signal=how)
     ended = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
     assert ended.returncode == -signal.Signals[how]
-    end = time.monotonic() + 120
-    while cache.info().kernels < 2 and time.monotonic() < end:
-        time.sleep(0.1)
+    until(lambda: cache.info().kernels >= 2)
     kernel = compile_source(ProgramSource(programs.chain, "a chain"), ("merit",), 1, cache=cache, wait=False)
     assert kernel.report.cached

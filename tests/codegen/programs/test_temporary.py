@@ -8,7 +8,8 @@ import time
 from pathlib import Path
 
 import pytest
-from compilers import building, fake, wait_for
+from compilers import building, fake
+from waiting import FOREVER, wait_for
 
 from symphys.codegen.toolchain.temporary import LOCK, OLD, YOUNG, TemporaryFolder
 
@@ -52,7 +53,7 @@ def test_what_a_killed_build_left_goes_with_the_next(tmp_path: Path, place: Path
             assert left.is_dir(), "its process is at work"
     finally:
         process.kill()
-        process.communicate(timeout=20)
+        process.communicate(timeout=FOREVER)
     aged(left, 2 * YOUNG)
     with TemporaryFolder(KIND) as own:
         assert list(place.iterdir()) == [Path(own)]

@@ -92,8 +92,8 @@ def own_direction(normal: Expr, frame: tuple[Parabola, Parabola, Parabola], t: E
 def without_spin(path: PredictedPath, axis: Expr, normal: Expr) -> PredictedPath:
     """The path of a cylinder without its spin about its axis, unless it stands on a face.
 
-    Points of a rim that touch stay where they are as a wheel turns. Carried along, those at the top of a wheel that
-    turns by more than 1.2 rad a step would seem to go through the ground. On a face the points turn with the body.
+    The points of contact of a rolling wheel do not turn with it. If they did, those at the top of a wheel that turns by
+    more than 1.2 rad a step would seem to go through the ground. On a face the points turn with the body.
     """
     lies = 1 - ca.dot(axis, normal) ** 2
 

@@ -1,7 +1,7 @@
 """A sphere on one body against a box on another.
 
-A ball that rolls level over the rim of a top touches the top alone. On the predicted path, which lacks what carries it,
-it would sink and strike the rim of the next of two boards that lie flush.
+A ball that rolls level over the rim of a top touches the top alone. The predicted path lacks the force that supports
+the ball: it sinks there, and would strike the rim of the next of two boards that lie flush.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Box, Sphere
 
 TINY = 1e-9
-"""[m] a ball that comes nearer to a face by less than this in the step does not come over its rim."""
+"""[m] Smallest approach to a face in a step by which a ball counts as coming over its rim."""
 
 
 @dataclass(frozen=True)
 class BoxField:
-    """Distances from a box. Outside the nearest point of the surface counts, inside the nearest face.
+    """Distances from a box: outside to the nearest point of its surface, inside to the nearest face.
 
     Attributes:
         half_sizes: (3,) [m].
@@ -74,7 +74,7 @@ def ball_at_box(offset: Offset, radius: Expr, box: Box, a: PredictedPath, b: Pre
 
 
 def rolls_onto(offset: Offset, radius: Expr, box: Box, a: PredictedPath, b: PredictedPath) -> tuple[Expr, ...]:
-    """Per axis of the box: 1 where a ball comes over a rim across it, level with a top by its true velocity."""
+    """For each axis of the box: 1 if a ball moves over a rim across it, at the height of a top by its true velocity."""
     gravity = a.gravity if a.gravity is not None else b.gravity
     if gravity is None:
         return ()
