@@ -100,7 +100,7 @@ class Energy(Columns):
 
 @dataclass(frozen=True)
 class Gain:
-    """A step, beginning at ``time`` [s], in which contacts added energy [J]."""
+    """A step, beginning at ``time`` [s], in which contacts added energy, or took it [J]."""
 
     step: int
     time: float
@@ -167,6 +167,7 @@ class Examination:
         growth: of changes, along the horizon.
         energy: along the horizon.
         gains, gained: the steps in which contacts added most energy, and all that they added [J].
+        stops: the steps in which contacts took most from a body that lay on something, by a force from another side.
         drift: largest change of energy in a step that nothing accounts for [J].
         unexplained, drift_at: the largest that the work of motors cannot explain [J], and when [s].
         drifted: the largest sum of such changes since the start [J].
@@ -205,6 +206,7 @@ class Examination:
     energy: Energy = field(default_factory=Energy)
     gains: tuple[Gain, ...] = ()
     gained: float = np.nan
+    stops: tuple[Gain, ...] = ()
     drift: float = np.nan
     unexplained: float = np.nan
     drift_at: float = np.nan

@@ -142,7 +142,8 @@ def speeds(rollout: Rollout, numbers: Bodies, x: Array) -> Array:
         np.stack([np.linalg.norm(x[:, layout[f"{name}.{field}"]], axis=1) for name in names], axis=1)
         for field in ("velocity", "angular_velocity")
     )
-    return np.maximum(linear, numbers.size * angular)
+    found: Array = np.maximum(linear, numbers.size * angular)
+    return found
 
 
 def change(block: VariableBlock, before: Array, after: Array) -> float | None:
