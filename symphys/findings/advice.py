@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from symphys.findings.contacts import CONTACTS, contact_findings, miss_findings
-from symphys.findings.energy import ENERGY, balance_finding, gains_finding, jump_findings
+from symphys.findings.energy import ENERGY, balance_finding, gains_finding, jump_findings, stop_findings
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
 from symphys.findings.numerics import (
@@ -47,7 +47,7 @@ def findings(trust: Examination, judged: Judged) -> list[Finding]:
     lines += smoothed_findings(trust.smoothed, judged)
     numbers = ((trust.gained, gains_finding), (trust.momentum, balance_finding))
     lines += [find(trust) for number, find in numbers if not math.isnan(number)]
-    return lines + jump_findings(trust) + contact_findings(trust, judged)
+    return lines + stop_findings(trust) + jump_findings(trust) + contact_findings(trust, judged)
 
 
 def slopes(trust: Examination) -> tuple[list[str], list[list[str]]]:

@@ -47,6 +47,21 @@ def gains_finding(trust: Examination) -> Finding:
     return Finding(ENERGY, level, what, number, meaning, doubt * (level == BAD))
 
 
+def stop_findings(trust: Examination) -> list[Finding]:
+    """Where something that lay on a surface was stopped from the side; a line for the step that took most."""
+    if not trust.stops:
+        return []
+    worst = trust.stops[0]
+    where = f"{listed(worst.contacts)} at t = {show(worst.time)} s, step {worst.step}"
+    meaning = (
+        f"{where}, takes {show(worst.energy, 2)} J from what "
+        "lay or rolled on a surface, by a force from another side: it ran into something. Where there is only a "
+        "seam or a small edge, it tripped: look at the motion there."
+    )
+    number = f"{show(worst.energy, 2)} J"
+    return [Finding(ENERGY, FAIR, "Energy that a stop from the side takes", number, meaning)]
+
+
 def jump_findings(trust: Examination) -> list[Finding]:
     """A change of place that no velocity explains, if there is one that matters."""
     level = graded(trust.jump, JUMP_LIMITS)

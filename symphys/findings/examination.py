@@ -100,7 +100,7 @@ class Energy(Columns):
 
 @dataclass(frozen=True)
 class Gain:
-    """A step, beginning at ``time`` [s], in which contacts added energy [J]."""
+    """A step, beginning at ``time`` [s], in which contacts added energy, or took it [J]."""
 
     step: int
     time: float
@@ -167,6 +167,7 @@ class Examination:
         growth: of changes, along the horizon.
         energy: along the horizon.
         gains, gained: the steps in which contacts added most energy, and all that they added [J].
+        stops: the steps in which contacts took most from a body that lay on something, by a force from another side.
         drift: largest change of energy in a step that nothing accounts for [J].
         unexplained, drift_at: the largest that the work of motors cannot explain [J], and when [s].
         drifted: the largest sum of such changes since the start [J].
@@ -176,6 +177,9 @@ class Examination:
         residual, residual_at, impulse: largest change of an impulse in the last sweep [N s], when [s], and largest
             impulse in a step [N s].
         unsettled: steps in which that change is large beside the largest impulse.
+        left, left_of, left_time, left_speed: the largest velocity of a body without joints that the sweeps of a step
+            have not found and more of them would, as a share of the largest in the motion; of which body, when [s], and
+            how large [m/s].
         residual_finer: the residual with twice the sweeps [N s], where that was looked at.
         resettled: the same z with other numbers of sweeps, where impulses have not settled.
         deepest, depth_contact, depth_time, size: deepest penetration [m], where, when; size of the smallest body [m].
@@ -202,6 +206,7 @@ class Examination:
     energy: Energy = field(default_factory=Energy)
     gains: tuple[Gain, ...] = ()
     gained: float = np.nan
+    stops: tuple[Gain, ...] = ()
     drift: float = np.nan
     unexplained: float = np.nan
     drift_at: float = np.nan
@@ -214,6 +219,10 @@ class Examination:
     residual: float = np.nan
     residual_at: float = np.nan
     unsettled: float = np.nan
+    left: float = np.nan
+    left_of: str = field(default="", metadata={"key": "left_at.name"})
+    left_time: float = field(default=np.nan, metadata={"key": "left_at.time"})
+    left_speed: float = field(default=np.nan, metadata={"key": "left_at.speed"})
     residual_finer: float = np.nan
     resettled: tuple[Refined, ...] = ()
     impulse: float = np.nan

@@ -17,7 +17,7 @@ from symphys.model.state_layout import Layout, input_columns, inputs_size
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout, plain
 from symphys.verification.bodies import bodies, parameters
-from symphys.verification.contacts import acting, touching
+from symphys.verification.contacts import acting, slip_speeds, touching
 from symphys.verification.joints import floating, joint_work, rotor_energy, uncounted
 from symphys.verification.sensitivity_growth import samples
 
@@ -29,6 +29,10 @@ MOST_SAMPLES = 400
 MOST_GAINS = 5
 GAIN = 1e-6
 """Of the largest kinetic energy: what a contact must add in a step to be reported."""
+STOP = 0.05
+"""Of the largest kinetic energy: what contacts must take in a step, beyond the slip, for a body to be stopped."""
+ACROSS = 0.5
+"""Cosine of the angle to what bore a body before, below which a force meets it from the side."""
 
 
 def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
@@ -40,7 +44,10 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
         contacts, limits of joints and joints that give way gave (negative: took) [J].
         "gains": the steps in which rigid contacts gave most, each with "step", "time" [s], "energy" [J], "contacts";
         steps in which a soft contact acts are left out, since it gives back what it has stored. "gained" [J]: the sum
-        of all such steps. "drift" [J]: the largest change in a step that neither forces nor contacts account for.
+        of all such steps. "stops": the same of the steps in which they took most from a body that lay or rolled on
+        something, by a force from another side: it ran into something, or tripped over an edge. What slip takes under
+        the load of the step before is not counted. "drift" [J]: the largest change in a step that neither forces nor
+        contacts account for.
         "unexplained" [J]: the largest that is more than twice what servos and springs did in the step, whose work is
         not known to that precision, in the step from "drift_at" [s]; "drifted" [J]: the largest sum of such changes
         since the start.
@@ -56,7 +63,8 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
     by_joints = uncounted(rollout, record)
     touched = (np.abs(motion.contact_force).sum(axis=(1, 2)) > 0) | by_joints
     contact = np.where(touched, surplus, 0.0)
-    gains = np.where(_rigid_alone(rollout, motion) & ~by_joints, contact, 0.0)
+    rigid = _rigid_alone(rollout, motion) & ~by_joints
+    gains = np.where(rigid, contact, 0.0)
     floor = GAIN * kinetic.max() + 1e-12 * np.abs(potential).max()
     gains = np.where(gains > floor, gains, 0.0)
     first = np.argsort(-gains, kind="stable")[:MOST_GAINS]
@@ -66,12 +74,40 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
         "energy": _thinned(motion.time, kinetic, potential, applied, contact),
         "gains": [_gain(motion, int(k), float(gains[k])) for k in first if gains[k] > 0],
         "gained": float(gains.sum()),
+        "stops": _stops(rollout, record, np.where(rigid, -contact, 0.0), STOP * kinetic.max()),
         "drift": float(np.abs(free).max()),
         "unexplained": float(np.abs(unknown).max()),
         "drift_at": float(motion.time[int(np.abs(unknown).argmax())]),
         "drifted": float(np.abs(np.cumsum(unknown)).max()),
         "momentum": momentum_gap(rollout, record),
     }
+
+
+def _stops(rollout: Rollout, record: Record, taken: Array, least: float) -> list[dict[str, Any]]:
+    """The steps in which contacts took more than ``least`` [J] by a force from another side; ``taken`` (N,) [J]."""
+    motion = record.motion
+    if not (motion.contact_names and (taken > least).any()):
+        return []
+    size = np.linalg.norm(motion.contact_force, axis=2)
+    lasting = np.minimum(size, np.vstack([size[:1], size[:-1]]))
+    taken = taken - rollout.dt * (lasting * slip_speeds(rollout, record)).sum(axis=1)
+    found = [k for k in np.argsort(-taken, kind="stable") if k and taken[k] > least and _sideways(rollout, motion, k)]
+    return [_gain(motion, int(k), float(taken[k])) for k in found[:MOST_GAINS]]
+
+
+def _sideways(rollout: Rollout, motion: Trajectory, k: int) -> bool:
+    """Whether a contact in step k pushes a body from another side than what bore it in the step before."""
+    bore = np.zeros((len(motion.body_names), 3))
+    sides = [(c, side.body, sign) for c, pair in enumerate(rollout.world.pairs)
+             for side, sign in ((pair.first, 1.0), (pair.second, -1.0)) if side.body is not None]  # fmt: skip
+    for c, body, sign in sides:
+        bore[body] += sign * motion.contact_force[k - 1, c]
+    for c, body, sign in sides:
+        push = sign * motion.contact_force[k, c]
+        both = float(np.linalg.norm(push) * np.linalg.norm(bore[body]))
+        if both > 0 and push @ bore[body] < ACROSS * both:
+            return True
+    return False
 
 
 def momentum_gap(rollout: Rollout, record: Record) -> float:

@@ -92,7 +92,7 @@ def _fault(transcription: Transcription, record: Record, compared: list[dict[str
 def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
     """Energy and momentum, jumps, contacts, and tunnelling; it takes little beside a solve.
 
-    Where impulses of contacts have not settled, the motion is simulated again with other numbers of sweeps.
+    Where impulses of contacts have not settled, steps or the motion are simulated again with other numbers of sweeps.
 
     Each module says what its numbers are.
     """
@@ -100,5 +100,6 @@ def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
         return {}
     rollout = transcription.timed(record).rollout
     resolved = contacts(rollout, record)
-    again = refinement.resettled(transcription, record.z, resolved["residual"], resolved["impulse"])
+    size = resolved["residual"], resolved["impulse"]
+    again = {**refinement.left(transcription, record, *size), **refinement.resettled(transcription, record.z, *size)}
     return {**balance(rollout, record), **jumps(rollout, record), **resolved, **again, **tunnelling(rollout, record)}

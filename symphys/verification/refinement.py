@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symphys.model.state_layout import Layout
 from symphys.shooting import VariableBlock
 from symphys.trajectory import NotFinite
-from symphys.transcription import Transcription, transcribe
+from symphys.transcription import Record, Rollout, Transcription, transcribe
+from symphys.verification.bodies import Bodies, bodies
+from symphys.verification.joints import floating
 
 Array = NDArray[np.float64]
 
@@ -23,6 +26,14 @@ SETTLED = 1e-3
 """Residuals below this share of the largest impulse are not looked into."""
 UNSETTLED = 5e-2
 """Residuals above this share of the largest impulse say that impulses have not settled."""
+LEFT = 1e-4
+"""Residuals below this share of the largest impulse leave no velocity that matters."""
+CYCLING = 0.5
+"""Where twice the sweeps leave more than this share of a residual, more of them do not settle it."""
+MOST_STEPS = 5
+"""Steps that are looked at for what stays of a velocity that sweeps have not found."""
+LATER = 10
+"""Steps after which it counts."""
 ROUNDING = 1e-9
 """Relative changes below this say nothing about the order of convergence."""
 
@@ -81,6 +92,58 @@ def resettled(transcription: Transcription, z: Array, residual: float, impulse: 
         verdict = finer_problem(transcription, what).judge(z)
         rows.append({"what": what, "objective": verdict.objective, "worst": verdict.worst})
     return {"resettled": rows}
+
+
+def left(transcription: Transcription, record: Record, residual: float, impulse: float) -> dict[str, Any]:
+    """The velocities of bodies without joints that the sweeps of a step have not found, and more of them would.
+
+    Each recorded step is taken again from its state with twice the sweeps, so that what a motion makes of a small
+    difference later does not count. What is left falls in the same ratio as the residual: a velocity that changes by d
+    while the residual falls to its share q was off by d / (1 - q). Steps in which the residual does not fall to half
+    are not counted; see ``resettled``. Of the steps in which most is left, the motion goes on for ``LATER`` steps from
+    where twice the sweeps led, since contacts that last put right what a body that flies off keeps.
+
+    Returns:
+        "left": the largest velocity that is off then, as a share of the largest in the motion, or of what gravity
+        gives in a step. "left_at": the body's "name", "time" [s] and "speed" [m/s]; None where nothing is left.
+        Nothing where the ``residual`` is small beside the largest ``impulse`` of a contact in a step [N s].
+    """
+    rollout, arrays, motion = transcription.timed(record).rollout, record.arrays, record.motion
+    free = [group[0] for group in floating(rollout) if len(group) == 1]
+    if not (free and residual > LEFT * impulse > 0):
+        return {}
+    finer = finer_problem(transcription, MORE_SWEEPS).timed(record).rollout
+    p = np.tile(arrays.p[:, None], rollout.steps)
+    after, _, _, residuals, *_ = finer.report.map(rollout.steps)(arrays.x[:-1].T, arrays.u.T, p, 0.0)
+    share = np.array(residuals).ravel() / np.maximum(motion.residual, np.finfo(float).tiny)
+    scale = np.where(share > CYCLING, 0.0, 1 / np.maximum(1 - share, 1 - CYCLING))
+    numbers, settled = bodies(rollout, record), np.array(after).T
+    off = scale[:, None] * speeds(rollout, numbers, settled - arrays.x[1:])[:, free]
+    stays = np.zeros_like(off)
+    for k in np.argsort(-off.max(axis=1), kind="stable")[:MOST_STEPS]:
+        x, end = settled[k], min(k + 1 + LATER, rollout.steps)
+        for later in range(k + 1, end):
+            x = np.array(rollout.report(x, arrays.u[later], arrays.p, 0.0)[0]).ravel()
+        stays[k] = scale[k] * speeds(rollout, numbers, (x - arrays.x[end])[None])[0, free]
+    k, b = np.unravel_index(int(stays.argmax()), stays.shape)
+    worst = float(stays[k, b])
+    if not worst > 0:
+        return {"left": 0.0, "left_at": None}
+    given = rollout.dt * float(np.linalg.norm(numbers.gravity, axis=1).max())
+    largest = float(speeds(rollout, numbers, arrays.x).max()) + given
+    at = {"name": motion.body_names[free[b]], "time": float(motion.time[k]), "speed": worst}
+    return {"left": worst / largest, "left_at": at}
+
+
+def speeds(rollout: Rollout, numbers: Bodies, x: Array) -> Array:
+    """(N, B) [m/s] of states or differences of states (N, nx): of bodies' centres, or at the radius of gyration."""
+    layout, names = Layout(rollout.world), [body.name for body in rollout.world.bodies]
+    linear, angular = (
+        np.stack([np.linalg.norm(x[:, layout[f"{name}.{field}"]], axis=1) for name in names], axis=1)
+        for field in ("velocity", "angular_velocity")
+    )
+    found: Array = np.maximum(linear, numbers.size * angular)
+    return found
 
 
 def change(block: VariableBlock, before: Array, after: Array) -> float | None:

@@ -48,6 +48,18 @@ def test_impulses_in_a_cycle_refute_what_does_not_hold_where_the_sweeps_end_else
     assert IN_TIME not in [each.meaning for each in impact_findings(replace(trust, multiple_impacts=0.0))]
 
 
+@pytest.mark.parametrize(("left", "level"), [(0.0, GOOD), (5e-3, FAIR), (0.08, BAD)])
+def test_a_velocity_that_more_sweeps_find_refutes_also_where_the_result_holds(left: float, level: str) -> None:
+    """Of a residual below a thousandth of the largest impulse."""
+    rows = (Refined("sweeps x 2", 1.0, 0.5),)
+    trust = Examination(
+        residual=5e-4, impulse=1.0, left=left, left_of="crate", left_time=0.4, left_speed=0.3, resettled=rows
+    )
+    line = residual_finding(trust, MET)
+    assert line.level == level and bool(doubts(trust, MET)) == (level == BAD)
+    assert ('"crate" is off by 0.3 m/s' in line.meaning) == (level != GOOD)
+
+
 def test_the_doubt_says_what_another_number_of_sweeps_does() -> None:
     told = residual_finding(replace(UNSETTLED, resettled=(Refined("sweeps + 1", 1.0, 7.0),)), MET).doubt
     assert told.endswith("0.5 of 1 N s, and simulated with sweeps + 1 it misses by 7 × tolerance")  # noqa: RUF001

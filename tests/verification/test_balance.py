@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from symphys.findings.energy import balance_finding, gains_finding
+from symphys.findings.energy import balance_finding, gains_finding, stop_findings
 from symphys.findings.examination import Energy, Examination, Gain
-from symphys.findings.levels import BAD, GOOD
+from symphys.findings.levels import BAD, FAIR, GOOD
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import transcribe
@@ -177,3 +177,57 @@ def test_words_of_the_budget():
 
 def test_points_of_one_contact_have_its_name():
     assert surface("box-ground:3") == surface("box-ground:0") == "box-ground"
+
+
+BOARDS = """
+[simulation]
+duration = 0.25
+dt = 0.005
+[[body]]
+name = "cube"
+shape = { box = { size = [0.1, 0.1, 0.1] } }
+mass = 1.0
+position = [0, 0, 0.05]
+velocity = [3, 0, 0]
+[contact]
+friction = 0.2
+[[block]]
+name = "first"
+shape = { box = { size = [2, 1, 0.2] } }
+position = [-0.5, 0, -0.1]
+[[block]]
+name = "second"
+shape = { box = { size = [4, 1, 0.2] } }
+position = [2.5, 0, HEIGHT]
+[[variable]]
+name = "push"
+sets = "cube.velocity[0]"
+guess = [3.0]
+[[target]]
+name = "far"
+value = "cube.position[0] - 0.5"
+tolerance = 1.0
+"""
+
+
+@pytest.mark.parametrize(("edge", "trips"), [(0.0, False), (0.01, True)])
+def test_a_trip_over_an_edge_is_told_with_what_it_takes(make, edge, trips):
+    """A cube slides off one board onto the next: flush, nothing but friction takes energy; an edge of 1 cm stops it.
+
+    The edge is met after 0.15 to 0.16 s, at 2.7 m/s.
+    """
+    boards = make(BOARDS.replace("HEIGHT", str(edge - 0.1)))
+    record = boards.record(boards.shooting.start(0))
+    found = balance(boards.rollout, record)
+    if not trips:
+        assert found["stops"] == []
+        return
+    (stop, *_) = found["stops"]
+    assert "cube-second" in stop["contacts"] and 0.145 < stop["time"] < 0.165
+    motion, k = record.motion, stop["step"]
+    before, after = (
+        np.sum(motion.velocity[i] ** 2 + 0.01 / 6 * motion.angular_velocity[i] ** 2) / 2 for i in (k, k + 1)
+    )
+    assert stop["energy"] == pytest.approx(before - after, rel=0.1)
+    (line,) = stop_findings(Examination(stops=(Gain(k, stop["time"], stop["energy"], tuple(stop["contacts"])),)))
+    assert line.level == FAIR and not line.doubt and "cube-second" in line.meaning
