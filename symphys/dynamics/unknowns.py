@@ -15,6 +15,9 @@ Expr = Any
 COMPLIANCE = 1e-6
 """Compliance of rigid constraints in ``newton_start``, as a share of their inverse effective masses."""
 
+NO_MASS = 1e-30
+"""[kg] added under the root of effective masses, so that its slope is finite where a constraint acts on nothing."""
+
 
 @dataclass(frozen=True)
 class Momentum:
@@ -68,7 +71,7 @@ class Linearisation:
 
     def within(self, distance: Expr, mass: Expr) -> Expr:
         """1 if an impulse is inside a bound by ``distance`` [N s], 0 if beyond it, and between near it."""
-        return ramp(distance, ca.sqrt(mass) * self.blur)
+        return ramp(distance, ca.sqrt(ca.fmax(mass, 0) + NO_MASS) * self.blur)
 
 
 class VelocityConstraint(Protocol):

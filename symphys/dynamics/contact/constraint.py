@@ -254,7 +254,7 @@ def linearised(contact: ContactConstraint, slip: Expr, old: ContactImpulse, by: 
     mass, width = contact.normal_mass, contact.normal_mass * contact.width
     kept = old.normal + mass * (contact.target - contact.softness * old.normal - ca.dot(contact.normal, slip))
     normal, rise = contact.near * positive(kept, width), contact.near * _slope(kept, width, mass, by)
-    gives = 1 - rise * (1 - mass * (contact.softness + by.softness))
+    gives = 1 - rise + rise * mass * (contact.softness + by.softness)
     press = (normal - old.normal - rise * mass * by.softness * by.centre * old.normal) / gives
     by_slip = rise * mass / gives * contact.normal.T
     # a change of load that its own projection does not make widens the disc of friction

@@ -362,8 +362,8 @@ def _miss(
 
 
 def _energy(metric: tuple[Expr, ...], velocities: Expr) -> Expr:
-    """[J] twice the kinetic energy."""
-    return ca.dot(velocities, ca.mtimes(ca.diagcat(*metric), velocities))
+    """[J] twice the kinetic energy, which rounding does not make negative."""
+    return ca.fmax(ca.dot(velocities, ca.mtimes(ca.diagcat(*metric), velocities)), 0)
 
 
 @traced

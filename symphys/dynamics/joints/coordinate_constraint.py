@@ -122,7 +122,7 @@ class CoordinateConstraint:
 
     def _inside(self, distance: Expr, by: Linearisation) -> Expr:
         smooth = positive_slope(distance, self.width)
-        return ca.if_else(self.width > 0, smooth, by.within(distance, ca.fabs(self.slope)))
+        return ca.if_else(self.width > 0, smooth, by.within(distance, self.slope))
 
     def answer(self, rate: Expr, old: Expr, less: Expr | None = None) -> tuple[Expr, Expr]:
         """The impulse after a projection, and its change; ``less`` is known last, so it is taken off last."""

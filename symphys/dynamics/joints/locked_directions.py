@@ -86,16 +86,8 @@ class LockConstraint:
         """(n,): velocities along the directions."""
         return speeds(self.terms, self.seen, momenta)
 
-<<<<<<< HEAD
     def linearised(self, momenta: tuple[Any, ...], old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
-        """(a (n,), B (n, n)); see ``newton_start``."""
-=======
-    def linearised(
-        self, momenta: tuple[Any, ...], old: JointImpulse, softness: Expr, centre: float
-    ) -> tuple[Expr, Expr]:
         """The impulse change a (n,) and its slope B (n, n) by the velocities; see ``newton_start``."""
-        del softness
->>>>>>> w-clean
         soft = COMPLIANCE / ca.diag(self.mass)
         miss = self.rates(momenta) - self.target + (self.softness + by.centre * soft) * old.numbers
         stiff = ca.diag(1 / (self.softness + soft))
