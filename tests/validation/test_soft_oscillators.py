@@ -6,12 +6,14 @@ exact solution at any step; what couples several is right to second order in the
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 from laboratory import Array, Lab
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from symphys.dynamics.contact.oscillator import response, spring_law
 from symphys.model.joints import BALL, FIXED, SLIDER, Joint, JointFrame
 from symphys.model.shapes import Box, Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
@@ -140,3 +142,17 @@ def test_a_foot_on_a_rail_rebounds_as_a_free_ball(ratio: float) -> None:
     states = Lab(world, Scheme(dt=0.01)).states({"b.position": [0, 0, RADIUS + 0.0937]}, 0.42)
     ended = states["b.position"][-1, 2] - RADIUS, states["b.velocity"][-1, 2]
     assert ended == pytest.approx(rebound(ratio, 0.0937, 0.42), abs=1e-8)
+
+
+@pytest.mark.parametrize("count", range(1, 7))
+def test_equal_springs_on_one_body_do_not_grow(count: int) -> None:
+    """Eigenvalues of a step of up to six that share a mass, from w dt .05 to 6, have a size of at most 1."""
+    omega, ratio = ca.SX.sym("omega"), ca.SX.sym("ratio")
+    law = spring_law(response(omega, ratio, ca.SX(1)), response(omega, -ratio, ca.SX(1)))
+    numbers = ca.Function("law", [omega, ratio], [law.stiff, law.b, law.c])
+    for angle in np.arange(0.05, 6, 0.05):
+        for share in (0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 1, 2):
+            stiff, b, c = (count * float(each) for each in numbers(angle, share))
+            velocity = np.array([1 - c, -stiff]) / (1 + b)
+            step = np.array([velocity, velocity + np.array([0, 1])])
+            assert np.abs(np.linalg.eigvals(step)).max() < 1 + 1e-7, (angle, share)

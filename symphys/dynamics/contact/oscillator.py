@@ -14,8 +14,9 @@ Without v this is the impulse that acts beside a over kick = (d + d_) / 2,
     Q = d (d P + d_ P_ sigma / sigma_) / 2,   r = d sigma / sigma_
 
 so that one oscillator is exact at any step, and several on one body are leapfrog with heavier masses and with dampers
-on mean velocities, which keeps energy and is stable. Beyond w d of about 1, b is at least what keeps up to six of them
-stable on one body. From w d = 1.5 to 2.5 the law goes over to implicit Euler, which damps what a step cannot resolve.
+on mean velocities, which keeps energy and is stable. N of them are stable where (b - c) / 2 >= kick w^2 d / 4 - 1 / N;
+beyond w d of about 1, b is larger and c smaller by what that lacks for N = 6. From w d = 1.5 to 2.5 the law becomes
+implicit Euler, which damps what a step cannot resolve.
 """
 
 from __future__ import annotations
@@ -116,9 +117,9 @@ def spring_law(forward: Response, backward: Response) -> SpringLaw:
     d, before, share = forward.time, backward.time, forward.sigma / backward.sigma
     kick, half = (d + before) / 2, d / 2
     q = (d * forward.p + before * backward.p * share) / 2
-    stiff, exact = kick * forward.omega**2, ca.fmax(kick / q - 1, LEAST_B)
-    heavier = ca.fmax(stiff * d / 4 - INVERSE_COUNT - exact, 0)
-    b, c = exact + heavier, 1 - kick * share / q - heavier
+    stiff, b, c = kick * forward.omega**2, ca.fmax(kick / q - 1, LEAST_B), 1 - kick * share / q
+    heavier = ca.fmax(stiff * d / 4 - INVERSE_COUNT - (b - c) / 2, 0)
+    b, c = b + heavier, c - heavier
     # v_end = pushed (a - w^2 e) + kept u_, with a = ((1 + b) u - (1 - c) u_) / kick + w^2 e
     kept = forward.kept / backward.sigma
     pushed = d * forward.sigma + kept * before * backward.p / 2
