@@ -75,6 +75,24 @@ def test_a_file_whose_frames_can_lock_is_refused_with_the_cures() -> None:
     problem_of_tables(gimbal(limits=[-1.3, 1.3]))
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_universal_joint_is_two_of_the_axes(turned: bool) -> None:
+    """With a hinge in line with its first or second axis it locks; about the one that a hinge would be it does not."""
+    tables = gimbal()
+    yaw, _, roll = tables["joint"]  # type: ignore[misc]
+    tables["body"] = tables["body"][1:]  # type: ignore[index]
+    both = {"name": "cardan", "universal": {"axes": [[0, 1, 0], [1, 0, 0]]}, "point": [0, 0, 1]}
+    joints = [{**yaw, "between": ["world", "ring_b"]}, {**both, "between": ["ring_b", "arm"]}]
+    if turned:
+        both["universal"] = {"axes": [[0, 0, 1], [0, 1, 0]]}
+        joints = [{**both, "between": ["world", "ring_b"]}, {**roll, "between": ["ring_b", "arm"]}]
+    tables["joint"] = joints
+    with pytest.raises(ProblemError, match=r"gimbal lock"):
+        problem_of_tables(tables)
+    joints[0 if turned else 1]["limits"] = [-1.3, 1.3]
+    problem_of_tables(tables)
+
+
 def test_an_armature_at_either_end_is_a_cure() -> None:
     tables = gimbal()
     tables["joint"][2]["armature"] = 0.002  # type: ignore[index]

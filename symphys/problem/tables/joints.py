@@ -85,7 +85,7 @@ def _chains(
 ) -> Iterator[tuple[list[ParametricJoint], list[Screw]]]:
     """Joints between two bodies with mass, or the world, in a row with frames without mass; with their screws.
 
-    Left out: frames that hold three joints or more, and universal joints.
+    Left out: frames that hold three joints or more.
     """
     rigid = [joint for joint in joints if joint]
     held = {name: [joint for joint in rigid if name in (joint.first, joint.second)] for name in massless}
@@ -100,8 +100,7 @@ def _chains(
                 (joint,) = (each for each in held[at] if each is not chain[-1])
                 place, chain = _crossed(joint, at, place, screws), [*chain, joint]
                 at = str(joint.second or WORLD) if at == joint.first else joint.first
-            whole = at not in held and chain[0].name < chain[-1].name
-            if whole and all(joint.kind.name in ("hinge", "slider", "ball", "fixed") for joint in chain):
+            if at not in held and chain[0].name < chain[-1].name:
                 yield chain, screws
 
 
@@ -113,8 +112,8 @@ def _crossed(joint: ParametricJoint, body: str | None, pose: Array, screws: list
     low, high = (_bound(joint.limits.lower, -np.inf), _bound(joint.limits.upper, np.inf))
     low, high = (-high, -low) if body == joint.first else (low, high)
     carried = not is_zero(joint.armature)
-    axes = {"hinge": [0], "slider": [0], "ball": [0, 1, 2]}.get(joint.kind.name, [])
-    for k in axes:
+    axes = {"fixed": [], "hinge": [0], "slider": [0], "universal": [1, 0], "ball": [0, 1, 2]}[joint.kind.name]
+    for k in axes if body == joint.first else reversed(axes):
         screws.append(Screw(frame[:3, k], None if joint.kind.name == "slider" else frame[:3, 3], low, high, carried))
     return np.asarray(frame @ np.linalg.inv(there), float)
 
