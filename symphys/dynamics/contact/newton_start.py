@@ -14,11 +14,12 @@ are open are those of least sum of squares; the last steps, about the loads that
 
 Such steps need not converge: bodies may be squeezed between two surfaces, and torsion, rolling and what friction does
 to a coupled contact are left to the sweeps. So each step stays within a reach of energy, and the sweeps begin with the
-iterates weighted by what they miss: the energy that projections of all constraints, each by itself, would change.
+iterate that misses least: from which projections of all constraints, each by itself, would change the least energy.
 
-What the start gives is continuous. A constraint near its bound would make the step jump as it changes sides, so its
-slope goes from one to the other over a width that shrinks with what the iterate misses (Chen, Qi and Sun, Global and
-superlinear convergence of the smoothing Newton method, Math. Comp. 67, 1998, have such a Jacobian).
+What the start gives is continuous. Where two iterates miss about as much their mean is taken. A constraint near its
+bound would make the step jump as it changes sides, so its slope goes from one to the other over a width that shrinks
+with what the iterate misses (Chen, Qi and Sun, Global and superlinear convergence of the smoothing Newton method, Math.
+Comp. 67, 1998, have such a Jacobian).
 """
 
 from __future__ import annotations
@@ -26,7 +27,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
 from itertools import accumulate
 from typing import Any
 
@@ -50,6 +50,7 @@ from symphys.dynamics.unknowns import (
     PlacedConstraint,
     VelocityConstraint,
 )
+from symphys.maths.smoothing import clip
 from symphys.model.world import World
 
 Expr = Any
@@ -66,8 +67,10 @@ FAR = 100.0
 """Of the energies from which a step may start: how large that of the step may be."""
 BLUR = 0.03
 """Of the root of what an iterate misses: over how much of it a constraint's slope goes from one side to the other."""
+BETTER, WORSE = 0.25, 4.0
+"""What an iterate misses, of what the best so far has missed: below, it is taken whole, and above, not at all."""
 EVEN = 1e-22
-"""Of the energies at hand: what two iterates may both miss so that they count alike."""
+"""Of the energies at hand: what is missed by rounding alone."""
 TINY = 1e-30
 """[J] the least that a step may reach, so that its slope is finite at rest."""
 
@@ -157,14 +160,15 @@ def solve_together(
     metric = _metric(trees, group.carriers, start.momenta)
     members = [_member(group, number, constraints[number], metric, start) for number in group.constraints]
     own = tuple(start.momenta[i] for i in group.carriers)
-    missed = [_missed(metric, members, start)]
-    reach = _reach(metric, own, missed[0], len(members))
-    iterates = [start]
+    after = missed = _missed(metric, members, start)
+    reach = _reach(metric, own, missed, len(members))
+    best = now = start
     for centre in centres:
-        by = Linearisation(softness, centre, _blur(missed[-1]))
-        iterates.append(_stepped(group, metric, members, iterates[-1], by, reach))
-        missed.append(_missed(metric, members, iterates[-1]))
-    return _weighted(group, iterates, _weights(tuple(missed), reach))
+        now = _stepped(group, metric, members, now, Linearisation(softness, centre, _blur(after)), reach)
+        after = _missed(metric, members, now)
+        share = _taken(after, missed, reach)
+        best, missed = _between(group, share, now, best), _mean(share, after, missed)
+    return best
 
 
 def _member(group: Group, number: int, placed: PlacedConstraint, metric: tuple[Expr, ...], start: Iterate) -> Member:
@@ -216,13 +220,13 @@ def _missed(metric: tuple[Expr, ...], members: Sequence[Member], now: Iterate) -
     return _sum(tuple(found))
 
 
-def _weighted(group: Group, iterates: Sequence[Iterate], weights: tuple[Expr, ...]) -> Iterate:
-    """Their mean. All have their velocities from their impulses, and so has it."""
-    momenta, impulses = list(iterates[0].momenta), list(iterates[0].impulses)
+def _between(group: Group, share: Expr, now: Iterate, best: Iterate) -> Iterate:
+    """A share of ``now``, the rest of ``best``. Both have their velocities from their impulses, and so has it."""
+    momenta, impulses = list(best.momenta), list(best.impulses)
     for i in group.carriers:
-        momenta[i] = _mean_state(weights, tuple(each.momenta[i] for each in iterates))
+        momenta[i] = _mean_state(share, now.momenta[i], best.momenta[i])
     for k in group.constraints:
-        impulses[k] = _mean_impulse(weights, tuple(each.impulses[k] for each in iterates))
+        impulses[k] = _mean_impulse(share, now.impulses[k], best.impulses[k])
     return Iterate(tuple(momenta), tuple(impulses), tuple(impulses))
 
 
@@ -377,21 +381,23 @@ def _blur(missed: Expr) -> Expr:
 
 
 @traced
-def _weights(missed: tuple[Expr, ...], reach: Expr) -> tuple[Expr, ...]:
-    """Of the iterates: as one over the square of what they miss."""
-    counted = [each + EVEN * reach + TINY for each in missed]
-    least = reduce(ca.fmin, counted)
-    weights = [(least / each) ** 2 for each in counted]
-    return tuple(each / sum(weights) for each in weights)
+def _taken(after: Expr, missed: Expr, reach: Expr) -> Expr:
+    """The share of an iterate that misses ``after`` against what has missed so far: 1 if far better, 0 if far worse."""
+    ratio = after / (missed + EVEN * reach + TINY)
+    return clip((WORSE - ratio) / (WORSE - BETTER), 0, 1, 0)
 
 
 @traced
-def _mean_state(weights: tuple[Expr, ...], states: States) -> State:
-    (found,) = _cut(sum(weight * _flat(state) for weight, state in zip(weights, states, strict=True)), states[:1])
+def _mean(share: Expr, now: Expr, best: Expr) -> Expr:
+    return now + (1 - share) * (best - now)
+
+
+@traced
+def _mean_state(share: Expr, now: State, best: State) -> State:
+    (found,) = _cut(_mean(share, _flat(now), _flat(best)), (best,))
     return found
 
 
 @traced
-def _mean_impulse(weights: tuple[Expr, ...], impulses: tuple[AnyImpulse, ...]) -> AnyImpulse:
-    first, *others = (impulse.times(weight) for weight, impulse in zip(weights, impulses, strict=True))
-    return reduce(lambda a, b: a.plus(b), others, first)
+def _mean_impulse(share: Expr, now: AnyImpulse, best: AnyImpulse) -> AnyImpulse:
+    return now.plus(best.minus(now).times(1 - share))
