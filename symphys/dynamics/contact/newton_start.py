@@ -59,7 +59,7 @@ State = Any
 """``Velocities`` of a carrier, or its displacement."""
 States = tuple[State, ...]
 
-CENTRES = 1, 1, 0, 0
+CENTRES = 1, 1, 0, 0, 0
 """Of the steps: 1 with loads about 0, 0 about those that were found."""
 LARGEST = 40
 """Velocities of a group that is solved at once."""
