@@ -16,10 +16,9 @@ Such steps need not converge: bodies may be squeezed between two surfaces, and t
 to a coupled contact are left to the sweeps. So each step stays within a reach of energy, and the sweeps begin with the
 iterate that misses least: from which projections of all constraints, each by itself, would change the least energy.
 
-What the start gives is continuous. Where two iterates miss about as much their mean is taken. A constraint near its
-bound would make the step jump as it changes sides, so its slope goes from one to the other over a width that shrinks
-with what the iterate misses (Chen, Qi and Sun, Global and superlinear convergence of the smoothing Newton method, Math.
-Comp. 67, 1998, have such a Jacobian).
+What it gives is continuous: where two iterates miss about as much their mean is taken, and near a bound the slope of a
+constraint goes from one side to the other over a width that shrinks with what is missed, as in the Jacobian of Chen,
+Qi and Sun (Global and superlinear convergence of the smoothing Newton method, Math. Comp. 67, 1998).
 """
 
 from __future__ import annotations
@@ -338,8 +337,7 @@ def _given(lever: Lever, a: Expr, b: Expr, changes: tuple[Expr, ...]) -> Expr:
 @traced
 def _reach(metric: tuple[Expr, ...], states: States, missed: Expr, count: int) -> Expr:
     """[J] which no step goes beyond: from the energy of the velocities, and of all projections were they to add up."""
-    velocities = ca.vertcat(*(_flat(state) for state in states))
-    return FAR * (_energy(metric, velocities) + count * missed) + TINY
+    return FAR * (_energy(metric, ca.vertcat(*map(_flat, states))) + count * missed) + TINY
 
 
 @traced
@@ -351,7 +349,7 @@ def _share(parts: tuple[tuple[Lever, Expr], ...], reach: Expr) -> Expr:
 
 @traced
 def _moved(lever: Lever, given: Expr, share: Expr, momenta: States, old: AnyImpulse) -> tuple[States, AnyImpulse]:
-    after = ca.vertcat(*(_flat(state) for state in momenta)) + share * ca.mtimes(lever.responses, given)
+    after = ca.vertcat(*map(_flat, momenta)) + share * ca.mtimes(lever.responses, given)
     return tuple(_cut(after, momenta)), old.plus(old.like(share * given))
 
 
@@ -394,8 +392,7 @@ def _mean(share: Expr, now: Expr, best: Expr) -> Expr:
 
 @traced
 def _mean_state(share: Expr, now: State, best: State) -> State:
-    (found,) = _cut(_mean(share, _flat(now), _flat(best)), (best,))
-    return found
+    return _cut(_mean(share, _flat(now), _flat(best)), (best,))[0]
 
 
 @traced
