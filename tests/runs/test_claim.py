@@ -32,7 +32,7 @@ def folder(tmp_path: Path) -> Path:
 @pytest.fixture
 def process() -> Iterator[subprocess.Popen[bytes]]:
     """A process of this machine that does nothing."""
-    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"]) as started:
+    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(1800)"]) as started:
         yield started
         started.kill()
 
@@ -83,7 +83,7 @@ def test_the_claim_of_a_living_process_is_respected_and_that_of_a_dead_one_is_no
 
 def test_a_zombie_holds_nothing(folder: Path) -> None:
     """A worker that was killed is one until its parent asks how it ended."""
-    process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(1800)"])
     leave(folder, of_process(process.pid))
     process.kill()
     while claims.beginning(process.pid) != "over":
