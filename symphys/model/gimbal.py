@@ -1,7 +1,8 @@
 """Gimbal lock: poses in which joints with massless frames between two bodies have a coordinate without inertia.
 
 A chain of joints is singular where its screws are linearly dependent: the rates of its frames are then free, and no
-inertia answers. Three hinges through one point are where their axes lie in one plane.
+inertia answers. Three hinges through one point are where their axes lie in one plane. Frames that hold three joints or
+more make a tree of chains, from one body with mass to each other: singular where one set of rates moves none of them.
 """
 
 from __future__ import annotations
@@ -39,19 +40,30 @@ class Screw:
     carried: bool = False
 
 
-def locks(chain: Sequence[Screw]) -> bool:
-    """Whether a chain, from one body with mass to the other, has a pose within its bounds in which it is singular."""
+def locks(screws: Sequence[Screw], paths: Sequence[Sequence[int]] | None = None) -> bool:
+    """Whether a tree of screws has a pose within their bounds in which it is singular.
+
+    Args:
+        screws: all of them, from one body with mass on.
+        paths: indices of the screws from that body to each other body with mass; without, one path of all.
+    """
     from scipy.optimize import minimize  # a start without such chains loads no scipy
 
-    if len(chain) > 6 + sum(each.carried for each in chain):
+    paths = [list(range(len(screws)))] if paths is None else paths
+    if len(screws) > 6 * len(paths) + sum(each.carried for each in screws):
         return True
-    inner, rng = list(chain[1:-1]), np.random.default_rng(0)
-    widest = [np.pi if each.point is not None else REACH for each in inner]
-    low = np.array([max(each.low, -wide) for each, wide in zip(inner, widest, strict=True)])
-    high = np.array([min(each.high, wide) for each, wide in zip(inner, widest, strict=True)])
+    # What comes last moves nothing else, and what all paths begin with moves all alike.
+    idle = {k for k in range(len(screws)) if all(k == path[-1] for path in paths if k in path)}
+    idle |= {k for k in range(len(screws)) if all(path[:1] == [k] for path in paths)}
+    inner, rng = [k for k in range(len(screws)) if k not in idle], np.random.default_rng(0)
+    widest = [np.pi if screws[k].point is not None else REACH for k in inner]
+    low = np.array([max(screws[k].low, -wide) for k, wide in zip(inner, widest, strict=True)])
+    high = np.array([min(screws[k].high, wide) for k, wide in zip(inner, widest, strict=True)])
 
-    def least(q: Array) -> float:
-        return _least(chain, np.concatenate([[0.0], np.clip(q, low, high), [0.0]])[: len(chain)])
+    def least(values: Array) -> float:
+        q = np.zeros(len(screws))
+        q[inner] = np.clip(values, low, high)
+        return _least(screws, paths, q)
 
     if not inner:
         return least(np.empty(0)) < SINGULAR
@@ -61,23 +73,29 @@ def locks(chain: Sequence[Screw]) -> bool:
     return any(least(minimize(least, at, method="Nelder-Mead", options=options).x) < SINGULAR for at in best)
 
 
-def _least(chain: Sequence[Screw], q: Array) -> float:
-    """The least singular value of the chain's screws, with a row for each rotor."""
-    from scipy.spatial.transform import Rotation
-
-    points = [each.point for each in chain if each.point is not None]
+def _least(screws: Sequence[Screw], paths: Sequence[Sequence[int]], q: Array) -> float:
+    """The least singular value of the velocities of all ends by the rates, with a row for each rotor."""
+    points = [each.point for each in screws if each.point is not None]
     size = max((float(np.linalg.norm(a - points[0])) for a in points), default=0.0) or 1.0
     centre = points[0] if points else np.zeros(3)
-    turned, moved, columns = Rotation.identity(), np.zeros(3), []
-    for each, value in zip(chain, q, strict=True):
-        axis = turned.apply(each.axis)
-        if each.point is None:
-            columns.append(np.concatenate([np.zeros(3), axis]))
-            moved = moved + value * axis
+    rows = [np.diag([float(each.carried) for each in screws])]
+    rows += [_velocities(screws, path, q, centre, size) for path in paths]
+    return float(np.linalg.svd(np.vstack(rows), compute_uv=False)[-1])
+
+
+def _velocities(screws: Sequence[Screw], path: Sequence[int], q: Array, centre: Array, size: float) -> Array:
+    """(6, screws) Turning, and speed over ``size``, of the body at the end of a path by the rate of each screw."""
+    from scipy.spatial.transform import Rotation
+
+    turned, moved, columns = Rotation.identity(), np.zeros(3), np.zeros((6, len(screws)))
+    for k in path:
+        axis = turned.apply(screws[k].axis)
+        if (given := screws[k].point) is None:
+            columns[3:, k] = axis
+            moved = moved + q[k] * axis
             continue
-        point = turned.apply(each.point - centre) + moved
-        columns.append(np.concatenate([axis, np.cross(point, axis) / size]))
-        step = Rotation.from_rotvec(value * axis)
+        point = turned.apply(given - centre) + moved
+        columns[:3, k], columns[3:, k] = axis, np.cross(point, axis) / size
+        step = Rotation.from_rotvec(q[k] * axis)
         turned, moved = step * turned, point + step.apply(moved - point)
-    rotors = np.diag([float(each.carried) for each in chain])
-    return float(np.linalg.svd(np.vstack([np.array(columns).T, rotors]), compute_uv=False)[-1])
+    return columns

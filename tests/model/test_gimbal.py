@@ -49,6 +49,13 @@ def test_a_chain_that_cannot_is_not(name: str) -> None:
     assert not locks(FREE[name])
 
 
+@pytest.mark.parametrize(("wheel", "locking"), [(X, True), (Z, False), (Y, False), ([0.6, 0.8, 0], False)])
+def test_a_frame_that_holds_three_joints_locks_where_nothing_beyond_it_answers(wheel: object, locking: bool) -> None:
+    """A flywheel on the inner ring answers turns of it about all but one axis, which must be the one that locks."""
+    screws = [hinge(Z), hinge(Y), hinge(X), hinge(wheel)]
+    assert locks(screws, [[0, 1, 2], [0, 1, 3]]) == locking
+
+
 def gimbal(**pitch: object) -> dict[str, object]:
     """An arm on three hinges with two frames; keys of the middle one."""
     frames = [{"name": name, "mass": 0, "position": [0, 0, 1]} for name in ("ring_a", "ring_b")]
@@ -73,6 +80,19 @@ def test_a_file_whose_frames_can_lock_is_refused_with_the_cures() -> None:
     with pytest.raises(ProblemError, match=r"gimbal lock.*ball joint.*armature.*limits"):
         problem_of_tables(gimbal())
     problem_of_tables(gimbal(limits=[-1.3, 1.3]))
+
+
+@pytest.mark.parametrize("wheel", [[1, 0, 0], [0, 1, 0]])
+def test_a_flywheel_on_the_inner_ring(wheel: list[float]) -> None:
+    tables = gimbal()
+    tables["body"] += [{"name": "wheel", "mass": 0.5, "inertia": [0.01, 0.01, 0.01], "position": [0, 0, 1]}]  # type: ignore[operator]
+    hub = {"name": "hub", "between": ["ring_b", "wheel"], "hinge": {"axis": wheel}, "point": [0, 0, 1]}
+    tables["joint"] += [hub]  # type: ignore[operator]
+    if wheel == [0, 1, 0]:
+        problem_of_tables(tables)
+        return
+    with pytest.raises(ProblemError, match="gimbal lock"):
+        problem_of_tables(tables)
 
 
 @pytest.mark.parametrize("turned", [False, True])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
@@ -69,8 +70,9 @@ def check_frames(joints: Sequence[ParametricJoint | None], massless: Sequence[st
             text = f"{name} has mass 0, so it must be between two rigid joints, which hold it to bodies with mass"
             faults.add(("joint",), text)
             return
-    for chain, screws in _chains(joints, massless):
-        if locks(screws):
+    for tree in _trees(joints, massless):
+        chain = tree.joints
+        if locks(tree.screws, tree.paths):
             names = ", ".join(joint.name for joint in chain)
             text = (
                 f"{names}, with frames of mass 0 between them, can come to a pose in which their axes depend on each "
@@ -80,28 +82,50 @@ def check_frames(joints: Sequence[ParametricJoint | None], massless: Sequence[st
             faults.add(("joint", list(joints).index(chain[0])), text)
 
 
-def _chains(
-    joints: Sequence[ParametricJoint | None], massless: Sequence[str]
-) -> Iterator[tuple[list[ParametricJoint], list[Screw]]]:
-    """Joints between two bodies with mass, or the world, in a row with frames without mass; with their screws.
+@dataclass
+class _Tree:
+    """Joints that frames without mass connect, from one body with mass, or the world, to all others.
 
-    Left out: frames that hold three joints or more.
+    Attributes:
+        joints: the first is the one of that body.
+        screws: of all joints, in their order, at the pose in which all coordinates are 0.
+        paths: for each other body, the indices of the screws between.
     """
+
+    joints: list[ParametricJoint]
+    screws: list[Screw]
+    paths: list[list[int]]
+
+
+def _trees(joints: Sequence[ParametricJoint | None], massless: Sequence[str]) -> Iterator[_Tree]:
+    """The joints of all frames without mass; left out: joints that close a ring of frames."""
     rigid = [joint for joint in joints if joint]
     held = {name: [joint for joint in rigid if name in (joint.first, joint.second)] for name in massless}
-    for first in rigid:
-        for end in (first.first, first.second):
-            inner = first.second if end == first.first else first.first
-            if end in held or inner not in held:
-                continue
-            chain, screws = [first], list[Screw]()
-            place, at = _crossed(first, end, np.eye(4), screws), inner
-            while at in held and len(held[at]) == 2:
-                (joint,) = (each for each in held[at] if each is not chain[-1])
-                place, chain = _crossed(joint, at, place, screws), [*chain, joint]
-                at = str(joint.second or WORLD) if at == joint.first else joint.first
-            if at not in held and chain[0].name < chain[-1].name:
-                yield chain, screws
+    seen: set[str] = set()
+
+    def grow(tree: _Tree, joint: ParametricJoint, body: str, pose: Array, path: list[int]) -> None:
+        before = len(tree.screws)
+        pose = _crossed(joint, body, pose, tree.screws)
+        path = [*path, *range(before, len(tree.screws))]
+        tree.joints.append(joint)
+        if (frame := _other(joint, body)) not in held:
+            tree.paths.append(path)
+            return
+        seen.add(frame)
+        for more in held[frame]:
+            if more is not joint and _other(more, frame) not in seen:
+                grow(tree, more, frame, pose, path)
+
+    for joint in rigid:
+        for body in (joint.first, joint.second or WORLD):
+            frame = _other(joint, body)
+            if body not in held and frame in held and frame not in seen:
+                grow(tree := _Tree([], [], []), joint, body, np.eye(4), [])
+                yield tree
+
+
+def _other(joint: ParametricJoint, body: str) -> str:
+    return str(joint.second or WORLD) if body == joint.first else joint.first
 
 
 def _crossed(joint: ParametricJoint, body: str | None, pose: Array, screws: list[Screw]) -> Array:
