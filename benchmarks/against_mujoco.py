@@ -13,8 +13,8 @@ from time import perf_counter
 
 import mujoco
 import numpy as np
+from measured_worlds import problem_of
 from numpy.typing import NDArray
-from worlds import problem_of
 
 from symphys import Body, Law, Plane, Scheme
 from symphys.codegen import compile_program

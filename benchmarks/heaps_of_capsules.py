@@ -19,8 +19,8 @@ from time import process_time
 import mujoco
 import numpy as np
 from against_mujoco import fastest
+from measured_worlds import problem_of
 from numpy.typing import NDArray
-from worlds import problem_of
 
 from symphys import Body, Law, Plane, Scheme
 from symphys.codegen import Cache, Program, compile_program
@@ -35,7 +35,7 @@ from symphys.transcription.neighbours.program import crowd_of
 from symphys.transcription.rollout import symbolic_rollout
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
-from heaps import heap
+from worlds.heaps import heap
 
 STEPS, BATCH, DT = 20, 64, 0.01
 PARTS, FINEST = (1, 2, 4, 8), 64

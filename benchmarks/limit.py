@@ -19,8 +19,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from measured_worlds import spheres_on_ground
 from spheres import BATCH, COUNT, STEPS, around, fastest, guess_of
-from worlds import spheres_on_ground
 
 from symphys.codegen import Program, compile_program
 from symphys.codegen.emit.plan import plan

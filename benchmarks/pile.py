@@ -11,8 +11,8 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from measured_worlds import pile
 from spheres import around, fastest, guess_of
-from worlds import pile
 
 from symphys.codegen import Cache, compile_program
 from symphys.transcription import rollout_program

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from casadi_code import compiled_by_casadi
-from worlds import spheres_on_ground
+from measured_worlds import spheres_on_ground
 
 from symphys.codegen import Cache, Kernel, Program, compile_program
 from symphys.codegen.toolchain.compiler import find_compiler

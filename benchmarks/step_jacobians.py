@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 from against_mujoco import text
+from measured_worlds import problem_of
 from mujoco_runs import mujoco
 from numpy.typing import NDArray
 from table_robot import table_problem
-from worlds import problem_of
 
 from symphys.codegen import compile_program
 from symphys.export import mjcf

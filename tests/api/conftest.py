@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from thrown import TABLES
+from worlds.thrown import TABLES
 
 import symphys
 

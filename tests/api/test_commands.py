@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from thread_engine import Threads
+from fakes.thread_engine import Threads
 
 import symphys
 import symphys.report

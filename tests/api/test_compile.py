@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from thrown import TABLES
+from worlds.thrown import TABLES
 
 import symphys
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from swung import TABLES
+from worlds.swung import TABLES
 
 import symphys
 from symphys.errors import SymphysError

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from thrown import TABLES
+from worlds.thrown import TABLES
 
 import symphys
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from thrown import TABLES
+from worlds.thrown import TABLES
 
 import symphys
 from symphys.errors import SymphysError

@@ -7,7 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from mixed import mixed
+from worlds.mixed import mixed
 
 import symphys
 from symphys import Body, Box, Capsule, Fixture, Law, Plane, Problem, Scheme, SymphysError, Terrain, World, make_world

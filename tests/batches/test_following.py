@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from thread_engine import Threads
-from waiting import FOREVER
+from fakes.thread_engine import Threads
+from tools.waiting import FOREVER
 
 from symphys.batches import BatchLimits, BatchResult, following, limits, run_on
 from symphys.batches.engines import EngineError, driver, open_engine

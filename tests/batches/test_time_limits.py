@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from waiting import assert_gone, wait_for
+from tools.waiting import assert_gone, wait_for
 
 from symphys.batches import BatchLimits, limits, pool, run_batch
 from symphys.batches.process_tree import end_tree

@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from waiting import FOREVER
+from tools.waiting import FOREVER
 
 from symphys.batches import BatchLimits, limits, run_batch
 from symphys.batches import pool as pools

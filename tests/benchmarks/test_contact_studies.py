@@ -11,8 +11,8 @@ import mujoco_runs
 import numpy as np
 import pytest
 from contact_figures import Curve, consistency_figure, gradient_figure
-from repeats import first
 from scenes import Solid, tumbling_box
+from tools.repeats import first
 
 from symphys.codegen import KernelUnavailable
 from symphys.codegen.toolchain.compiler import find_compiler

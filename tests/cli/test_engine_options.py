@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from thread_engine import Threads
+from fakes.thread_engine import Threads
 
 from symphys.batches import following
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from recorded_runs import record, recorded
+from data.recorded_runs import record, recorded
 
 import symphys
 from symphys.cli.finding import shown

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from swung import pendulum
+from worlds.swung import pendulum
 
 from symphys.cli.app import main
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from compilers import fake
+from fakes.compilers import fake
 
 from symphys import doctor
 from symphys.codegen import KernelUnavailable

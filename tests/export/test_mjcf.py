@@ -8,8 +8,8 @@ from xml.etree.ElementTree import Element, fromstring
 
 import numpy as np
 import pytest
-from mixed import mixed
 from robots import REST, quadruped, state_of
+from worlds.mixed import mixed
 
 from symphys.export import ExportError, mjcf, mjcf_files
 from symphys.model.joints import HINGE, SLIDER, Joint, JointFrame, Limits, Servo, Spring, TorqueMotor, VelocityMotor

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from repeats import first
-from same_worlds import compared, differences
+from tools.repeats import first
+from tools.same_worlds import compared, differences
 
 from symphys.export import MjcfModel, problem_model
 from symphys.importing.options import ImportOptions

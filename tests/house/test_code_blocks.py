@@ -24,8 +24,8 @@ from typing import Any
 
 import click
 import pytest
-import run_blocks
-from markdown_pages import ROOT, Block, blocks, needs, of, pages
+from tools import run_blocks
+from tools.markdown_pages import ROOT, Block, blocks, needs, of, pages
 
 import symphys
 from symphys.cli.app import app

@@ -13,7 +13,7 @@ from urllib.parse import unquote
 
 import pytest
 from markdown_it import MarkdownIt
-from markdown_pages import ROOT, pages
+from tools.markdown_pages import ROOT, pages
 
 import symphys
 from symphys.codegen import KernelUnavailable
@@ -23,7 +23,7 @@ from symphys.solvers import SOLVERS
 
 DOCS = ROOT / "docs"
 NOTEBOOK = DOCS / "ball_throw.ipynb"
-RUNNER = ROOT / "tests" / "run_notebook.py"
+RUNNER = ROOT / "tests" / "tools" / "run_notebook.py"
 INCLUDE = re.compile(r"^```\{include\} (\S+)$", re.MULTILINE)
 ADDRESS = re.compile(r"\w+://|mailto:")
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
 
 from symphys.identification import FitOptions, IdentificationError, IdentificationOptions, fit, identify
 from symphys.identification.inference.bootstrap import Bootstrap, bootstrap, refitted

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from analytic_recordings import TRUTHS, AnalyticRecordings, Truth, recordings, tumble
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, Truth, recordings, tumble
 
 from symphys.identification import (
     FitOptions,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from analytic_recordings import TRUTHS, Array, Truth, recordings, slide
+from data.analytic_recordings import TRUTHS, Array, Truth, recordings, slide
 
 from symphys.identification import FitOptions, IdentificationOptions, fit_parameters, identify
 from symphys.identification.inference.advice import GENERAL, advice

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from analytic_recordings import TRUTHS, AnalyticRecordings, Model, bounce, recordings, slide
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, Model, bounce, recordings, slide
 
 from symphys import files
 from symphys.errors import SymphysError

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.optimize
-from analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
 
 from symphys.identification import FitOptions, FitOutcome, FitStatus, IdentificationOptions, fit_parameters, identify
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit

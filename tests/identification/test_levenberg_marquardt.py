@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.optimize
-from analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
-from repeats import first
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
+from tools.repeats import first
 
 from symphys.identification import FitOptions, FitStatus, IdentificationError, fit_parameters, revive_state
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from analytic_recordings import TRUTHS, AnalyticRecordings, Truth, recordings
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, Truth, recordings
 
 from symphys.identification import (
     FitOptions,

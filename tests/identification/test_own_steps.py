@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from analytic_recordings import TRUTHS, AnalyticRecordings, recordings
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, recordings
 
 from symphys.identification import FitOptions, FitStatus
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from analytic_recordings import TRUTHS, AnalyticRecordings, Array, Truth, oscillator, recordings
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, Array, Truth, oscillator, recordings
 
 from symphys.identification import IdentificationOptions, fit_parameters, identify
 from symphys.identification.inference.residual_study import explained, ljung_box

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from analytic_recordings import AnalyticRecordings, Array
+from data.analytic_recordings import AnalyticRecordings, Array
 
 from symphys.identification import FitOptions, FitStatus, fit, fit_parameters
 

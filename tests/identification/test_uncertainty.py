@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from analytic_recordings import TRUTHS, AnalyticRecordings, Array, Truth, recordings
-from repeats import thorough
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, Array, Truth, recordings
+from tools.repeats import thorough
 
 from symphys.identification import FitOptions, IdentificationOptions, fit, fit_parameters, identify
 from symphys.identification.inference.uncertainty import Uncertainty

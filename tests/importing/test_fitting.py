@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from repeats import first
 from scipy.spatial import ConvexHull
+from tools.repeats import first
 
 from symphys.errors import SymphysError
 from symphys.importing.fitting import Fit, best, draw_fit, fit, fits

@@ -11,10 +11,10 @@ mujoco = pytest.importorskip("mujoco")
 
 from imported_model import Imported, begin, grounded, imported  # noqa: E402
 from imported_statics import held, rest, slopes  # noqa: E402
-from repeats import first  # noqa: E402
 from robot_matching import Match, matched  # noqa: E402
 from robot_models import gymnasium_model  # noqa: E402
 from robot_motion import agreement_after  # noqa: E402
+from tools.repeats import first  # noqa: E402
 
 pytestmark = pytest.mark.skipif(not gymnasium_model("ant").path.is_file(), reason="gymnasium is not installed")
 MODELS = ("half_cheetah", "ant", "hopper", "walker2d_v5", "humanoid", "reacher")

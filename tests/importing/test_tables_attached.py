@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from imported import by_name, model_of, problem_of, read, texts
+from data.imported import by_name, model_of, problem_of, read, texts
 
 import symphys
 from symphys.expression import parse

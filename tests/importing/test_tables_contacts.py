@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from imported import by_name, model_of, problem_of, read, texts
-from repeats import thorough
+from data.imported import by_name, model_of, problem_of, read, texts
+from tools.repeats import thorough
 
 from symphys.problem import Problem
 

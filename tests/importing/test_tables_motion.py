@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from imported import Tables, apart, by_name, model_of, mujoco_motion, problem_of, read, texts
+from data.imported import Tables, apart, by_name, model_of, mujoco_motion, problem_of, read, texts
 
 import symphys
 

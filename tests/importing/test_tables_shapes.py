@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from imported import by_name, model_of, problem_of, read, texts
+from data.imported import by_name, model_of, problem_of, read, texts
 
 from symphys.importing import fitting
 from symphys.importing.options import ImportOptions

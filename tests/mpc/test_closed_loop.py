@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from swung import pendulum
+from worlds.swung import pendulum
 
 from symphys.dynamics.observation import reading_function
 from symphys.errors import SymphysError

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from swung import TABLES, pendulum
+from worlds.swung import TABLES, pendulum
 
 from symphys.errors import ProblemError
 from symphys.mpc.planner import LENGTHS, Planner, PlanPolicy, RecedingPlan, plan_feedback, shifted

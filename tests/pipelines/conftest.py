@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from driven import TABLES
+from worlds.driven import TABLES
 
 import symphys
 

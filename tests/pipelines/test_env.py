@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driven import TABLES
+from worlds.driven import TABLES
 
 import symphys
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from identify_coverage import A_RATIO, NO_EFFECT, covered, named
-from repeats import thorough
+from tools.repeats import thorough
 
 
 @pytest.mark.parametrize(("draws", "least"), [(3, 1), thorough(100, 90)])

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded import BALL, HEIGHT, TABLE
+from data.recorded import BALL, HEIGHT, TABLE
 
 import symphys
 from symphys.results.identification import Identification, summary

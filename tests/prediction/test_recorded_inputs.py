@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commanded import DT, GUESS, SETS, TRUTH, VARIABLES, arm, dense_means, recorded_arm, true_angles
+from worlds.commanded import DT, GUESS, SETS, TRUTH, VARIABLES, arm, dense_means, recorded_arm, true_angles
 
 import symphys
 from symphys.prediction.recorded_inputs import step_means

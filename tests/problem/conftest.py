@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
-from included import MAIN, ROBOT
+from worlds.included import MAIN, ROBOT
 
 from symphys.errors import ProblemError
 from symphys.problem import Problem, load_problem

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from included import MAIN, ROBOT
+from worlds.included import MAIN, ROBOT
 
 from symphys.dynamics.observation import gap_function
 from symphys.dynamics.observation.joint_coordinates import readings

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from included import MAIN, ROBOT
+from worlds.included import MAIN, ROBOT
 
 from symphys.cli import main
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from included import ROBOT
+from worlds.included import ROBOT
 
 from symphys.cli import main
 from symphys.errors import ProblemError

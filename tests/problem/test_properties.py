@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from included import MAIN, ROBOT
+from worlds.included import MAIN, ROBOT
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem

@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from joint_texts import HINGE, SLIDER, UNIVERSAL, body, joint
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+from worlds.joint_texts import HINGE, SLIDER, UNIVERSAL, body, joint
 
 from symphys.dynamics.observation.joint_coordinates import Reading, readings
 from symphys.errors import ProblemError

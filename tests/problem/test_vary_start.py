@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import casadi as ca
-import joint_texts
 import numpy as np
 import pytest
-from joint_texts import SLIDER, UNIVERSAL, joint
 from numpy.typing import NDArray
+from worlds import joint_texts
+from worlds.joint_texts import SLIDER, UNIVERSAL, joint
 
 from symphys.dynamics.observation.joint_coordinates import readings
 from symphys.errors import ProblemError

@@ -8,8 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from data.shipped import Array, seeds, shipped, solve
 from scipy.integrate import solve_ivp
-from shipped import Array, seeds, shipped, solve
 
 from symphys.findings.verdict import DOUBTED, rule
 from symphys.problem import load_problem

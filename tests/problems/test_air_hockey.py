@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import seeds, shipped, solve
+from data.shipped import seeds, shipped, solve
 
 from symphys.verification.refinement import FINER_DT, finer_problem
 

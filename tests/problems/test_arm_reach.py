@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from data.shipped import solve, work
 from scipy.spatial.transform import Rotation
-from shipped import solve, work
 
 from symphys import problems
 from symphys.problem import load_problem

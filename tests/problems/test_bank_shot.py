@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import seeds, shipped, solve, work
+from data.shipped import seeds, shipped, solve, work
 
 from symphys import problems
 from symphys.problem import load_problem

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from data.shipped import Array, seeds, shipped, solve, work
 from scipy.optimize import fsolve
-from shipped import Array, seeds, shipped, solve, work
 
 GRAVITY = np.array([0, 0, -9.81])
 START, RING, TIME = np.array([-2.2, 1.8, 2.1]), np.array([0, 0, 3.05]), 1.3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bouncing import bouncing_height
+from data.bouncing import bouncing_height
 
 import symphys
 from symphys import problems

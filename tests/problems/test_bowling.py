@@ -7,8 +7,8 @@ from math import pi, tan
 
 import numpy as np
 import pytest
+from data.shipped import Array, seeds, shipped, solve, work
 from scipy.optimize import fsolve
-from shipped import Array, seeds, shipped, solve, work
 
 RADIUS, BRAKE, FORWARD, TIME = 0.1085, 0.08 * 9.81, 30.0, 2.4
 

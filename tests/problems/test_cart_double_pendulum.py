@@ -7,8 +7,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from data.shipped import Array, shipped, solve
 from scipy.integrate import solve_ivp
-from shipped import Array, shipped, solve
 
 GRAVITY, DAMPING, LENGTH, MASS, CART, TIME, KNOTS = 9.81, 0.002, 0.5, 0.3, 1.0, 3.0, 61
 

@@ -8,8 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from data.shipped import Array, seeds, shipped, solve, work
 from scipy.integrate import solve_ivp
-from shipped import Array, seeds, shipped, solve, work
 
 CART, BOB, LENGTH, INERTIA, GRAVITY, TIME, KNOTS = 1.0, 0.3, 0.5, 0.0003, 9.81, 2.0, 11
 UPRIGHT = [1.0, -np.pi, 0.0, 0.0]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from data.shipped import Array, seeds, shipped, solve
 from scipy.integrate import solve_ivp
-from shipped import Array, seeds, shipped, solve
 
 from symphys import problems
 from symphys.problem import load_problem

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import met, shipped
+from data.shipped import met, shipped
 
 from symphys.trajectory import Trajectory
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import shipped, solve
+from data.shipped import shipped, solve
 
 SHARE, FRICTION, GRAVITY, MASS, DISTANCE = 0.95, 0.3, 9.81, 1.3, 1.0
 FASTEST = 2 * np.sqrt(DISTANCE / (SHARE * FRICTION * GRAVITY))

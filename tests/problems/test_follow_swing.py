@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from repeats import first
-from shipped import shipped, solve
+from data.shipped import shipped, solve
+from tools.repeats import first
 
 
 @first("solver", ["ilqr", "multiple_shooting", "least_squares"])

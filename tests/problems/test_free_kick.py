@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from data.shipped import shipped, solve
 from scipy.integrate import solve_ivp
-from shipped import shipped, solve
 
 MASS, DRAG, LIFT = 0.43, 0.0064, 0.0059
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import first_steps
+from data.shipped import first_steps
 
 from symphys.problem import load_problem
 from symphys.problems import find

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import met, shipped, short_descent
+from data.shipped import met, shipped, short_descent
 
 
 @pytest.mark.thorough

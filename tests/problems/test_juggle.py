@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from data.shipped import Array, seeds, shipped, solve, work
 from scipy.integrate import solve_ivp
-from shipped import Array, seeds, shipped, solve, work
 
 BAT, BALL, GRAVITY, RESTITUTION, TOUCH = 1.0, 0.1, 9.81, 0.8, 0.02 + 0.05
 KNOTS = np.linspace(0, 0.6, 7)

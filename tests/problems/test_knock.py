@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plate import Plate
-from shipped import Array, seeds, shipped, solve, work
+from data.shipped import Array, seeds, shipped, solve, work
+from worlds.plate import Plate
 
 KICK = [4.8767, 1.7477, -0.1312]
 """As the time step goes to 0, from 10 ms, 5 ms and 2.5 ms."""

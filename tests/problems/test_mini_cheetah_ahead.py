@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import shipped, short_descent, solve
+from data.shipped import shipped, short_descent, solve
 
 from symphys.mpc import Controller, Plant, close_loop, record_of
 from symphys.problem import load_problem

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plate import Plate
-from shipped import seeds, shipped, solve, work
+from data.shipped import seeds, shipped, solve, work
+from worlds.plate import Plate
 
 LENGTH, WIDTH, FRICTION, GRAVITY = 0.4, 0.3, 0.35, 9.81
 PLATE = Plate((LENGTH, WIDTH), 0.01, FRICTION)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from data.shipped import Array, seeds, shipped, solve
 from scipy.integrate import solve_ivp
-from shipped import Array, seeds, shipped, solve
 
 GRAVITY, DAMPING, LENGTH, INERTIA, TIME, KNOTS = 9.81, 0.1, 0.5, 0.251, 2.0, 41
 COST = 44.827183

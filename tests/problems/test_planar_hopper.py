@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import shipped, solve
+from data.shipped import shipped, solve
 
 from symphys.trajectory import Trajectory
 

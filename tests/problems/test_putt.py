@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shipped import seeds, shipped, solve, work
+from data.shipped import seeds, shipped, solve, work
 
 PUTT = [2.3215, -1.1838]
 """[m/s] Where the putt goes as the time step goes to 0, from 10 ms, 5 ms and 2.5 ms: their changes halve."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from data.shipped import met, shipped
 from scipy.spatial.transform import Rotation
-from shipped import met, shipped
 
 
 @pytest.mark.thorough

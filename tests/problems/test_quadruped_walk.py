@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from repeats import thorough
-from shipped import first_steps
+from data.shipped import first_steps
+from tools.repeats import thorough
 from walk_gradient import compared, gait
 
 from symphys.problem import load_problem

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from shipped import seeds, shipped, solve, work
+from data.shipped import seeds, shipped, solve, work
 
 MASSES = [1.6, 0.8, 0.4, 0.2, 0.1]
 

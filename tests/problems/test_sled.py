@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from repeats import thorough
-from shipped import seeds
+from data.shipped import seeds
+from tools.repeats import thorough
 
 from symphys import problems
 from symphys.problem import load_problem, validate_options

@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from shipped import seeds, shipped, solve, work
+from data.shipped import seeds, shipped, solve, work
 
 RISER, PERIOD, GRAVITY, LYING = 0.17, 0.5, 9.81, 0.68 + 0.03
 FALL = sqrt(2 * RISER / GRAVITY)  # [s] from one step to the next, without a bounce

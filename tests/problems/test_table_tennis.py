@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from data.shipped import seeds, shipped, solve
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from shipped import seeds, shipped, solve
 
 Array = NDArray[np.float64]
 MASS, RADIUS = 0.0027, 0.02

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from shipped import Array, seeds, shipped, solve
+from data.shipped import Array, seeds, shipped, solve
 
 from symphys import problems
 from symphys.problem import load_problem

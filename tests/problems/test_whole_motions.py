@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from repeats import first
-from shipped import shipped, solve
+from data.shipped import shipped, solve
+from tools.repeats import first
 
 from symphys.problem import load_problem
 from symphys.problems import find

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from walker import SCENE, write_walker
+from data.walker import SCENE, write_walker
 
 from symphys.results.scene import Scene, read_scene
 from symphys.results.trajectories import read_trajectory

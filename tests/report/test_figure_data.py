@@ -13,8 +13,8 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from walker import motion as walk
-from walker import write_walker
+from data.walker import motion as walk
+from data.walker import write_walker
 
 from symphys.report import write_batch_report, write_motion, write_run_report
 from symphys.report.figures.data import DataFigure, keep, table

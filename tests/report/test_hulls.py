@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from data.walker import SCENE, motion
+from data.yard import QUARTER, area, motion_of, prism
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
-from page_scripts import NODE, plays_to_the_end, run_script
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
-from walker import SCENE, motion
-from yard import QUARTER, area, motion_of, prism
+from tools.page_scripts import NODE, plays_to_the_end, run_script
 
 from symphys.model.shapes import SHAPES, Capsule, RoundedHull
 from symphys.report.figures import style

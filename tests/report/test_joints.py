@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from data.walker import DT, SCENE, STEPS, hinge, motion, write_walker
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
-from repeats import first
-from walker import DT, SCENE, STEPS, hinge, motion, write_walker
+from tools.repeats import first
 
 from symphys.report import write_motion, write_run_report
 from symphys.report.figures import style

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from page_scripts import NODE, run_script
-from walker import motion, write_walker
+from data.walker import motion, write_walker
+from tools.page_scripts import NODE, run_script
 
 from symphys.report import write_light_report, write_run_report
 from symphys.report.charts.chart import STEPS, Chart, Panel, fine, lines

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from page_scripts import NODE, run_script
+from tools.page_scripts import NODE, run_script
 
 from symphys import files
 from symphys.report import write_batch_report

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from page_scripts import NODE, plays_to_the_end
+from tools.page_scripts import NODE, plays_to_the_end
 
 from symphys.report import write_motion
 from symphys.report.scene.animation import NUMBERS, motion_data

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from page_scripts import NODE, plays_to_the_end, run_script
-from walker import DT, LEGS, NAMES, SCENE, STEPS, TURNED, hinge, motion
+from data.walker import DT, LEGS, NAMES, SCENE, STEPS, TURNED, hinge, motion
+from tools.page_scripts import NODE, plays_to_the_end, run_script
 
 from symphys.report.figures import style
 from symphys.report.pages.joints import steps_sentence

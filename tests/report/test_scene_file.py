@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from yard import write_yard
+from data.yard import write_yard
 
 from symphys.model.shapes import Convex, Cylinder, Ellipsoid, Shape
 from symphys.results.scene import Scene, Solid, read_scene

@@ -8,8 +8,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from page_scripts import NODE, run_script
-from yard import area, prism
+from data.yard import area, prism
+from tools.page_scripts import NODE, run_script
 
 from symphys.report.scene.animation import solid_data
 from symphys.report.scene.outlines import outline

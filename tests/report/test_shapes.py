@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from data.yard import QUARTER, X, area, write_yard
 from matplotlib.patches import Polygon
-from yard import QUARTER, X, area, write_yard
 
 from symphys.report import write_motion, write_run_report
 from symphys.report.figures import style

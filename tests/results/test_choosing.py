@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded_runs import record, recorded
+from data.recorded_runs import record, recorded
 
 import symphys
 from symphys import files

@@ -16,7 +16,7 @@ from random import Random
 from typing import Any
 
 import pytest
-from recorded_runs import record, recorded
+from data.recorded_runs import record, recorded
 
 from symphys import files
 from symphys.cli.finding.shown import lines, summary, usual_columns

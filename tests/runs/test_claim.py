@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from waiting import FOREVER, until
+from tools.waiting import FOREVER, until
 
 from symphys.files import FileError
 from symphys.runs import claim as claims

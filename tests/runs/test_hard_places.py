@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import programs
 import pytest
+from worlds import programs
 
 from symphys import files
 from symphys.cli import main

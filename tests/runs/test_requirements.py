@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from compilers import fake
+from fakes.compilers import fake
 
 from symphys import solvers
 from symphys.batches import run_batch

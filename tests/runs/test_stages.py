@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from repeats import first
+from tools.repeats import first
 
 from symphys.batches import run_batch
 from symphys.problem import Problem, load_problem

@@ -9,8 +9,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from shipped import seeds
-from toys import solve
+from data.shipped import seeds
+from worlds.toys import solve
 
 import symphys.problems
 from symphys.problem import load_problem

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from toys import PLAIN, failing, rosenbrock, solve, stop_at, target, through_json, values
+from worlds.toys import PLAIN, failing, rosenbrock, solve, stop_at, target, through_json, values
 
 from symphys.errors import SymphysError
 from symphys.solvers import SOLVERS, Outcome, Status

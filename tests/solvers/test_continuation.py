@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from toys import PLAIN, failing, solve, stop_at, through_json, toy, values
+from worlds.toys import PLAIN, failing, solve, stop_at, through_json, toy, values
 
 from symphys.errors import SymphysError
 from symphys.maths.smoothing import positive

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse
 from numpy.typing import NDArray
-from single_steps import SingleSteps
+from tools.single_steps import SingleSteps
 
 from symphys.shooting import Expansion, Linearized, StagedMotion
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass

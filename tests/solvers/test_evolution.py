@@ -8,8 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from toys import toy
-from windy import BEST, windy
+from worlds.toys import toy
+from worlds.windy import BEST, windy
 
 from symphys.solvers import SOLVERS, CmaOptions, EvolutionOptions, Outcome, Status, TraceRow
 

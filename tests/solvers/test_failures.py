@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from toys import PLAIN, Counted, failing, quadratic, rosenbrock, solve, target, toy
+from worlds.toys import PLAIN, Counted, failing, quadratic, rosenbrock, solve, target, toy
 
 from symphys.shooting import Evaluator, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Status

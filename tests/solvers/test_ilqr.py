@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from staged_toys import acrobot, attitude, boxed, pendulum
-from toys import quadratic, stop_at, through_json
+from worlds.staged_toys import acrobot, attitude, boxed, pendulum
+from worlds.toys import quadratic, stop_at, through_json
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers import Outcome, Status, solver

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from staged_toys import boxed, pendulum
-from toys import PLAIN, counted, rosenbrock, solve, stop_at, through_json, toy, values
-from windy import BEST, windy
+from worlds.staged_toys import boxed, pendulum
+from worlds.toys import PLAIN, counted, rosenbrock, solve, stop_at, through_json, toy, values
+from worlds.windy import BEST, windy
 
 from symphys.errors import ProblemError
 from symphys.problem import json_schema, validate_options

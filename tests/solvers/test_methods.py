@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from toys import quadratic, through_json
-from windy import BEST, windy
+from worlds.toys import quadratic, through_json
+from worlds.windy import BEST, windy
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers import Counts, Status

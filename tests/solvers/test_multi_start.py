@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from toys import Counted, counted, failing, quadratic, rosenbrock, solve, stop_at, target
+from worlds.toys import Counted, counted, failing, quadratic, rosenbrock, solve, stop_at, target
 
 from symphys.errors import SymphysError
 from symphys.problem import load_problem

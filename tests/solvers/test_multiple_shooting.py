@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from shots_of_toys import LINE, SWING, WAYS, defect, every_backend, every_way, program, solve
-from staged_toys import Chain, acrobot, attitude, boxed, pendulum
-from toys import stop_at, through_json
+from worlds.shots_of_toys import LINE, SWING, WAYS, defect, every_backend, every_way, program, solve
+from worlds.staged_toys import Chain, acrobot, attitude, boxed, pendulum
+from worlds.toys import stop_at, through_json
 
 from symphys.solvers import Status
 from symphys.solvers.methods.multiple_shooting import DEFECT

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shots_of_toys import LINE, SWING, every_backend, solve
-from staged_toys import Chain, acrobot, boxed, pendulum
-from toys import quadratic, stop_at, through_json
+from worlds.shots_of_toys import LINE, SWING, every_backend, solve
+from worlds.staged_toys import Chain, acrobot, boxed, pendulum
+from worlds.toys import quadratic, stop_at, through_json
 
 from symphys.errors import SymphysError
 from symphys.solvers import SOLVERS, MultipleShootingOptions, Status

@@ -8,8 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from shots_of_toys import every_backend, program, solve
-from staged_toys import Chain, acrobot, attitude, boxed, pendulum
+from worlds.shots_of_toys import every_backend, program, solve
+from worlds.staged_toys import Chain, acrobot, attitude, boxed, pendulum
 
 from symphys.solvers.multiple_shooting.chart import curved_columns, interpolated
 from symphys.solvers.multiple_shooting.shots import IntervalSteps

@@ -14,9 +14,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from shipped import seeds
-from toys import PLAIN, Counted, constrained, rosenbrock, solve, target, toy
-from windy import BEST, Winds, windy
+from data.shipped import seeds
+from worlds.toys import PLAIN, Counted, constrained, rosenbrock, solve, target, toy
+from worlds.windy import BEST, Winds, windy
 
 from symphys.shooting import Array, Evaluator, ScenarioSamples, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Outcome, Status

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
-from toys import quadratic, rosenbrock, solve
+from worlds.toys import quadratic, rosenbrock, solve
 
 from symphys.errors import ProblemError, SymphysError
 from symphys.problem import json_schema, validate_options

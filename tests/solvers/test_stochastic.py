@@ -8,8 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from toys import toy
-from windy import BEST, Winds, windy
+from worlds.toys import toy
+from worlds.windy import BEST, Winds, windy
 
 from symphys.shooting import Array, ScenarioSamples, Values
 from symphys.solvers import SOLVERS, Status, StochasticOptions, TraceRow

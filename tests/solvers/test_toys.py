@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from toys import (
+from worlds.toys import (
     PENALTY,
     PLAIN,
     constrained,

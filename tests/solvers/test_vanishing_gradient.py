@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from toys import PLAIN, counted, solve, stop_at, through_json, toy
+from worlds.toys import PLAIN, counted, solve, stop_at, through_json, toy
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers import Status

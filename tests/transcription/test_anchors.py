@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from repeats import first
+from tools.repeats import first
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem, reposition

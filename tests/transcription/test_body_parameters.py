@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
-from parameter_slopes import slopes_of
 from scipy.spatial.transform import Rotation
+from tools.parameter_slopes import slopes_of
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from parameter_slopes import slopes
+from tools.parameter_slopes import slopes
 
 from symphys import Body, Plane, Problem, SymphysError, make_world
 from symphys.errors import ProblemError

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from repeats import first
+from tools.repeats import first
 
 from symphys import problems
 from symphys.codegen import compile_program, interpret

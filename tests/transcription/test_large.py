@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from emulated import Remote, needs_compiler
-from monopod import MONOPOD
+from fakes.emulated import Remote, needs_compiler
 from numpy.typing import NDArray
-from repeats import thorough
+from tools.repeats import thorough
+from worlds.monopod import MONOPOD
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pushed import PUSHED
-from repeats import first
+from tools.repeats import first
+from worlds.pushed import PUSHED
 
 from symphys.codegen import compile_program, interpret
 from symphys.problem import Problem, load_problem

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from parameter_slopes import slopes
+from tools.parameter_slopes import slopes
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem

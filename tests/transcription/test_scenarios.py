@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from repeats import first
+from tools.repeats import first
 
 from symphys.dynamics.observation import gap_function
 from symphys.dynamics.observation.joint_coordinates import readings

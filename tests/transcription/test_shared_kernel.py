@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from thrown import TABLES
+from worlds.thrown import TABLES
 
 from symphys.dynamics.functions import report_function
 from symphys.problem import Problem, problem_of_tables

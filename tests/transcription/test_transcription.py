@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pushed import PUSHED
+from worlds.pushed import PUSHED
 
 from symphys.problem import load_problem
 from symphys.trajectory import NotFinite

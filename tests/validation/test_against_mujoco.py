@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from laboratory import Lab
-from mixed import mixed
 from robots import REST, chain, quadruped, state_of
+from tools.laboratory import Lab
+from worlds.mixed import mixed
 
 from symphys.export import mjcf
 from symphys.model.joints import Spring, TorqueMotor

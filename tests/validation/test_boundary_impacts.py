@@ -13,10 +13,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from agreement import transcribed
-from laboratory import Lab
 from numpy.typing import NDArray
-from repeats import thorough
+from tools.agreement import transcribed
+from tools.laboratory import Lab
+from tools.repeats import thorough
 
 from symphys.model.joints import HINGE, SLIDER, Joint, JointFrame, Limits
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain

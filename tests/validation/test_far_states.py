@@ -5,8 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from mixed import mixed
 from numpy.typing import NDArray
+from worlds.mixed import mixed
 
 from symphys.dynamics.functions import step_function
 from symphys.maths.rotation import normalised

@@ -8,7 +8,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
-from repeats import thorough
+from tools.repeats import thorough
 
 from symphys.dynamics.functions import step_function
 from symphys.dynamics.line_search import clusters

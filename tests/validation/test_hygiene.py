@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from laboratory import Lab, built, central_difference, value_and_gradient
-from repeats import thorough
+from tools.laboratory import Lab, built, central_difference, value_and_gradient
+from tools.repeats import thorough
 
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.state_layout import initial_state

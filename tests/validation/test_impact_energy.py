@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from laboratory import Lab
-from repeats import thorough
+from tools.laboratory import Lab
+from tools.repeats import thorough
 
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Plane, Sphere

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from laboratory import Lab
+from tools.laboratory import Lab
 
 from symphys.maths import rotation
 from symphys.model.shapes import Plane, Sphere

@@ -7,9 +7,9 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import Array, block
-from laboratory import Lab
-from plate import Plate
+from tools.laboratory import Lab
+from worlds.blocks import Array, block
+from worlds.plate import Plate
 
 from symphys.dynamics.contact.load_distribution import faces
 from symphys.model.shapes import Box, Plane

@@ -14,9 +14,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import Array, block
-from driven import TABLES
-from laboratory import Lab
+from tools.laboratory import Lab
+from worlds.blocks import Array, block
+from worlds.driven import TABLES
 
 import symphys
 from symphys.dynamics.functions import step_function

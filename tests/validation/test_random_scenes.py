@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_worlds import STRUCTURES, draw, lot, steps
+from worlds.random_worlds import STRUCTURES, draw, lot, steps
 
 Structure = tuple[str, str, str, str]
 FEW = (2, 6, 7)

@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import turned_by
 from numpy.typing import NDArray
-from repeats import thorough
+from tools.repeats import thorough
+from worlds.blocks import turned_by
 
 from symphys.api.simulation import simulate
 from symphys.export import mjcf

@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import block, rod, turned_by
 from numpy.typing import NDArray
-from repeats import first, thorough
+from tools.repeats import first, thorough
+from worlds.blocks import block, rod, turned_by
 
 from symphys.dynamics.functions import InlineSteps
 from symphys.model.shapes import Box, Fixture

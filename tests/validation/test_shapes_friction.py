@@ -10,9 +10,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import Array, among, block, turned_by
-from laboratory import Lab
-from repeats import first
+from tools.laboratory import Lab
+from tools.repeats import first
+from worlds.blocks import Array, among, block, turned_by
 
 from symphys.model.shapes import Box, Fixture, Plane
 from symphys.model.world import Body, Law, Scheme, World, make_world

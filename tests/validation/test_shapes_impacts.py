@@ -8,11 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import Array, block, rod, turned_by
-from laboratory import Lab, value_and_gradient
-from meetings import matrix
-from repeats import first
 from scipy.integrate import solve_ivp
+from tools.laboratory import Lab, value_and_gradient
+from tools.repeats import first
+from worlds.blocks import Array, block, rod, turned_by
+from worlds.meetings import matrix
 
 from symphys.model.heightfield import Heightfield
 from symphys.model.shapes import Box, Fixture, Plane, Static, Terrain

@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import among, block, drift, rod, stack, turned_by, unrest
-from laboratory import Lab
-from repeats import thorough
+from tools.laboratory import Lab
+from tools.repeats import thorough
+from worlds.blocks import among, block, drift, rod, stack, turned_by, unrest
 
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Static
 from symphys.model.world import Body, Law, Scheme, make_world

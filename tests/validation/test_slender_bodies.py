@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from repeats import first
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from tools.repeats import first
 
 from symphys.dynamics.free_rotation import SECOND_ORDER, turned
 from symphys.dynamics.functions import step_function

@@ -9,9 +9,9 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from laboratory import Array, Lab
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from tools.laboratory import Array, Lab
 
 from symphys.dynamics.contact.oscillator import response, spring_law
 from symphys.model.joints import BALL, FIXED, SLIDER, Joint, JointFrame

@@ -7,8 +7,8 @@ from math import cos, radians, sin
 import casadi as ca
 import numpy as np
 import pytest
-from laboratory import Lab
-from repeats import first
+from tools.laboratory import Lab
+from tools.repeats import first
 
 from symphys.model.shapes import Plane
 from symphys.model.world import Body, Law, Pair, Scheme, World, make_world

@@ -8,10 +8,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import turned_by
-from laboratory import Lab
+from data.textbook import Array, G
 from scipy.optimize import linprog
-from textbook import Array, G
+from tools.laboratory import Lab
+from worlds.blocks import turned_by
 
 from symphys.model.shapes import Box, Plane
 from symphys.model.world import Body, Law, Scheme, World, make_world

@@ -8,11 +8,11 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
-from laboratory import Lab
-from linkage import momenta
+from data.textbook import Array, about_a_point, differences, final, turn
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
-from textbook import Array, about_a_point, differences, final, turn
+from tools.laboratory import Lab
+from worlds.linkage import momenta
 
 from symphys.maths import rotation
 from symphys.model.world import Body, Scheme, World

@@ -7,9 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import turned_by
-from laboratory import Lab
-from textbook import Array, G, about_a_point, differences, final, turn
+from data.textbook import Array, G, about_a_point, differences, final, turn
+from tools.laboratory import Lab
+from worlds.blocks import turned_by
 
 from symphys.model.joints import BALL, HINGE, Joint, JointFrame
 from symphys.model.world import Body, Scheme, World

@@ -7,10 +7,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import turned_by
-from laboratory import Lab
-from repeats import first
-from textbook import Array, G, differences, final
+from data.textbook import Array, G, differences, final
+from tools.laboratory import Lab
+from tools.repeats import first
+from worlds.blocks import turned_by
 
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world

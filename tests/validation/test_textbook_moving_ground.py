@@ -8,11 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import among, block, turned_by
-from laboratory import Lab
-from linkage import ABOUT_Z
-from repeats import first
-from textbook import Array, G, differences, final
+from data.textbook import Array, G, differences, final
+from tools.laboratory import Lab
+from tools.repeats import first
+from worlds.blocks import among, block, turned_by
+from worlds.linkage import ABOUT_Z
 
 from symphys.model.joints import HINGE, SLIDER, Joint, JointFrame
 from symphys.model.shapes import Box

@@ -7,11 +7,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from laboratory import Lab
-from linkage import ABOUT_Y, ABOUT_Z
-from repeats import first
+from data.textbook import Array, G, differences, final
 from scipy.integrate import solve_ivp
-from textbook import Array, G, differences, final
+from tools.laboratory import Lab
+from tools.repeats import first
+from worlds.linkage import ABOUT_Y, ABOUT_Z
 
 from symphys.model.joints import BALL, FIXED, HINGE, SLIDER, Joint, JointFrame, Spring, VelocityMotor
 from symphys.model.joints.kind import Kind

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from laboratory import Lab
-from linkage import ABOUT_Y, ABOUT_Z, chain, hanging, rod
-from repeats import first
+from data.textbook import Array, G
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
-from textbook import Array, G
+from tools.laboratory import Lab
+from tools.repeats import first
+from worlds.linkage import ABOUT_Y, ABOUT_Z, chain, hanging, rod
 
 from symphys.model.joints import BALL, HINGE, SLIDER, Joint, JointFrame, Limits, Spring, VelocityMotor
 from symphys.model.shapes import Plane, Sphere

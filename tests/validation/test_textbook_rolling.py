@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from laboratory import Lab
-from repeats import first
-from textbook import Array, G, differences, final
+from data.textbook import Array, G, differences, final
+from tools.laboratory import Lab
+from tools.repeats import first
 
 from symphys.model.shapes import Box, Fixture, Plane, Terrain
 from symphys.model.world import Body, Law, Scheme, make_world

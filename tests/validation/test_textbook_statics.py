@@ -8,10 +8,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import turned_by
-from laboratory import Lab
-from repeats import first
-from textbook import G, final
+from data.textbook import G, final
+from tools.laboratory import Lab
+from tools.repeats import first
+from worlds.blocks import turned_by
 
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, make_world

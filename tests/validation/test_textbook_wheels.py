@@ -7,12 +7,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from blocks import turned_by
-from laboratory import Lab
-from linkage import energy
-from repeats import first, thorough
+from data.textbook import Array, G, differences, final, spinning, turn
 from scipy.integrate import solve_ivp
-from textbook import Array, G, differences, final, spinning, turn
+from tools.laboratory import Lab
+from tools.repeats import first, thorough
+from worlds.blocks import turned_by
+from worlds.linkage import energy
 
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, make_world

@@ -6,8 +6,8 @@ The merit is sum rho(r), rho = r^2 for |r| <= k, 2 k |r| - k^2 beyond. k is in u
 A step takes min(1, k / |r|) for the curvature of rho: iterative reweighting. That is an upper bound of the curvature.
 Triggs' correction (Triggs et al., *Bundle Adjustment - A Modern Synthesis*, 2000, section 4.3) takes the curvature
 itself, which is 0 beyond k. It was slower on the projectile, oscillator, bounce and sliding block of
-tests/analytic_recordings.py with 0, 10 and 40 % of gross errors: 10 to 15 steps instead of 7 to 13 from 5 % off, and
-from 30 % off it ended in another minimum of the bounces, where most residuals begin beyond k and have no curvature.
+tests/data/analytic_recordings.py with 0, 10 and 40 % of gross errors: 10 to 15 steps instead of 7 to 13 from 5 % off,
+and from 30 % off it ended in another minimum of the bounces, where most residuals begin beyond k and have no curvature.
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from pushed import PUSHED
-from toys import require
+from worlds.pushed import PUSHED
+from worlds.toys import require
 
 from symphys.codegen import compile_program
 from symphys.codegen.backends import BACKENDS, BEST, NAMES

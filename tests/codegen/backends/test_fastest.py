@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from emulated import Emulated, needs_compiler
-from toys import require
+from fakes.emulated import Emulated, needs_compiler
+from worlds.toys import require
 
 from symphys.codegen import KernelUnavailable, ProcessorKernel, compile_program
 from symphys.codegen.backends import BEST, build_kernel

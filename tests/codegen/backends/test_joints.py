@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from agreement import assert_kernel_gives_what_casadi_does, transcribed
+from tools.agreement import assert_kernel_gives_what_casadi_does, transcribed
 
 LEG = """
 [simulation]

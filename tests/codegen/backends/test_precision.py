@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emulated import Emulated, needs_compiler
-from toys import require
+from fakes.emulated import Emulated, needs_compiler
+from worlds.toys import require
 
 import symphys
 from symphys.codegen.backends.precision import largest_error

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from agreement import assert_kernel_gives_what_casadi_does
-from repeats import first
+from tools.agreement import assert_kernel_gives_what_casadi_does
+from tools.repeats import first
 
 YARD = """
 [simulation]

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from emulated import Emulated
+from fakes.emulated import Emulated
 
 from symphys.codegen import Cache
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emulated import Emulated, needs_compiler
-from toys import require
+from fakes.emulated import Emulated, needs_compiler
+from worlds.toys import require
 
 from symphys.codegen import KernelUnavailable
 from symphys.problem import load_problem

@@ -8,9 +8,9 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from emulated import Emulated, needs_compiler
-from guarded import guarded_sections, halving, program_of, whole
-from repeats import thorough
+from fakes.emulated import Emulated, needs_compiler
+from tools.repeats import thorough
+from worlds.guarded import guarded_sections, halving, program_of, whole
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Place, Program, compile_program
 from symphys.codegen.cuda import compile_on

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import programs
 import pytest
-from emulated import Emulated, needs_compiler
+from fakes.emulated import Emulated, needs_compiler
+from worlds import programs
 
 from symphys.codegen import AdjointDiscount, Cache, Kernel, KernelUnavailable, Place, Program, compile_program
 from symphys.codegen.cuda import DeviceKernel, compile_on

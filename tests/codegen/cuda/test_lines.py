@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import programs
+from worlds import programs
 
 from symphys.codegen.cuda.apart import results_apart
 from symphys.codegen.emit.lines import Lines

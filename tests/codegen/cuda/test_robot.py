@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import programs
 import pytest
-from agreement import transcribed
-from emulated import Emulated, needs_compiler
-from monopod import MONOPOD
+from fakes.emulated import Emulated, needs_compiler
+from tools.agreement import transcribed
+from worlds import programs
+from worlds.monopod import MONOPOD
 
 from symphys.codegen import Cache, Kernel, KernelUnavailable, Program, compile_program
 from symphys.codegen.cuda import DeviceKernel, compile_on, find_gpu

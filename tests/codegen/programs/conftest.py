@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import programs
 import pytest
+from worlds import programs
 
 from symphys.codegen import Cache, Kernel, KernelUnavailable, compile_program
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import programs
 import pytest
+from worlds import programs
 
 from symphys.codegen import AdjointDiscount, Cache, KernelUnavailable, Place, ProgramError, compile_program
 

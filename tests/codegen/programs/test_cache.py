@@ -10,10 +10,10 @@ import time
 from pathlib import Path
 from types import SimpleNamespace
 
-import programs
 import pytest
-from compilers import building, fake, logged, waits
-from waiting import FOREVER, until, wait_for
+from fakes.compilers import building, fake, logged, waits
+from tools.waiting import FOREVER, until, wait_for
+from worlds import programs
 
 from symphys.codegen import Cache, Kernel, KernelUnavailable, compile_program, default_cache
 from symphys.codegen.toolchain.cache import PATIENCE

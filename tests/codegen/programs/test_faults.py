@@ -8,10 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import programs
 import pytest
-from compilers import building, fake
-from waiting import FOREVER, assert_gone, wait_for
+from fakes.compilers import building, fake
+from tools.waiting import FOREVER, assert_gone, wait_for
+from worlds import programs
 
 from symphys.codegen import Cache, KernelUnavailable, compile_program
 from symphys.codegen.toolchain import processor

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from guarded import guarded_sections, halving, program_of, whole
-from plain_c import plain
-from repeats import thorough
+from tools.plain_c import plain
+from tools.repeats import thorough
+from worlds.guarded import guarded_sections, halving, program_of, whole
 
 from symphys.codegen import (
     Cache,

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import programs
 import pytest
-from heaps import heap
-from operations import alone, every_operation
-from repeats import thorough
-from toys import require
-from waiting import until
+from tools.repeats import thorough
+from tools.waiting import until
+from worlds import programs
+from worlds.heaps import heap
+from worlds.operations import alone, every_operation
+from worlds.toys import require
 
 import symphys
 from symphys.codegen import Cache, Program, compile_program
@@ -34,7 +34,7 @@ exec gcc "$@"
 """
 ENDS_AT_ONCE = """
 import os, signal, sys
-import programs
+from worlds import programs
 from symphys.codegen.toolchain import build
 from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
 build.WORTH = 0

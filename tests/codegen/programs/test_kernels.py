@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import programs
 import pytest
+from worlds import programs
 
 from symphys.codegen import Cache, Kernel, ProgramError, compile_program, interpret
 from symphys.codegen.emit.plan import plan

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-import programs
 import pytest
-from repeats import thorough
-from toys import require
+from tools.repeats import thorough
+from worlds import programs
+from worlds.toys import require
 
 import symphys
 from symphys.codegen import Cache, Program, compile_program

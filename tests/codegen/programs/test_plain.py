@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import programs
 import pytest
-from operations import alone, every_operation, long_function
-from plain_c import plain
-from repeats import thorough
+from tools.plain_c import plain
+from tools.repeats import thorough
+from worlds import programs
+from worlds.operations import alone, every_operation, long_function
 
 from symphys.codegen import Cache, Kernel, KernelUnavailable, compile_program
 

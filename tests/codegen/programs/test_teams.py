@@ -8,7 +8,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from toys import require
+from worlds.toys import require
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Program, compile_program
 from symphys.codegen.emit.alone import alone

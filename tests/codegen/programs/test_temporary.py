@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 import pytest
-from compilers import building, fake
-from waiting import FOREVER, wait_for
+from fakes.compilers import building, fake
+from tools.waiting import FOREVER, wait_for
 
 from symphys.codegen.toolchain.temporary import LOCK, OLD, YOUNG, TemporaryFolder
 

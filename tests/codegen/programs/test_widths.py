@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import programs
 import pytest
-from heaps import heap
-from repeats import thorough
-from toys import require
+from tools.repeats import thorough
+from worlds import programs
+from worlds.heaps import heap
+from worlds.toys import require
 
 import symphys
 from symphys.codegen import Cache, Kernel, KernelUnavailable, ProcessorKernel, Program, compile_program

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from operations import ARGUMENTS, PAIRS, SMOOTH, alone, build, every_operation, long_function
+from worlds.operations import ARGUMENTS, PAIRS, SMOOTH, alone, build, every_operation, long_function
 
 from symphys.codegen import Cache, compile_program
 from symphys.codegen.emit.pieces import Form

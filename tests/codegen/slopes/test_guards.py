@@ -8,8 +8,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from guarded import HEAPS, whole
-from repeats import thorough
+from tools.repeats import thorough
+from worlds.guarded import HEAPS, whole
 
 import symphys
 from symphys.codegen import Cache, FunctionCall, KernelUnavailable, MemoryLayout, Place, Program

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from laboratory import Lab
-from linkage import chain, hanging, momenta, separations
+from tools.laboratory import Lab
+from worlds.linkage import chain, hanging, momenta, separations
 
 from symphys.model.world import Scheme, World
 

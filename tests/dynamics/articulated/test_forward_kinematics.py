@@ -5,8 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from contacts import numbers
-from linkage import chain, hanging
+from worlds.contacts import numbers
+from worlds.linkage import chain, hanging
 
 from symphys.dynamics.articulated.forward_kinematics import final_poses, joint_starts
 from symphys.dynamics.collision.predicted_path import PredictedPath

@@ -8,8 +8,8 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from heaps import heap
-from repeats import thorough
+from tools.repeats import thorough
+from worlds.heaps import heap
 
 import symphys
 from symphys import Body, Law, Layout, Plane, Scheme, initial_state, make_world, step_function

@@ -7,9 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from distances import distance
-from meetings import PLACE, STILL, Array, Thing, met, moved_to, random_thing, rule, shifted
 from scipy.optimize import minimize
+from tools.distances import distance
+from worlds.meetings import PLACE, STILL, Array, Thing, met, moved_to, random_thing, rule, shifted
 
 from symphys.dynamics.collision.pairs.box_box import RIM
 from symphys.model.shapes import POINTS, SHAPES, Plane, Terrain

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from distances import Solid, distance
-from meetings import Array, Thing, flying, later, met, moved_to, random_thing, rule
-from slopes import compared, some_way
+from tools.distances import Solid, distance
+from worlds.meetings import Array, Thing, flying, later, met, moved_to, random_thing, rule
+from worlds.slopes import compared, some_way
 
 KINDS = ("sphere", "capsule", "box")
 PAIRS = [(a, b) for a in KINDS for b in KINDS]

@@ -7,10 +7,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from meetings import PLACE, STILL, Array, Thing, course, flying, later, matrix, met, random_thing, rule, shifted
-from meetings import shape as make
 from scipy.optimize import brentq, nnls
-from slopes import compared, some_way
+from worlds.meetings import PLACE, STILL, Array, Thing, course, flying, later, matrix, met, random_thing, rule, shifted
+from worlds.meetings import shape as make
+from worlds.slopes import compared, some_way
 
 from symphys.dynamics.collision import collide
 from symphys.dynamics.collision.predicted_path import at_rest

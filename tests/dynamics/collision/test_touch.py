@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from distances import distance
-from meetings import STILL, Array, Meet, Thing, flying, met, moved_to, random_thing, rule, shifted
-from repeats import first, thorough
+from tools.distances import distance
+from tools.repeats import first, thorough
+from worlds.meetings import STILL, Array, Meet, Thing, flying, met, moved_to, random_thing, rule, shifted
 
 from symphys.model.shapes import Plane, Terrain
 

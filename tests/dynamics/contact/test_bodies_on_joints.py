@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from laboratory import Lab
-from linkage import ABOUT_Y, Array
+from tools.laboratory import Lab
+from worlds.linkage import ABOUT_Y, Array
 
 from symphys.model.joints import HINGE, Joint, JointFrame
 from symphys.model.shapes import Capsule, Plane

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from contacts import contact_of, momenta_of, numbers, terms_of
+from worlds.contacts import contact_of, momenta_of, numbers, terms_of
 
 from symphys.dynamics.contact.constraint import ContactImpulse
 from symphys.dynamics.contact.effective_mass import mobilities

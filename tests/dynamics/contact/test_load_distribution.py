@@ -7,7 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from contacts import Array, contact_of, numbers
+from worlds.contacts import Array, contact_of, numbers
 
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.constraint import ZERO

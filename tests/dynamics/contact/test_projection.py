@@ -7,7 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from contacts import contact_of, momenta_of, numbers, terms_of
+from worlds.contacts import contact_of, momenta_of, numbers, terms_of
 
 from symphys.dynamics.contact.constraint import ZERO, ContactImpulse, known_before
 from symphys.dynamics.contact.coupling import coupling_of

@@ -8,10 +8,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from laboratory import Lab
-from linkage import Array, momenta
-from repeats import thorough
 from scipy.spatial.transform import Rotation
+from tools.laboratory import Lab
+from tools.repeats import thorough
+from worlds.linkage import Array, momenta
 
 from symphys.dynamics.observation.joint_coordinates import reading_function
 from symphys.model.joints import KINDS, Joint, JointFrame

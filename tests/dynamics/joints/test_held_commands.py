@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from laboratory import Lab, central_difference, value_and_gradient
+from tools.laboratory import Lab, central_difference, value_and_gradient
 
 from symphys.model.joints import SLIDER, AffineMotor, Joint, JointFrame, Motor, TorqueMotor, VelocityMotor
 from symphys.model.shapes import Box, Plane

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from laboratory import Lab
-from linkage import ABOUT_Y, Array, chain, energy, hanging, momenta, rod, separations
 from scipy.spatial.transform import Rotation
+from tools.laboratory import Lab
+from worlds.linkage import ABOUT_Y, Array, chain, energy, hanging, momenta, rod, separations
 
 from symphys.model.joints import KINDS, Joint, JointFrame, Servo
 from symphys.model.world import Body, Scheme, World

@@ -7,8 +7,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from laboratory import Lab, central_difference, value_and_gradient
-from linkage import ABOUT_Y, ABOUT_Z, Array, chain, hanging, momenta, separations
+from tools.laboratory import Lab, central_difference, value_and_gradient
+from worlds.linkage import ABOUT_Y, ABOUT_Z, Array, chain, hanging, momenta, separations
 
 from symphys.model.joints import (
     FIXED,

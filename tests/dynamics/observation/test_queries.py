@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from repeats import first
+from tools.repeats import first
 
 from symphys.dynamics.collision import RULES
 from symphys.dynamics.functions import step_function

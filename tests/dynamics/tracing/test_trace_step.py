@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from repeats import first
+from tools.repeats import first
 
 from symphys.dynamics.functions import TracedStep, step_function, trace_step
 from symphys.dynamics.tracing.dead_code import without_dead_code

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded import HEIGHT, TABLE
+from data.recorded import HEIGHT, TABLE
 
 import symphys
 from symphys.errors import ProblemError

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from data.recorded import BALL, HEIGHT, TABLE, beside, loaded
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from recorded import BALL, HEIGHT, TABLE, beside, loaded
 
 from symphys.errors import ProblemError
 from symphys.problem import Problem

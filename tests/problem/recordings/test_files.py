@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded import HEIGHT, beside
+from data.recorded import HEIGHT, beside
 
 from symphys.errors import ProblemError
 from symphys.problem import Problem, load_problem

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded import beside
+from data.recorded import beside
 
 from symphys.problem import Problem
 from symphys.problem.checks.start_values import StartValues

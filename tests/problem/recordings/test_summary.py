@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from recorded import TABLE, loaded
+from data.recorded import TABLE, loaded
 
 from symphys.problem.recordings.summary import recording_lines
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from recorded import HEIGHT, TABLE, beside, loaded
+from data.recorded import HEIGHT, TABLE, beside, loaded
 
 from symphys.problem.recordings import Recording
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from repeats import thorough
-from toys import require
+from tools.repeats import thorough
+from worlds.toys import require
 
 import symphys
 from symphys import Body, Law, Plane, Problem, make_world

@@ -9,9 +9,9 @@ from tempfile import TemporaryDirectory
 import casadi as ca
 import numpy as np
 import pytest
-from driven import TABLES
-from repeats import thorough
-from staged_worlds import problem_of
+from tools.repeats import thorough
+from worlds.driven import TABLES
+from worlds.staged_worlds import problem_of
 
 import symphys
 from symphys.codegen import KernelUnavailable

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from repeats import first
+from tools.repeats import first
 
 from symphys.errors import SymphysError
 from symphys.problem import Problem, load_problem

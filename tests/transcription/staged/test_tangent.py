@@ -7,8 +7,8 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from repeats import thorough
-from staged_worlds import problem_of
+from tools.repeats import thorough
+from worlds.staged_worlds import problem_of
 
 from symphys.model.state_layout import Layout
 from symphys.transcription.rollout import symbolic_rollout

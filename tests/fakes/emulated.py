@@ -15,7 +15,7 @@ import pytest
 from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import DTypeLike, NDArray
 
-ROOM = Path(__file__).parent / "codegen" / "cuda"
+ROOM = Path(__file__).parents[1] / "codegen" / "cuda"
 FLAGS = ("-std=c++17", "-O0", "-fPIC", "-w", "-ffp-contract=off", "-fno-math-errno")
 needs_compiler = pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler stands in for CUDA's")
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from distances import Solid, distance
 from numpy.typing import NDArray
 from scipy.optimize import brentq
+from tools.distances import Solid, distance
 
 from symphys.dynamics.collision import collide
 from symphys.dynamics.collision.contact_geometry import Displacement

@@ -6,7 +6,7 @@ from functools import cache
 
 import casadi as ca
 import numpy as np
-from meetings import MOTION, PLACE, WIDTHS, Array, arguments, contacts
+from worlds.meetings import MOTION, PLACE, WIDTHS, Array, arguments, contacts
 
 from symphys.model.shapes import Terrain
 

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from toys import require
+from worlds.toys import require
 
 from symphys.problem import load_problem
 from symphys.transcription import Transcription, transcribe

@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any
 
 import casadi as ca
-from heaps import heap
+from worlds.heaps import heap
 
 import symphys
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program

@@ -161,7 +161,7 @@ def problem_of(name: str, folder: Path, more: str = "") -> Problem:
     """A shipped problem, or one of this module with ``more`` tables."""
     text = {"loop": LOOP, "soft": SOFT, "leg": LEG}.get(name)
     if text is None:
-        return load_problem(Path(__file__).parents[1] / "problems" / f"{name}.toml")
+        return load_problem(Path(__file__).parents[2] / "problems" / f"{name}.toml")
     file = folder / f"{name}.toml"
     file.write_text(text + more)
     return load_problem(file)

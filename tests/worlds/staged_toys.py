@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from single_steps import SingleSteps
+from tools.single_steps import SingleSteps
 
 from symphys.shooting import (
     Expansion,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from markdown_it import MarkdownIt
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 NEEDS = re.compile(r"^(?:% needs: (.*)|<!-- needs: (.*) -->)$", re.MULTILINE)
 FRAGMENT = re.compile(r"(?:% fragment of: (\w+)|<!-- fragment of: (\w+) -->)")
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from toys import toy
+from worlds.toys import toy
 
 from symphys.shooting import Array, ScenarioSamples, ShootingProblem, Values
 

@@ -10,9 +10,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import programs
-
-BUILD = "import programs; from symphys.codegen import compile_program as c; print(c(programs.pendulum()).report.cached)"
+BUILD = """
+from symphys.codegen import compile_program
+from worlds.programs import pendulum
+print(compile_program(pendulum()).report.cached)
+"""
 
 
 def fake(folder: Path, script: str) -> str:
@@ -51,7 +53,7 @@ def building(folder: Path, compiler: str, **places: str) -> subprocess.Popen[str
     environment = os.environ | {
         "CC": compiler,
         "SYMPHYS_CACHE": str(folder / "cache"),
-        "PYTHONPATH": os.pathsep.join([str(Path(programs.__file__).parent), *sys.path]),
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[1]), *sys.path]),
         **places,
     }
     command = [sys.executable, "-c", BUILD]
