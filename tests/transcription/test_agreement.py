@@ -1,0 +1,99 @@
+"""Every feature of problem files in every way to evaluate: they agree with each other, and slopes with differences."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from worlds.features import FEATURES
+from worlds.toys import require
+
+from symphys.problem import problem_of_tables
+from symphys.shooting import StagedProblem
+from symphys.transcription import Transcription, transcribe
+from symphys.verification import examine
+
+Array = NDArray[np.float64]
+
+
+HEAVY = {"load on two boards"}
+"""What takes a minute to build."""
+every = pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in HEAVY)) for name in FEATURES]
+)
+
+
+@cache
+def made(name: str, backend: str = "casadi") -> Transcription:
+    """The problem, in one thread."""
+    require(backend)
+    return transcribe(problem_of_tables(FEATURES[name]), backend=backend, threads=1)
+
+
+def widest(name: str) -> float:
+    """The smoothing [m/s] that the problem asks for."""
+    return max(made(name).problem.simulation.smoothing)
+
+
+def merit_and_slope(name: str, backend: str) -> tuple[Array, Array]:
+    """(2,), (2, n) at the guess and at a start beside it."""
+    shooting = made(name).shooting
+    found = made(name, backend).shooting.evaluator.gradient(
+        np.stack([shooting.start(0), shooting.start(1)]), widest(name)
+    )
+    assert found.gradient is not None
+    return found.merit, found.gradient
+
+
+@every
+def test_a_kernel_gives_what_the_virtual_machine_gives(name: str) -> None:
+    merit, slope = merit_and_slope(name, "casadi")
+    compiled, compiled_slope = merit_and_slope(name, "simd")
+    assert compiled == pytest.approx(merit, rel=1e-11)
+    np.testing.assert_allclose(compiled_slope, slope, rtol=1e-8, atol=1e-9 * np.abs(slope).max())
+
+
+@every
+def test_slopes_are_those_of_differences(name: str) -> None:
+    """At the guess, where each counts."""
+    evaluator, h = made(name).shooting.evaluator, 1e-6
+    z, slope = made(name).shooting.start(0), merit_and_slope(name, "casadi")[1][0]
+    ahead, behind = (evaluator.value(z + sign * h * np.eye(z.size), widest(name)).merit for sign in (1, -1))
+    np.testing.assert_allclose((ahead - behind) / (2 * h), slope, rtol=1e-5, atol=1e-7 * np.abs(slope).max())
+    assert np.abs(slope).min() > 0
+
+
+def chained(staged: StagedProblem, z: Array) -> tuple[float, Array]:
+    """The objective and its slopes, step by step."""
+    motion = staged.roll_out(z, 0.0)
+    count = len(staged.lower)
+    slopes, costs = staged.linearize(motion), staged.expand(motion, np.zeros(count), np.zeros(count))
+    adjoint, by_inputs, by_statics = costs.x[-1], np.zeros(motion.u.shape), costs.s.copy()
+    for k in reversed(range(staged.steps)):
+        by_inputs[k] = costs.u[k] + slopes.b[k].T @ adjoint
+        by_statics += slopes.c[k].T @ adjoint
+        adjoint = costs.x[k] + slopes.a[k].T @ adjoint
+    gradient = np.asarray(staged.weights.T @ by_inputs.ravel())
+    gradient[staged.statics] += by_statics + slopes.start.T @ adjoint
+    return costs.value, gradient
+
+
+@every
+def test_stages_give_what_the_whole_gives(name: str) -> None:
+    problem, whole = made(name), made(name).shooting
+    assert whole.staged is not None
+    z, nlp = whole.start(0), problem.functions.nlp
+    objective, slope = chained(whole.staged(), z)
+    expected = nlp.factory("g", ["i0", "i1"], ["o0", "grad:o0:i0"])(z, 0.0)
+    assert objective == pytest.approx(float(expected[0]), rel=1e-10)
+    exact = np.array(expected[1]).ravel()
+    np.testing.assert_allclose(slope, exact, rtol=1e-8, atol=1e-8 * np.abs(exact).max())
+
+
+@pytest.mark.slow
+@every
+def test_every_examination_comes_to_an_end(name: str) -> None:
+    found = examine(made(name), made(name).shooting.start(0))
+    assert found["gradient"]
