@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports bench-idto bench-tosses profiles gallery clean
+.PHONY: help demo demo-walk test test-quick test-rest test-all test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports bench-idto bench-tosses profiles gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -15,14 +15,19 @@ demo: $(VENV)/.installed  ## solve the ball throw with four solvers and write th
 demo-walk: $(VENV)/.installed  ## a quadruped learns to walk, in half a minute; Ctrl-C stops it, and the same command goes on
 	$(BIN)/symphys solve quadruped_walk --unexamined --out reports/walk
 
-test: $(VENV)/.developing  ## run the tests; ARGS="-m 'not slow'" passes options to pytest
+test: $(VENV)/.developing  ## run the tests; ARGS=tests/runs passes options to pytest
 	$(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
 test-quick: $(VENV)/.developing  ## run the tests that tell most in a minute: the house, problem files, the step, solvers
-	$(BIN)/pytest -n auto --dist loadfile -m "not slow" $(QUICK) $(ARGS)
+	$(BIN)/pytest -n auto --dist loadfile $(QUICK) $(ARGS)
+
+test-rest: $(VENV)/.developing  ## run what test leaves out: whole solves, pages of the documents, laws once more
+	$(BIN)/pytest -n auto --dist worksteal -m "slow and not thorough" $(ARGS)
+
+test-all: test test-rest  ## run all tests but those of thorough
 
 test-pipelines: $(VENV)/.pipelining  ## run the tests of symphys.torch, symphys.jax and symphys.env, and install what they need
-	$(BIN)/pytest tests/pipelines tests/house/test_code_blocks.py -k pipelines $(ARGS)
+	$(BIN)/pytest tests/pipelines tests/house/test_code_blocks.py -k pipelines -m "not thorough" $(ARGS)
 
 thorough: $(VENV)/.developing  ## run the tests that take minutes: ten thousand random scenes, tall towers, long rolls
 	$(BIN)/pytest -n auto -m thorough $(ARGS)

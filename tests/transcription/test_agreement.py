@@ -13,7 +13,6 @@ from worlds.toys import require
 from symphys.problem import problem_of_tables
 from symphys.shooting import StagedProblem
 from symphys.transcription import Transcription, transcribe
-from symphys.verification import examine
 
 Array = NDArray[np.float64]
 
@@ -90,10 +89,3 @@ def test_stages_give_what_the_whole_gives(name: str) -> None:
     assert objective == pytest.approx(float(expected[0]), rel=1e-10)
     exact = np.array(expected[1]).ravel()
     np.testing.assert_allclose(slope, exact, rtol=1e-8, atol=1e-8 * np.abs(exact).max())
-
-
-@pytest.mark.slow
-@every
-def test_every_examination_comes_to_an_end(name: str) -> None:
-    found = examine(made(name), made(name).shooting.start(0))
-    assert found["gradient"]

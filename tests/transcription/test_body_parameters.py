@@ -99,19 +99,6 @@ velocity = {(np.array([1, 0, -1]) + np.cross([3, 5, -4], arm)).tolist()}
     assert motion(cube(tmp_path, PLAIN)) != pytest.approx(built, abs=1e-2)
 
 
-def test_slopes_of_a_toss(tmp_path: Path) -> None:
-    sets = (
-        variable("cube.second_moments", "[3e-4, 5e-4, 2e-4]")
-        + variable("cube.correlations", "[0.3, -0.2, 0.4]")
-        + variable("cube.centre_of_mass", "[0.002, -0.001, 0.003]")
-        + variable("ground.tilt", "[0.02, -0.03]")
-    )
-    value = "dot(marker.position, [1, 2, 3]) + 0.1 * dot(cube.angular_velocity, [1, 1, 2])"
-    _, exact, differences = slopes_of(cube(tmp_path, PLAIN, sets, value=value), 1e-7)
-    assert exact == pytest.approx(differences, rel=1e-4)
-    assert np.abs(exact).min() > 1e-3
-
-
 PENDULUM = """
 [simulation]
 duration = 0.5
@@ -218,26 +205,3 @@ def test_what_cannot_vary(tmp_path: Path, sets: str, guess: str, lower: str, mes
     file = cube(tmp_path, PLAIN, f"{variable(sets, guess)}lower = {lower}\n")
     with pytest.raises(ProblemError, match=message):
         load_problem(file)
-
-
-def test_a_compiled_kernel_has_the_same_slopes(tmp_path: Path) -> None:
-    """A cube with round edges that lands on tilted ground, by fourteen numbers."""
-    box = "shape = { box = { size = [0.1, 0.1, 0.1], edge = 0.004 } }"
-    body = "\n".join(box if line.startswith("shape") else line for line in PLAIN.splitlines()).replace("0.13]", "0.15]")
-    sets = [
-        variable("cube.second_moments", "[3e-4, 5e-4, 2e-4]"),
-        variable("cube.correlations", "[0.3, -0.2, 0.4]"),
-        variable("cube.centre_of_mass", "[0.002, -0.001, 0.003]"),
-        variable("ground.tilt", "[0.02, -0.03]"),
-        *map(variable, ("contact.torsion", "contact.restitution", "cube.edge")),
-    ]
-    value = "dot(marker.position, [1, 2, 3]) + 0.1 * dot(cube.angular_velocity, [1, 1, 2])"
-    law = "[contact]\ntorsion = 0.002\nrestitution = 0.1\n"
-    problem = load_problem(cube(tmp_path, body, "".join(sets) + law, value))
-    found = []
-    for backend in ("casadi", "simd"):
-        made = transcribe(problem, backend=backend)
-        z = np.concatenate([block.guess for block in made.shooting.blocks])
-        found.append(np.array(made.shooting.evaluator.gradient(z[None], 0.0).gradient[0]))
-    assert found[1] == pytest.approx(found[0], rel=1e-7)
-    assert np.abs(found[0]).min() > 1e-3

@@ -107,28 +107,6 @@ def points(made: Transcription) -> Array:
     return start + 0.05 * np.random.default_rng(3).standard_normal((3, start.size))
 
 
-def test_kernels_and_casadi_agree(tmp_path: Path) -> None:
-    """Merits and gradients of both backends, smoothed or not."""
-    problem = problem_of(tmp_path)
-    fast, plain = transcribe(problem, backend="simd"), transcribe(problem, backend="casadi")
-    assert fast.backend.name == "simd", fast.backend.note
-    for smoothing in (0.0, 0.05):
-        a, b = (made.shooting.evaluator.gradient(points(made), smoothing) for made in (fast, plain))
-        assert np.allclose(a.merit, b.merit, rtol=1e-12)
-        assert a.gradient is not None and b.gradient is not None
-        assert np.allclose(a.gradient, b.gradient, rtol=1e-9, atol=1e-12 * np.abs(b.gradient).max())
-
-
-def test_gradient_by_differences(tmp_path: Path) -> None:
-    """Through sensors, memory, nets and sines: every derivative against central differences."""
-    made = transcribe(problem_of(tmp_path), backend="simd")
-    z, evaluator, h = points(made)[:1], made.shooting.evaluator, 1e-5
-    gradient = evaluator.gradient(z, 0.0).gradient
-    assert gradient is not None
-    ahead, behind = (evaluator.value(z + sign * h * np.eye(z.size), 0.0).merit for sign in (1, -1))
-    assert np.allclose((ahead - behind) / (2 * h), gradient[0], rtol=1e-5, atol=1e-7 * np.abs(gradient).max())
-
-
 def test_all_controllers_add_up(tmp_path: Path) -> None:
     """The command of every step is what numpy makes of the recorded states and the step before."""
     problem = problem_of(tmp_path)

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from symphys.codegen import compile_program, interpret
 from symphys.errors import ProblemError
 from symphys.problem import Problem, problem_of_tables
 from symphys.trajectory import Trajectory
-from symphys.transcription import rollout_program, transcribe
+from symphys.transcription import transcribe
 
 MASS, G = 0.5, 9.81
 BALL = {"name": "ball", "mass": MASS, "shape": {"sphere": {"radius": 0.1}}}
@@ -146,37 +145,6 @@ def test_laws_on_motors_and_on_bodies_of_joints_are_of_second_order(on: str) -> 
         errors.append(np.abs(found.joint_value[:, 0, 0] - expected).max())
     assert errors[1] < 1e-4
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.05)
-
-
-def test_slopes_are_those_of_differences_and_the_kernel_agrees() -> None:
-    forces = [{**DRAG, "numbers": {"c": 0.05}}, {**MAGNUS, "numbers": {"c": 0.02}}, SPRING]
-    forces.append(
-        {
-            "name": "gust",
-            "on": "ball.force[0]",
-            "value": "strength * sin(5 * time) + gust.more",
-            "numbers": {"more": 0.1},
-        }
-    )
-    variables = [
-        {"name": "throw", "sets": "ball.velocity", "guess": [3, 1, 2]},
-        {"name": "strength", "sets": "drag.c"},
-        {"name": "lift_of_air", "sets": "lift.c"},
-        {"name": "push", "sets": "ball.force[1]", "knots": 3, "guess": [0.1, 0.2, 0.3]},
-    ]
-    start = {"angular_velocity": [1, 2, 8]}
-    made = transcribe(problem(forces, 0.01, 0.5, G, variable=variables, start=start), backend="casadi")
-    z, h = made.shooting.start(1), 1e-6
-    merit, *_, slope, _ = (np.array(part).ravel() for part in made.functions.gradient(z, 0.0))
-    value = made.functions.value
-    differences = [(float(value(z + e, 0.0)[0]) - float(value(z - e, 0.0)[0])) / (2 * h) for e in h * np.eye(z.size)]
-    assert np.all(slope != 0)
-    assert slope == pytest.approx(differences, rel=1e-6, abs=1e-7)
-    program = rollout_program(made.rollout)
-    assert interpret(program, z, [0.0])["merit"] == pytest.approx(merit, rel=1e-12)
-    outputs, gradient = compile_program(program, seeded=("merit",), threads=1).gradient(z, [1.0], [0.0])
-    assert outputs["merit"][0] == pytest.approx(merit, rel=1e-12)
-    assert gradient[0] == pytest.approx(slope, rel=1e-9)
 
 
 def test_laws_add_to_controllers_and_to_each_other() -> None:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 from tools.repeats import first
 
 from symphys import problems
-from symphys.codegen import compile_program, interpret
 from symphys.errors import ProblemError, SymphysError
 from symphys.problem import Problem, load_problem, problem_of_tables
-from symphys.transcription import Transcription, rollout_program, transcribe
+from symphys.transcription import Transcription, transcribe
 from symphys.transcription.open_step import compile_open_step
 from symphys.verification import examine
 from symphys.verification.examination import survey
@@ -68,21 +66,6 @@ def other() -> Transcription:
     fixed = {**TABLES, "simulation": {"duration": 0.7, "dt": 0.7 / 30}}
     fixed["variable"] = [each for each in TABLES["variable"] if each["name"] != "T"]
     return transcribe(problem_of_tables(fixed), backend="casadi")
-
-
-def test_slopes_are_those_of_differences_and_the_kernel_agrees(made: Transcription) -> None:
-    z, h = made.shooting.start(0), 1e-6
-    merit, *_, slope, outputs = (np.array(part).ravel() for part in made.functions.gradient(z, 0.0))
-    value = made.functions.value
-    differences = [(float(value(z + e, 0.0)[0]) - float(value(z - e, 0.0)[0])) / (2 * h) for e in h * np.eye(z.size)]
-    assert np.all(slope != 0)
-    assert slope == pytest.approx(differences, rel=2e-6)
-    assert outputs[0] == pytest.approx(0.7, rel=1e-14)
-    program = rollout_program(made.rollout)
-    assert interpret(program, z, [0.0])["merit"] == pytest.approx(merit, rel=1e-11)
-    found, gradient = compile_program(program, seeded=("merit",), threads=1).gradient(z, [1.0], [0.0])
-    assert found["merit"][0] == pytest.approx(merit, rel=1e-11)
-    assert gradient[0] == pytest.approx(slope, rel=1e-8)
 
 
 def test_the_motion_is_that_of_the_fixed_duration(made: Transcription, other: Transcription) -> None:

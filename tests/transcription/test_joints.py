@@ -157,18 +157,6 @@ def test_the_rate_is_the_derivative_of_the_angle(make: Make) -> None:
     assert motion.joint_separation.max() < 1e-4
 
 
-@pytest.mark.parametrize("text", [PENDULUM, CROSS])
-def test_gradient_agrees_with_differences(make: Make, text: str) -> None:
-    made = make(text)
-    z = made.shooting.start(0)
-    slope = made.shooting.evaluator.gradient(z[None], 0.0).gradient
-    assert slope is not None
-    steps = 1e-5 * np.eye(z.size)
-    up, down = (made.shooting.evaluator.value(z + sign * steps, 0.0).merit for sign in (1, -1))
-    assert slope[0] == pytest.approx((up - down) / 2e-5, rel=1e-5, abs=1e-6 * np.abs(slope).max())
-    assert np.abs(slope).min() > 1e-9
-
-
 def test_a_motor_that_no_variable_commands_is_told_0(make: Make) -> None:
     start, end = PENDULUM.index('[[variable]]\nname = "aim"'), PENDULUM.index('[[variable]]\nname = "made"')
     motion = make(PENDULUM[:start] + PENDULUM[end:].replace('squares = "pivot.command"', 'squares = "pivot.rate"'))

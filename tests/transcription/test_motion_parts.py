@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symphys.codegen import compile_program, interpret
 from symphys.errors import ProblemError, SymphysError
 from symphys.problem import Problem, load_problem
-from symphys.transcription import Transcription, rollout_program, transcribe
+from symphys.transcription import Transcription, transcribe
 from symphys.transcription.nan_tracing.steps import first_non_finite
 from symphys.transcription.open_step import compile_open_step
 
@@ -89,21 +88,6 @@ def test_an_integral_is_the_running_cost_and_start_and_end_are_those_of_the_moti
     power = np.abs(motion.force[:, 0, 0] * velocity[:-1, 0]) + np.abs(motion.force[:, 0, 0] * velocity[1:, 0])
     work = 0.01 * power.sum() / 2
     assert judged.costs["of transport"] == pytest.approx(work / np.linalg.norm(position[-1] - position[0]), rel=1e-12)
-
-
-def test_slopes_are_those_of_differences_and_the_kernel_agrees(ball: Transcription) -> None:
-    z, h = ball.shooting.start(1), 1e-6
-    merit, _, errors, slope, _ = (np.array(part).ravel() for part in ball.functions.gradient(z, 0.0))
-    differences = [
-        (float(ball.functions.value(z + e, 0.0)[0]) - float(ball.functions.value(z - e, 0.0)[0])) / (2 * h)
-        for e in h * np.eye(z.size)
-    ]
-    assert slope == pytest.approx(differences, rel=1e-6, abs=1e-6)
-    program = rollout_program(ball.rollout)
-    assert interpret(program, z, [0.0])["errors"] == pytest.approx(errors, rel=1e-12)
-    outputs, gradient = compile_program(program, seeded=("merit",), threads=1).gradient(z, [1.0], [0.0])
-    assert outputs["merit"][0] == pytest.approx(merit, rel=1e-12)
-    assert gradient[0] == pytest.approx(slope, rel=1e-9)
 
 
 def test_where_a_part_is_not_finite_is_said(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from symphys.codegen import compile_program, interpret
+from symphys.codegen import interpret
 from symphys.errors import ProblemError, SymphysError
 from symphys.problem import Problem, problem_of_tables
 from symphys.transcription import Transcription, rollout_program, transcribe
@@ -125,50 +125,6 @@ MIXED: dict[str, Any] = {
 @pytest.fixture(scope="module")
 def mixed() -> Transcription:
     return transcribe(problem_of_tables(MIXED), backend="casadi")
-
-
-def test_program_and_kernel_agree_with_casadi_and_with_differences(mixed: Transcription) -> None:
-    z, h = mixed.shooting.start(1), 1e-6
-    merit, *_, slope, _ = (np.array(part).ravel() for part in mixed.functions.gradient(z, 0.0))
-    value = mixed.functions.value
-    differences = [(float(value(z + e, 0.0)[0]) - float(value(z - e, 0.0)[0])) / (2 * h) for e in h * np.eye(z.size)]
-    assert slope == pytest.approx(differences, rel=1e-5, abs=1e-6)
-    assert np.abs(slope[-4:]).min() > 1e-6
-    program = rollout_program(mixed.rollout)
-    assert interpret(program, z, [0.0])["merit"] == pytest.approx(merit, rel=1e-12)
-    outputs, gradient = compile_program(program, seeded=("merit",), threads=1).gradient(z, [1.0], [0.0])
-    assert outputs["merit"][0] == pytest.approx(merit, rel=1e-12)
-    assert gradient[0] == pytest.approx(slope, rel=1e-9, abs=1e-12)
-
-
-@pytest.mark.parametrize("backend", ["casadi", "c"])
-def test_steps_are_linearized_as_the_whole_is(mixed: Transcription, backend: str) -> None:
-    """Also of a motion that was put together step by step, and of what costs and limits along it are."""
-    from symphys.transcription.staged.staged_problem import RolloutStages
-
-    staged, z = RolloutStages(mixed.rollout, backend, 1), mixed.shooting.start(1)
-    motion, record = staged.roll_out(z, 0.0), mixed.record(z)
-    np.testing.assert_allclose(motion.x, record.arrays.x, atol=1e-11)
-    assert motion.u.shape[1] == staged.input_size == mixed.rollout.controls
-    objective, limits = staged.measure(z[None], motion.x[None], motion.u[None])
-    assert objective[0] == pytest.approx(mixed.judge(z).objective, rel=1e-10)
-    slopes, costs = staged.linearize(motion), staged.expand(motion, np.zeros(limits.size), np.zeros(limits.size))
-    gradient, adjoint = np.zeros(z.size), costs.x[-1]
-    by_inputs, by_statics = np.zeros(motion.u.shape), costs.s.copy()
-    for k in reversed(range(staged.steps)):
-        by_inputs[k] = costs.u[k] + slopes.b[k].T @ adjoint
-        by_statics += slopes.c[k].T @ adjoint
-        adjoint = costs.x[k] + slopes.a[k].T @ adjoint
-    by_statics += slopes.start.T @ adjoint
-    gradient += staged.weights.T @ by_inputs.ravel()
-    gradient[staged.statics] += by_statics
-    objective_slope = np.array(mixed.functions.nlp.factory("g", ["i0", "i1"], ["grad:o0:i0"])(z, 0.0)).ravel()
-    np.testing.assert_allclose(gradient, objective_slope, rtol=1e-8, atol=1e-8 * np.abs(objective_slope).max())
-    after = staged.step(30, motion.x[30][None], motion.u[30][None], z[None], 0.0)
-    np.testing.assert_allclose(after[0], motion.x[31], atol=1e-12)
-    values, by_state, *_ = staged.limit_slopes(motion)
-    np.testing.assert_allclose(values, limits[0], atol=1e-12)
-    assert by_state.nnz
 
 
 def test_adjoints_of_single_states_are_those_of_the_whole(mixed: Transcription) -> None:

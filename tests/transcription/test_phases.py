@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from symphys.codegen import compile_program, interpret
+from symphys.codegen import interpret
 from symphys.errors import ProblemError, SymphysError
 from symphys.problem import problem_of_tables
 from symphys.transcription import rollout_program, transcribe
@@ -52,20 +52,6 @@ def test_phases_add_up_and_begin_and_end_where_they_say() -> None:
     assert take_off.error == pytest.approx(np.linalg.norm(motion.position[20, 0]), rel=1e-12)
     assert high.error == pytest.approx(0.99 - motion.position[21:26, 0, 2].min(), rel=1e-12)
     assert made.shooting.constraint_lower.size == 5
-
-
-def test_the_kernel_agrees_and_slopes_are_those_of_differences() -> None:
-    made = transcribe(problem_of_tables(TABLES), backend="casadi")
-    z, h = made.shooting.start(1), 1e-6
-    merit, *_, slope, _ = (np.array(part).ravel() for part in made.functions.gradient(z, 0.0))
-    value = made.functions.value
-    differences = [(float(value(z + e, 0.0)[0]) - float(value(z - e, 0.0)[0])) / (2 * h) for e in h * np.eye(z.size)]
-    assert slope == pytest.approx(differences, rel=1e-6, abs=1e-6)
-    program = rollout_program(made.rollout)
-    assert interpret(program, z, [0.0])["merit"] == pytest.approx(merit, rel=1e-12)
-    outputs, gradient = compile_program(program, seeded=("merit",), threads=1).gradient(z, [1.0], [0.0])
-    assert outputs["merit"][0] == pytest.approx(merit, rel=1e-12)
-    assert gradient[0] == pytest.approx(slope, rel=1e-9)
 
 
 def test_phases_are_the_same_on_a_finer_grid_and_scale_with_a_free_duration() -> None:
@@ -119,20 +105,6 @@ def test_a_force_acts_in_its_phase_alone(duration: float) -> None:
     assert np.all(motion.force[80:180, 0, 0] < 0)
     program = rollout_program(made.rollout)
     assert interpret(program, z, [0.0])["merit"] == pytest.approx(made.judge(z).objective, rel=1e-12)
-
-
-def test_steps_with_forces_of_phases_are_linearized_as_the_whole_is() -> None:
-    made = transcribe(problem_of_tables(WADING), backend="casadi")
-    assert made.shooting.staged is not None
-    staged, z = made.shooting.staged(), made.shooting.start(0)
-    motion = staged.roll_out(z, 0.0)
-    slopes = staged.linearize(motion)
-    total = slopes.start
-    for a, c in zip(slopes.a, slopes.c, strict=True):
-        total = a @ total + c
-    costs = staged.expand(motion, np.zeros(0), np.zeros(0))
-    gradient = np.array(made.functions.gradient(z, 0.0)[3]).ravel()
-    np.testing.assert_allclose(costs.x[-1] @ total, gradient, atol=1e-10 * np.abs(gradient).max())
 
 
 FREE = {"name": "T", "sets": "simulation.duration"}

@@ -1,7 +1,4 @@
-"""Every feature of problem files by every examination: each ends with numbers, and the gradient is that of differences.
-
-Tables are small: a ball that comes down on the ground, and a pendulum on a hinge.
-"""
+"""Every feature of problem files, and what phases make of it, by every examination: each ends with numbers."""
 
 from __future__ import annotations
 
@@ -10,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from worlds.features import FEATURES
 
 from symphys.problem import problem_of_tables
 from symphys.transcription import transcribe
@@ -70,56 +68,34 @@ def phases(first: Tables | None = None, second: Tables | None = None, **end: flo
 DURATION = {"name": "duration", "sets": "simulation.duration", "guess": 0.1, "lower": 0.05}
 OFF = {"knee.torque": 0, "knee.friction": 0}
 DRAG = {"name": "drag", "on": "ball.force", "value": "-0.1 * ball.velocity"}
-SENSOR = {"name": "place", "reads": ["ball.position"]}
-CONTROL = {"name": "hold", "drives": ["ball.force"], "senses": ["place"], "net": {"hidden": []}}
-WEIGHTS = {"name": "weights", "sets": "hold.weights", "guess": 0.1}
 THROW = BALL["variable"][0]
-SECOND = {"name": "arm", "mass": 0.2, "inertia": 0.01, "position": [0.2, 0, -0.5]}
-ELBOW = {"name": "elbow", "between": ["bob", "arm"], "hinge": {"axis": [0, 1, 0]}, "point": [0, 0, -0.5]}
 
 MU = {"name": "mu", "sets": "hang.ground.friction", "guess": 0.2}
 TORQUE = {"motor": {"torque": {"torque": 3}}}
 AFFINE = {"motor": {"affine": {"gain": 20, "kp": 20, "kv": 2}}}
-VELOCITY = {"motor": {"velocity": {"torque": 3, "velocity": 5}}}
 SPRING = {"spring": {"stiffness": 2, "damping": 0.1, "rest": 0.2}}
 LIMITED = {"limits": [-0.01, 0.5], "armature": 0.01, "friction": 0.1}
 BOTH = [RATE, COMMAND]
-PUSH = {"name": "push", "sets": "bob.force", "knots": 2, "guess": [0.1, 0, 0]}
-TWO = {"body": [*PENDULUM["body"], SECOND], "joint": [*PENDULUM["joint"], ELBOW]}
 
-USUAL: dict[str, Tables] = {
-    "contact": ball(),
-    "soft contact": ball(pair=[{"between": ["ball", "ground"], "restitution": 0, "frequency": 30, "damping": 0.5}]),
-    "smoothing": ball(simulation={"smoothing": [0.1, 0]}),
+PHASES: dict[str, Tables] = {
     "phases": ball(phase=phases(), cost=[{"name": "c", "during": "flight", "squares": "ball.position"}]),
     "phases that set contact": ball(phase=phases({"ground.friction": 0.1}, {"gravity": [0, 0, -1]})),
     "phases with joints off": pendulum(SERVO | {"friction": 0.1}, variable=BOTH, phase=phases(OFF, {"knee.torque": 1})),
     "phases with a free duration": ball(phase=phases({"ground.friction": 0}, share=0.5), variable=[THROW, DURATION]),
     "a number of a phase": ball(phase=phases({"ground.friction": 0.1}), variable=[THROW, MU]),
     "force law in a phase": ball(phase=phases(), force=[DRAG | {"during": "hang"}]),
-    "terrain": ball(terrain=[{"name": "hill", "height": "0.02 * sin(6 * x)"}], ground=None),
-    "scenarios": ball(scenario=[{"name": "light", "sets": "ball.mass", "factor": 0.2}]),
-    "network": ball(sensor=[SENSOR], controller=[CONTROL], variable=[THROW, WEIGHTS]),
-    "servo": pendulum(SERVO, variable=BOTH),
-    "soft joint": pendulum({"frequency": 10, "damping": 0.5}, variable=[PUSH]),
 }
 MORE: dict[str, Tables] = {
-    "free duration": ball(variable=[THROW, DURATION]),
-    "mass": ball(variable=[THROW, {"name": "mass", "sets": "ball.mass", "guess": 0.5, "lower": 0.1}]),
-    "force": ball(variable=[{"name": "force", "sets": "ball.force", "knots": 2, "guess": [0, 0, 1]}]),
-    "force law": ball(force=[DRAG]),
-    "velocity motor": pendulum(VELOCITY, variable=BOTH),
     "torque motor in a phase": pendulum(TORQUE, variable=BOTH, phase=phases({"knee.torque": 0})),
     "affine motor in a phase": pendulum(AFFINE, variable=BOTH, phase=phases({"knee.kp": 0, "knee.kv": 0})),
     "spring in a phase": pendulum(SPRING, phase=phases({"knee.stiffness": 0, "knee.damping": 0}, {"knee.rest": 0})),
     "limits and armature in a phase": pendulum(LIMITED, phase=phases({"knee.friction": 0})),
-    "coupling": pendulum(coupling=[{"name": "gear", "joints": ["knee", "elbow"], "polynomial": [0, 2]}], **TWO),
 }
 
 
-@pytest.mark.parametrize("name", [*USUAL, *(pytest.param(name, marks=pytest.mark.thorough) for name in MORE)])
+@pytest.mark.parametrize("name", [*PHASES, *(pytest.param(name, marks=pytest.mark.slow) for name in MORE | FEATURES)])
 def test_every_examination_ends_with_numbers(name: str) -> None:
-    tables = {key: value for key, value in (USUAL | MORE)[name].items() if value is not None}
+    tables = (PHASES | MORE | FEATURES)[name]
     made = transcribe(problem_of_tables(tables), backend="casadi")
     found = examine(made, made.shooting.start(0))
     assert {"gradient", "refined", "order", "bounds"} <= set(found)

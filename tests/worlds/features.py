@@ -37,10 +37,10 @@ FLIGHT: Tables = {**BALL, "position": [0, 0, 2]}
 
 def thrown(*variables: Tables, **tables: Any) -> Tables:
     """A ball that lands on rough ground within a dozen steps."""
-    ground = {"friction": 0.4, "restitution": 0.3}
+    ground = {} if "terrain" in tables else {"ground": {"friction": 0.4, "restitution": 0.3}}
     return {
         "simulation": {"duration": 0.12, "dt": 0.01, **tables.pop("simulation", {})},
-        "ground": ground,
+        **ground,
         "body": [BALL],
         "variable": [THROW, *variables],
         "cost": [WHERE, *tables.pop("more", [])],
@@ -104,6 +104,50 @@ MOUNT: Tables = {
     "frequency": 5,
     "damping": 0.3,
 }
+LEG: Tables = {
+    "simulation": {"duration": 0.12, "dt": 0.01, "sweeps": 3, "cuts": 0, "smoothing": 1e-3},
+    "ground": {"friction": 0.6},
+    "body": [
+        {"name": "hull", "mass": 2.0, "inertia": [0.01, 0.02, 0.02], "position": [0, 0, 0.55]},
+        {"name": "thigh", "mass": 1.0, "inertia": [0.01, 0.01, 0.002], "position": [0, 0, 0.4]},
+        {
+            "name": "shin",
+            "shape": {"spheres": [{"radius": 0.03, "centre": [0, 0, -0.1]}]},
+            "mass": 0.5,
+            "inertia": [5e-3, 5e-3, 1e-3],
+            "position": [0, 0, 0.14],
+        },
+    ],
+    "joint": [
+        {"name": "rail", "between": ["world", "hull"], "slider": {"axis": [0, 0, 1]}},
+        {
+            "name": "hip",
+            "between": ["hull", "thigh"],
+            "universal": {"axes": [[0, 1, 0], [1, 0, 0]]},
+            "point": [0, 0, 0.52],
+            "motor": {"velocity": {"torque": 5, "velocity": 6}},
+            "limits_deg": [-40, 60],
+        },
+        {
+            "name": "knee",
+            "between": ["thigh", "shin"],
+            "hinge": {"axis": [0, 1, 0]},
+            "point": [0, 0, 0.27],
+            "motor": SERVO,
+            "spring": {"stiffness": 5, "damping": 0.1},
+        },
+    ],
+    "variable": [
+        {"name": "bend", "sets": "knee.command", "knots": 3, "guess": [-0.2, -0.5, 0.1]},
+        {"name": "swing", "sets": "hip.command", "guess": [0.5, 0.3]},
+        {"name": "fall", "sets": ["hull.velocity[2]", "thigh.velocity[2]", "shin.velocity[2]"], "guess": -1.5},
+        {"name": "stiff", "sets": "knee.stiffness"},
+    ],
+    "cost": [
+        {"name": "place", "value": "sumsqr([hull.position[2] - 0.4, hip.angle, 0.1 * knee.rate])"},
+        {"name": "effort", "at": "always", "squares": "knee.torque", "weight": 0.01},
+    ],
+}
 FEEDBACK: Tables = {
     "sensor": [
         {"name": "state", "reads": ["hinge.angle", "hinge.rate", "sin(9 * time)"]},
@@ -146,8 +190,10 @@ FEATURES: dict[str, Tables] = {
         contact={"torsion": 2e-3, "rolling": 0.01},
         ground={"friction": 0.4},
     ),
+    "terrain": thrown(terrain=[{"name": "hill", "height": "0.02 * sin(6 * x)", "friction": 0.3}]),
     "steps that are not cut": thrown(simulation={"cuts": 0, "time_of_impact": False}),
     "load on two boards": BOARDS,
+    "a leg that lands": LEG,
     "forces over time": thrown(
         varied("ball.mass"), PUSH, {**PUSH, "name": "lean", "sets": "ball.torque[1]", "interpolation": "linear"}
     ),
@@ -205,7 +251,7 @@ FEATURES: dict[str, Tables] = {
         *map(varied, ("ball.second_moments", "ball.correlations", "ball.centre_of_mass", "ground.tilt")),
         body=[DUMBBELL],
     ),
-    "phases": swung(
+    "numbers that phases set": swung(
         varied("late.gravity[2]"),
         varied("early.hinge.gain"),
         phase=[
@@ -213,6 +259,14 @@ FEATURES: dict[str, Tables] = {
             {"name": "late", "sets": {"gravity": [0.5, 0.0, -3.0], "hinge.torque": 200.0}},
         ],
         more=[{"name": "then", "during": "late", "squares": "hinge.rate"}],
+    ),
+    "contact that phases set": thrown(
+        *map(varied, ("early.ground.friction", "late.ground.restitution", "ground.friction")),
+        phase=[
+            {"name": "early", "share": 0.4, "sets": {"ground.friction": 0.1}},
+            {"name": "late", "sets": {"ground.restitution": 0.8, "gravity": [0.5, 0, -30]}},
+        ],
+        constraint=[{"name": "cone", "at": "always", "value": "ground.friction * ball.position[2]", "upper": 0.03}],
     ),
     "free duration": thrown({"name": "T", "sets": "simulation.duration", "guess": 0.15}),
     "force laws": thrown(
@@ -225,8 +279,9 @@ FEATURES: dict[str, Tables] = {
                 "value": "-drag.c * norm(ball.velocity) * ball.velocity",
                 "numbers": {"c": 0.05},
             },
-            {"name": "gust", "on": "ball.force[0]", "value": "sin(5 * time) - ball.position[2]"},
+            {"name": "gust", "on": "ball.force[0]", "during": "windy", "value": "sin(5 * time) - ball.position[2]"},
         ],
+        phase=[{"name": "calm", "share": 0.3}, {"name": "windy"}],
     ),
     "references": thrown(
         varied("path.delay", 0.013),
