@@ -36,6 +36,7 @@ def test_a_start_loads_no_scipy() -> None:
     assert done.stdout.strip() == "False"
 
 
+@pytest.mark.slow
 def test_a_second_start_loads_nothing_that_makes_kernels(tmp_path: Path) -> None:
     """It has neither the step of the dynamics nor what writes C; the first start has both."""
     makers = ("codegen.emit.plan", "codegen.slopes", "codegen.cuda", "dynamics.step", "transcription.staged.tangent")
@@ -60,6 +61,7 @@ EXAMPLES = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

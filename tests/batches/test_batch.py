@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.batches import run_batch
 from symphys.problem import Problem, load_problem
@@ -117,6 +118,7 @@ def test_a_file_says_which_solvers_it_is_for(problem_file: Path, tmp_path: Path)
     assert [(job.config.solver, job.chosen) for job in named] == [("ipopt", "")]
 
 
+@pytest.mark.slow
 def test_workers_do_what_one_process_does(problem_file: Path, tmp_path: Path, recorder: Any) -> None:
     problem = load_problem(problem_file)
     here = make_jobs([problem], ["gradient", "least_squares"], [0], {}, tmp_path / "here")
@@ -159,7 +161,7 @@ def test_a_process_that_dies_fails_its_own_run_only(
     assert all("died" in result.advice for result in batch.results[2:] if result)
 
 
-@pytest.mark.parametrize("name", ["gradient", "least_squares", "ipopt", "cma"])
+@few("name", ["gradient", "least_squares", "ipopt", "cma"], 1)
 def test_every_solver_goes_on_from_its_file_as_if_nothing_had_been(
     problem_file: Path, tmp_path: Path, recorder: Any, name: str
 ) -> None:

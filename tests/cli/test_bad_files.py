@@ -126,6 +126,7 @@ def test_a_file_with_nothing_to_solve_is_shown(run: Run, write: Callable[[str], 
     assert Path(out.strip()).exists()
 
 
+@pytest.mark.slow
 def test_what_the_message_says_to_add_makes_it_solvable(run: Run, write: Callable[[str], Path]) -> None:
     path = write(WORLD)
     advice = [line.partition("for instance, ")[2] for line in run("solve", path)[2].splitlines()]

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tools.repeats import few
 
 import symphys
 from symphys import problems
@@ -69,6 +70,7 @@ def test_what_an_unsolved_run_misses_has_a_unit_and_the_bound_that_holds_it_back
     assert f"unreachable least_squares: 2 of 2 seeds end at {bound}" in out
 
 
+@pytest.mark.slow
 def test_what_is_met_by_a_motion_that_cannot_be_exits_1_with_its_reasons(run: Run, throw: Path) -> None:
     """The ball may begin anywhere, and begins in the ground; with and without an examination."""
     text = throw.read_text(encoding="utf-8").replace("ball.velocity[0:2]", "ball.position[2]")
@@ -109,6 +111,7 @@ def test_seeds_and_settings_reach_the_runs(run: Run, throw: Path) -> None:
     assert config["options"]["iterations"] == 30
 
 
+@pytest.mark.slow
 def test_other_settings_overwrite_nothing_in_either_order(
     run: Run, throw: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -130,6 +133,7 @@ def test_other_settings_overwrite_nothing_in_either_order(
         assert err.splitlines() == [f"{case} least_squares seed 0: done before (solved)"]
 
 
+@pytest.mark.slow
 def test_workers_solve_too(run: Run, throw: Path) -> None:
     code, out, err = run("solve", throw, "--solver", "gradient,least_squares", "--jobs", "2", *QUICK)
     assert code == 0 and out.count("1/1") == 2
@@ -211,6 +215,7 @@ def test_a_failing_run_stops_no_other(run: Run, throw: Path, tmp_path: Path) -> 
     assert "0/1" in out and "1/1" in out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("whole_report")
 def test_report_is_made_again(run: Run, throw: Path) -> None:
     run("solve", throw, "--solver", "gradient", *QUICK)
@@ -276,7 +281,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert not loaded & {"casadi", "numpy", "scipy", "cma", "matplotlib", "pydantic", "rich"}
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@few("jobs", [1, 2], 1)
 def test_ctrl_c_saves_and_the_same_command_goes_on(throw: Path, tmp_path: Path, jobs: int) -> None:
     command = [sys.executable, "-m", "symphys", "solve", str(throw), "--solver", "cma", "--seeds", "2", *LONG]
     command += ["--jobs", str(jobs)]
@@ -294,6 +299,7 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(throw: Path, tmp_path: Path, 
     assert all((folder / "checkpoint.json").exists() for folder in folders)
 
 
+@pytest.mark.slow
 def test_a_backend_is_chosen_and_told(run: Run, throw: Path) -> None:
     assert run("solve", throw, "--solver", "least_squares", *QUICK)[0] == 0
     found = read_result(Path("reports/throw/least_squares-seed0/result.json"))
@@ -330,6 +336,7 @@ def test_the_help_names_every_backend(run: Run) -> None:
     assert "|".join(sorted(NAMES, key=["auto", "casadi", "c", "simd", "simd32", "cuda", "cuda32"].index)) in out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("whole_report")
 def test_no_report_leaves_pages_out_and_report_makes_them_later(run: Run, throw: Path) -> None:
     code, out, _ = run("solve", throw, "--solver", "least_squares", "--no-report", *QUICK)
@@ -344,6 +351,7 @@ def test_no_report_leaves_pages_out_and_report_makes_them_later(run: Run, throw:
     assert run("report", "reports", "--all", "--new")[0] == 2
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("whole_report")
 def test_a_page_that_cannot_be_made_is_named_and_exits_3(run: Run, throw: Path) -> None:
     """Of two runs that are solved one has no place for its page; the other page and that of the batch are made."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tools.repeats import few
 
 from symphys import problems
 
@@ -21,6 +22,7 @@ def test_a_copy_is_the_problem(run: Run, name: str) -> None:
     assert run("show", "mine.toml")[0] == 0
 
 
+@pytest.mark.slow
 def test_a_robot_is_to_be_included(run: Run) -> None:
     code, out, _ = run("new", "leg.toml", "--from", "hopper")
     assert code == 0 and 'file = "leg.toml"' in out
@@ -48,7 +50,7 @@ def test_the_text_of_what_is_shipped(run: Run) -> None:
         assert (code, out) == (0, path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("robot", ["robots/arm.toml", "hopper", "cart_pendulum"])
+@few("robot", ["robots/arm.toml", "hopper", "cart_pendulum"], 1)
 def test_a_robot_alone(run: Run, robot: str) -> None:
     code, out, _ = run("show", robot, "--set", "simulation.duration=0.1")
     assert code == 0 and Path(out.strip()).is_file()

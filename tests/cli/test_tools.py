@@ -126,6 +126,7 @@ def test_a_package_that_is_not_there(monkeypatch: Patch) -> None:
     assert "pip install no-such-package" in found.text
 
 
+@pytest.mark.slow
 def test_export_writes_both(run: Run, throw: Path) -> None:
     code, out, _ = run("export", throw, "--c", "c", "--casadi", "functions", "--set", "simulation.duration=0.4")
     assert code == 0

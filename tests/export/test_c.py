@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.codegen import KernelUnavailable
 from symphys.codegen.toolchain.compiler import find_compiler
@@ -58,7 +59,7 @@ def example(folder: Path, name: str, *z: float) -> dict[str, float]:
     return {line.rpartition(" ")[0].rstrip(":"): float(line.rpartition(" ")[2]) for line in done.stdout.splitlines()}
 
 
-@pytest.mark.parametrize("problem", ["kick", "ball_throw"])
+@few("problem", ["kick", "ball_throw"], 1)
 def test_the_example_prints_the_numbers_of_python(problem: str, kick: Transcription, tmp_path: Path) -> None:
     one = kick if problem == "kick" else transcribe(load_problem(find(problem)), backend="casadi")
     name = identifier(one.problem.name)
@@ -86,6 +87,7 @@ def test_the_example_refuses_what_is_no_z(folder: Path) -> None:
         assert "7 numbers" in done.stderr
 
 
+@pytest.mark.slow
 def test_steps_from_the_start_are_the_rollout(kick: Transcription, folder: Path, library: Any) -> None:
     define = defined(folder)
     z, (nx, nu, steps) = kick.shooting.start(1), (define[key] for key in ("X", "U", "STEPS"))

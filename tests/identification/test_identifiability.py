@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from data.analytic_recordings import TRUTHS, Array, Truth, recordings, slide
+from tools.repeats import few
 
 from symphys.identification import FitOptions, IdentificationOptions, fit_parameters, identify
 from symphys.identification.inference.advice import GENERAL, advice
@@ -62,7 +63,7 @@ CASES: dict[str, tuple[Callable[..., Array], tuple[str, ...], list[float], str]]
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@few("case", CASES, 2)
 def test_an_open_direction_is_named_in_each_draw(case: str) -> None:
     model, names, values, text = CASES[case]
     found = [named(model, names, values, seed) for seed in SEEDS]

@@ -42,6 +42,7 @@ def both(*parts: tuple[Array, NDArray[np.int64]]) -> tuple[Array, NDArray[np.int
     )
 
 
+@pytest.mark.slow
 @first("kind", SIZES)
 def test_a_mesh_of_a_shape_is_that_shape(kind: str) -> None:
     """Turned and shifted, up to the coarseness of its triangles."""
@@ -75,6 +76,7 @@ def test_a_dumbbell_is_two_spheres() -> None:
     assert found[0].deviation_mm > 20
 
 
+@pytest.mark.slow
 def test_deviations_are_distances_both_ways() -> None:
     """A ball that is fitted to a cube: its corners lie outside, the ball beyond its faces, by closed forms."""
     half = 0.1

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from data.imported import by_name, model_of, problem_of, read, texts
+from tools.repeats import few
 
 from symphys.importing import fitting
 from symphys.importing.options import ImportOptions
@@ -244,7 +245,7 @@ def gymnasium(name: str) -> Path:
     return Path(spec.submodule_search_locations[0]) / "envs" / "mujoco" / "assets" / f"{name}.xml"
 
 
-@pytest.mark.parametrize(
+@few(
     ("name", "bodies", "frames", "joints", "motors"),
     [
         ("ant", 9, 0, 8, 8),
@@ -253,6 +254,7 @@ def gymnasium(name: str) -> Path:
         ("walker2d", 7, 2, 9, 6),
         ("humanoid", 11, 7, 17, 17),
     ],
+    1,
 )
 def test_gymnasiums_models(name: str, bodies: int, frames: int, joints: int, motors: int) -> None:
     source = read_source(gymnasium(name), ImportOptions())

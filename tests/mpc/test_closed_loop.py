@@ -45,6 +45,7 @@ def changed(duration: float = 0.4, **plant: Any) -> Controller:
     return made
 
 
+@pytest.mark.slow
 def test_it_swings_up_and_holds() -> None:
     record = record_of(swing())
     assert record.done and record.held > 1.0
@@ -147,6 +148,7 @@ def test_a_delayed_command_comes_later() -> None:
     assert loop.u[3] != 0
 
 
+@pytest.mark.slow
 def test_noise_is_repeated_and_has_its_size() -> None:
     made = controller()
     rng = np.random.default_rng(0)

@@ -52,6 +52,7 @@ def merit(z: np.ndarray) -> float:
     return float(objective[0] + np.sum(stages().penalties * beyond**2))
 
 
+@pytest.mark.slow
 def test_a_plan_costs_what_the_staged_problem_says() -> None:
     assert plan().cost == pytest.approx(merit(plan().v.ravel()), rel=1e-12)
 
@@ -133,6 +134,7 @@ def test_a_shift_by_half_a_step_is_halfway() -> None:
     assert moved.v[:-1] == pytest.approx((plan().v[:-1] + plan().v[1:]) / 2)
 
 
+@pytest.mark.slow
 def test_a_cost_in_time_sees_the_time_of_the_tick() -> None:
     """A reference that moves: a plan at t tracks what is wanted from t on."""
     tables = {**TABLES, "cost": [{"name": "track", "at": "always", "squares": "pivot.angle - 0.1 * time"}]}
@@ -150,12 +152,14 @@ def with_cost(**cost: str) -> dict[str, object]:
     return {"cost": [*TABLES["cost"][::2], {"name": "effort", "weight": 0.03, **cost}]}
 
 
+@pytest.mark.slow
 def test_a_control_may_be_named_by_its_variable() -> None:
     """``twist`` is what it sets, ``pivot.command``, at the step that is looked at: plans cost the same."""
     made = Planner(problem_of_tables({**TABLES, **with_cost(at="always", squares="twist")}, "pendulum"), threads=1)
     assert made.first(made.start, 0.0).cost == pytest.approx(planner().first(planner().start, 0.0).cost, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_part_of_a_driven_input_that_a_variable_sets_goes_by_its_name() -> None:
     """The sum of both is not known at the end of a step, and the message says what to write."""
     brake = {"name": "brake", "on": "bob.torque", "value": "-brake.c * bob.angular_velocity", "numbers": {"c": 0.1}}

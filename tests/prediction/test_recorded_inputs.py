@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.commanded import DT, GUESS, SETS, TRUTH, VARIABLES, arm, dense_means, recorded_arm, true_angles
 
 import symphys
@@ -63,7 +64,7 @@ def test_where_jumps_meet_ends_of_steps_the_derivative_is_that_towards_later() -
     np.testing.assert_allclose(step_means(signal, 8, DT, 0.0)[1], later / 1e-6, atol=1e-6)
 
 
-@pytest.mark.parametrize("interpolation", WAYS)
+@few("interpolation", WAYS, 1)
 def test_gain_delay_damping_friction_and_armature_are_found(interpolation: str) -> None:
     """All five within their intervals, from an angle with noise; these are narrow."""
     problem = recorded_arm(interpolation)
@@ -76,7 +77,7 @@ def test_gain_delay_damping_friction_and_armature_are_found(interpolation: str) 
         assert abs(problem.variables[list(SETS).index(name)].guess[0] - truth) > 0.2 * truth, "begins elsewhere"
 
 
-@pytest.mark.parametrize("interpolation", WAYS)
+@few("interpolation", WAYS, 1)
 def test_residuals_have_the_derivatives_of_differences(interpolation: str) -> None:
     """By the numbers of the motor, the delay, and the clock of each recording, which moves its commands too."""
     clock = {"name": "clock", "sets": ["run0.offset", "run1.offset"], "each": "recording", "lower": -0.1}
@@ -121,7 +122,7 @@ HOLD = {"name": "hold", "drives": ["knee.command"], "senses": ["state"], "linear
 GAINS = {"name": "gains", "sets": "hold.gains", "guess": [-0.2, -0.05]}
 
 
-@pytest.mark.parametrize(
+@few(
     "others",
     [
         {},
@@ -130,6 +131,7 @@ GAINS = {"name": "gains", "sets": "hold.gains", "guess": [-0.2, -0.05]}
         {"sensor": [STATE], "controller": [HOLD], "variable": [*VARIABLES, GAINS]},
     ],
     ids=["alone", "beside a variable", "with a force law", "with a controller"],
+    count=1,
 )
 def test_commands_are_added_to_other_inputs(others: dict[str, Any]) -> None:
     """The compiled rollout, in which each step reads its command, and casadi's, which has all in one vector, agree."""
@@ -149,6 +151,7 @@ def test_units_of_a_motors_numbers() -> None:
     assert residuals_of(recorded_arm("constant"), 1).shared.units == ("", "s", "N m s/rad", "N m", "kg m^2")
 
 
+@pytest.mark.slow
 def test_what_would_determine_a_joints_friction() -> None:
     """Not a slide, as for a surface."""
     still = {"name": "still", "rate": 50.0, "table": {"q": [0.0] * 20}}

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tools.repeats import few
 
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
@@ -50,7 +51,7 @@ def integrated(shapes: tuple[Shape, ...]) -> tuple[float, Array]:
     return len(held) * (side[1] - side[0]) ** 3, np.trace(second) * np.eye(3) - second
 
 
-@pytest.mark.parametrize(
+@few(
     "shapes",
     [
         (Sphere(0.31),),
@@ -59,6 +60,7 @@ def integrated(shapes: tuple[Shape, ...]) -> tuple[float, Array]:
         (Box((0.1, 0.2, 0.3), (0.05, 0.1, -0.1), TILTED),),
         (Capsule(0.15, 0.3, (0.0, 0.1, 0.1), TILTED), Box((0.2, 0.1, 0.15), (-0.2, 0.1, 0.0)), Sphere(0.2)),
     ],
+    2,
 )
 def test_volume_and_inertia_are_those_of_integrals(shapes: tuple[Shape, ...]) -> None:
     held, expected = integrated(shapes)

@@ -172,6 +172,7 @@ def test_inner_edges_of_a_cylinder() -> None:
     np.testing.assert_allclose(lying[..., 0], 0.5)
 
 
+@pytest.mark.slow
 @NODE
 @pytest.mark.parametrize("radius", [0.0, 0.2])
 def test_support_of_the_script(radius: float) -> None:

@@ -153,6 +153,7 @@ def test_an_axis_shows_limits_that_are_near_and_no_noise_at_large() -> None:
     assert axis_range(np.array([0.0, 1.0]), [100.0], 0.1)[1] < 1.2
 
 
+@pytest.mark.slow
 def test_the_page_has_joints_gait_and_strip(run_dir: Path) -> None:
     arrays = worked()
     arrays["contact_force"][:10, 1, 2] = 50.0
@@ -167,6 +168,7 @@ def test_the_page_has_joints_gait_and_strip(run_dir: Path) -> None:
     assert 'href="#gait"' in text
 
 
+@pytest.mark.slow
 def test_a_page_without_joints_has_none_of_it(run_dir: Path, edit: Callable[..., None]) -> None:
     def body(page: Path) -> bytes:
         return page.read_bytes().partition(b"<body>")[2]
@@ -196,6 +198,7 @@ def test_joints_that_cannot_be_read_are_left_out(load: Load, broken: dict[str, A
     assert [joint.name for joint in load(motion(), {**SCENE, "joints": joints})[1].joints] == ["fl_knee"]
 
 
+@pytest.mark.slow
 @first("scene", [{"joints": SCENE["joints"][:1]}, {}, {"joints": None}, {**SCENE, "bodies": []}])
 def test_any_scene_of_a_motion_with_joints_can_be_drawn(tmp_path: Path, scene: dict[str, Any]) -> None:
     folder = write_walker(tmp_path, worked(), scene)

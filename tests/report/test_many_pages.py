@@ -87,6 +87,7 @@ def test_a_motion_that_cannot_be_drawn_ends_no_page_of_others(
     assert "The motion could not be drawn" in text and "Pages that could not be made" in text
 
 
+@pytest.mark.slow
 def test_pages_that_take_too_long_are_given_up(runs: list[Path]) -> None:
     """Their workers are killed, and others take their places."""
     made = make_pages(WantedPages(runs[0].parents[1], tuple(runs[:2])), "light", limit=0.0)
@@ -204,6 +205,7 @@ def test_a_page_that_is_kept_is_the_page_that_would_be_made(runs: list[Path]) ->
     assert not any(page.stat().st_ino == number for page, (_, number) in pages.items())
 
 
+@pytest.mark.slow
 def test_the_page_of_the_batch_follows_what_it_shows(runs: list[Path]) -> None:
     """A run that changes, comes, goes, or loses its page, which it would link to."""
     root = runs[0].parents[1]

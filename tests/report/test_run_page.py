@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.report import write_run_report
 from symphys.report.pages.verification import NOT_EXAMINED
@@ -125,6 +126,7 @@ def test_knots_and_controls_are_drawn(batch: Path) -> None:
     assert {"controls.svg", "variables.svg"} <= {p.name for p in (batch / "two_balls/gradient-seed0/figures").iterdir()}
 
 
+@pytest.mark.slow
 def test_what_is_told_is_shown_and_drawn(run_dir: Path, edit: Callable[..., None]) -> None:
     """The number with that of the guess, and its way."""
     guess = json.loads((run_dir / "result.json").read_text()).get("guess") or {}
@@ -180,13 +182,14 @@ def test_text_from_files_is_escaped(run_dir: Path, edit: Callable[..., None]) ->
     assert all("<script" not in path.read_text(encoding="utf-8") for path in (run_dir / "figures").glob("*.svg"))
 
 
-@pytest.mark.parametrize("text", ["$\\frac{$", "球 \N{ROCKET}", "\x00\x1b\ud800", "a" * 5000, ""])
+@few("text", ["$\\frac{$", "球 \N{ROCKET}", "\x00\x1b\ud800", "a" * 5000, ""], 1)
 def test_any_name_can_be_drawn(run_dir: Path, edit: Callable[..., None], text: str) -> None:
     found = json.loads((run_dir / "result.json").read_text())
     edit(run_dir / "result.json", title=text, solver=text, checks=[{**c, "name": text} for c in found["checks"]])
     assert "Targets and constraints" in read(run_dir)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OPTIONAL)
 def test_any_file_but_the_result_may_be_missing(run_dir: Path, name: str) -> None:
     (run_dir / name).unlink()

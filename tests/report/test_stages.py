@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.report import write_batch_report, write_run_report
 from symphys.report.figures.convergence import Curve, best_so_far, curve, violation_so_far
@@ -148,12 +149,13 @@ def test_a_stage_without_rows_has_its_place_in_the_table_only(staged: Path, edit
     assert "0.05 m/s not finite" in text_of(write_run_report(staged))
 
 
-@pytest.mark.parametrize("stages", [None, 3, {}, ["x"], [{}], [{"smoothing": "much", "counts": 3}]])
+@few("stages", [None, 3, {}, ["x"], [{}], [{"smoothing": "much", "counts": 3}]], 2)
 def test_damaged_stages_do_no_harm(staged: Path, edit: Edit, stages: Any) -> None:
     edit(staged / "result.json", stages=stages, guess=stages)
     assert "Solved" in text_of(write_run_report(staged))
 
 
+@pytest.mark.slow
 def test_the_page_of_a_batch_says_who_used_stages(batch: Path, edit: Edit) -> None:
     path = batch / "ball_throw" / "gradient-seed1" / "result.json"
     assert "stages of smoothing" not in text_of(write_batch_report(batch))

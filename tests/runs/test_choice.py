@@ -81,6 +81,7 @@ def test_those_that_are_named_are_taken(tmp_path: Path) -> None:
     assert [(job.config.solver, job.chosen) for job in make_jobs([named], None, [0], {}, tmp_path)] == [("cma", "")]
 
 
+@pytest.mark.slow
 def test_solvers_that_are_chosen_are_for_such_problems() -> None:
     """With scenarios or without, as ``Solver.scenarios`` says; of shipped problems, step by step where they must be."""
     for each in SITUATIONS:

@@ -124,6 +124,7 @@ def test_without_room_for_its_copy_ipopt_does_without_the_kernel(
     )
 
 
+@pytest.mark.slow
 def test_compiled_functions_that_cannot_be_loaded_give_way_to_casadi(
     problem_file: Path, compiler: None, monkeypatch: Patch
 ) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from data.shipped import seeds
+from tools.repeats import few
 from worlds.toys import solve
 
 import symphys.problems
@@ -58,7 +59,7 @@ def test_least_squares(backend: str, distance: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hessian", ["limited-memory", "exact"])
+@few("hessian", ["limited-memory", "exact"], 2)
 @every_throw
 def test_ipopt(backend: str, distance: float, hessian: str) -> None:
     assert solve("ipopt", throw(distance, backend), options={"hessian": hessian}).status is Status.MET

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.toys import PLAIN, failing, rosenbrock, solve, stop_at, target, through_json, values
 
 from symphys.errors import SymphysError
@@ -34,10 +35,8 @@ def same(a: Outcome, b: Outcome) -> None:
     np.testing.assert_array_equal(rows[0], rows[1])
 
 
-@pytest.mark.parametrize(("name", "options"), EXACT)
-@pytest.mark.parametrize(
-    "problem", [pytest.param(rosenbrock(), id="rosenbrock"), pytest.param(target(), id="target", marks=THOROUGH)]
-)
+@few(("name", "options"), EXACT, 2)
+@few("problem", [pytest.param(rosenbrock(), id="rosenbrock"), pytest.param(target(), id="target", marks=THOROUGH)], 2)
 def test_the_same_to_the_last_bit(name: str, options: dict[str, Any], problem: Any) -> None:
     whole = solve(name, problem, seed=2, options=options)
     for stop in {0, 1, 2, len(whole.trace) // 2, len(whole.trace) - 2, len(whole.trace) - 1}:

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.toys import PLAIN, failing, solve, stop_at, through_json, toy, values
 
 from symphys.errors import SymphysError
@@ -174,9 +175,7 @@ def test_a_foreign_error_belongs_to_its_stage() -> None:
 
 @pytest.mark.slow
 @replayed
-@pytest.mark.parametrize(
-    "problem", [pytest.param(moving(), id="moving", marks=pytest.mark.thorough), pytest.param(bent(), id="bent")]
-)
+@few("problem", [pytest.param(moving(), id="moving", marks=pytest.mark.thorough), pytest.param(bent(), id="bent")], 1)
 def test_goes_on_in_any_stage_to_the_last_bit(name: str, problem: ShootingProblem) -> None:
     whole = solve(name, problem, seed=2)
     first, second = (sum(row.smoothing >= smoothing for row in whole.trace) for smoothing in SMOOTHINGS[:2])

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.toys import Counted, counted, failing, quadratic, rosenbrock, solve, stop_at, target
 
 from symphys.errors import SymphysError
@@ -46,7 +47,7 @@ def test_each_is_that_of_the_solve_alone(name: str, problem: Any) -> None:
 
 
 @descents
-@pytest.mark.parametrize("backend", ["casadi", "auto"])
+@few("backend", ["casadi", "auto"], 1)
 def test_on_a_throw(name: str, backend: str) -> None:
     problem = transcribe(load_problem(find("ball_throw")), backend=backend).shooting
     for seed, found in enumerate(together(name, problem, range(4))):

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from tools.repeats import few
 from worlds.shots_of_toys import LINE, SWING, WAYS, defect, every_backend, every_way, program, solve
 from worlds.staged_toys import Chain, acrobot, attitude, boxed, pendulum
 from worlds.toys import stop_at, through_json
@@ -18,9 +19,7 @@ from symphys.solvers.methods.multiple_shooting import DEFECT
 from symphys.solvers.multiple_shooting.multipliers import fitted
 
 
-@pytest.mark.parametrize(
-    ("backend", "hessian", "every"), [(*way, every) for way, every in zip(WAYS, (1, 4, 4, 1), strict=True)]
-)
+@few(("backend", "hessian", "every"), [(*way, every) for way, every in zip(WAYS, (1, 4, 4, 1), strict=True)], 1)
 def test_acrobot_swings_up_from_a_straight_line(backend: str, hessian: str, every: int) -> None:
     """Hanging to upright through states that no motion has, without a guess of the controls."""
     problem = boxed(acrobot())
@@ -96,7 +95,7 @@ def test_limits_of_controls_and_of_the_path(backend: str, hessian: str) -> None:
     assert found.trace[-1].max_violation < 1
 
 
-@pytest.mark.parametrize("stop", [0, 7, 25])
+@few("stop", [0, 7, 25], 1)
 @every_backend
 def test_what_was_interrupted_comes_to_the_same_answer(backend: str, stop: int) -> None:
     """Through the checkpoint's nodes: the rollout of its z alone is not where the solve was."""
@@ -123,7 +122,7 @@ def test_multipliers_of_a_checkpoint_shorten_the_rest() -> None:
 
 
 @every_backend
-@pytest.mark.parametrize("first", ["ipopt", "fatrop"])
+@few("first", ["ipopt", "fatrop"], 1)
 def test_multipliers_of_a_solution_shorten_a_solve_from_there(first: str, backend: str) -> None:
     """Of limits that bind; whichever library found them. Twice as many steps between the same nodes take them too."""
     chain = pendulum(fast=4.0, knots=11)

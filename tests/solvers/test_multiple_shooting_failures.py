@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.shots_of_toys import LINE, SWING, every_backend, solve
 from worlds.staged_toys import Chain, acrobot, boxed, pendulum
 from worlds.toys import quadratic, stop_at, through_json
@@ -20,8 +21,8 @@ from symphys.solvers import SOLVERS, MultipleShootingOptions, Status
 
 
 @every_backend
-@pytest.mark.parametrize("kind", ["step", "linearize", "expand"])
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), RuntimeError("out of order"), MemoryError("72 TiB")])
+@few("kind", ["step", "linearize", "expand"], 4)
+@few("error", [KeyboardInterrupt(), RuntimeError("out of order"), MemoryError("72 TiB")], 4)
 def test_what_an_evaluation_raises(backend: str, kind: str, error: BaseException, monkeypatch: Any) -> None:
     """An interruption goes on from the last iterate, all else is a failure; neither is lost in the library."""
     chain = acrobot()
@@ -184,6 +185,7 @@ def test_a_checkpoint_of_another_grid_is_damaged() -> None:
         solve(problem, steps_between_nodes=5, checkpoint=through_json(part.checkpoint))
 
 
+@pytest.mark.slow
 def test_options_reach_the_library() -> None:
     """A barrier that begins low, or a line of IPOPT's text."""
     problem = boxed(pendulum(), 8.0)

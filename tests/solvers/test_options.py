@@ -156,6 +156,7 @@ def test_rates_share_the_iterations() -> None:
     assert [row.step for row in found.trace[1:]] == pytest.approx([0.5 * 3**0.5] * 2 + [0.05 * 3**0.5] * 2, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_pycma_is_loaded_by_prepare_and_not_before() -> None:
     tell = "'cma' in sys.modules"
     code = f"import sys; from symphys.solvers import solver; print({tell}); solver('cma').prepare(); print({tell})"

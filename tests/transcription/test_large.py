@@ -239,6 +239,7 @@ def test_values_and_gradients(both: tuple[Transcription, LargeTranscription], sm
     assert np.allclose(a.merit, alone.merit, rtol=1e-12) and np.allclose(a.errors, alone.errors, rtol=1e-12)
 
 
+@pytest.mark.slow
 @problems(HOPS[0])
 def test_gradient_by_differences(both: tuple[Transcription, LargeTranscription]) -> None:
     """Of a leg that lands on its foot, by weights and start."""
@@ -286,6 +287,7 @@ def test_judge_and_motion(both: tuple[Transcription, LargeTranscription]) -> Non
             assert np.allclose(values, motions[1][name], rtol=1e-9, atol=1e-9, equal_nan=True), name
 
 
+@pytest.mark.slow
 @problems(LIFTS[0])
 def test_examination(
     both: tuple[Transcription, LargeTranscription], examined: tuple[dict[str, Any], dict[str, Any]]
@@ -304,6 +306,7 @@ def test_examination(
     assert (b["fault"], b["smoothed"]) == ("", [pytest.approx(row) for row in a["smoothed"]])
 
 
+@pytest.mark.slow
 @problems(HOPS[0])
 def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]) -> None:
     """Nets in single precision cost six digits, not more."""
@@ -316,6 +319,7 @@ def test_single_precision_of_nets(both: tuple[Transcription, LargeTranscription]
     assert not np.array_equal(a.gradient, b.gradient)
 
 
+@pytest.mark.slow
 @needs_compiler
 @problems(LIFTS[0])
 def test_nets_on_a_device(
@@ -339,6 +343,7 @@ def test_nets_on_a_device(
     assert growth["factor"] == pytest.approx(examined[1]["growth"]["factor"], rel=1e-7)
 
 
+@pytest.mark.slow
 @needs_compiler
 @problems(LIFTS[0])
 def test_a_device_that_cannot_multiply(

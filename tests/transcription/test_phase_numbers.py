@@ -43,6 +43,7 @@ def made_of(tables: dict[str, Any], **simulation: Any) -> Transcription:
     return transcribe(problem, backend="casadi")
 
 
+@pytest.mark.slow
 def test_a_sled_slides_over_ice_then_asphalt() -> None:
     """Before it stops: velocities exact, places of second order, and exact where no impact may split a step."""
     tables = {**SLED, "phase": [{**SLED["phase"][0], "share": 2 / 3}, {"name": "asphalt"}]}
@@ -56,6 +57,7 @@ def test_a_sled_slides_over_ice_then_asphalt() -> None:
     assert off[0] < 1e-3 and off[1] == pytest.approx(off[0] / 4, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [0.02, 0.01, 0.005])
 def test_the_stopping_distance_and_its_slopes(dt: float) -> None:
     """x = v0 t - mu g t^2 / 2 + v1^2 / 2 mu' g; it stops within a step, so that slopes are of first order."""
@@ -180,6 +182,7 @@ def test_gravity_and_motors_change_at_their_time() -> None:
     assert motion["cart.position"][-1, 0] == pytest.approx(0.16 / 3 + w * 0.6 + 0.36, abs=1e-13)
 
 
+@pytest.mark.slow
 def test_phases_scale_with_a_free_duration() -> None:
     """Twice as long: x = v0 T/2 - ..., with half of the time on ice."""
     free = {"name": "T", "sets": "simulation.duration", "guess": 0.8}
@@ -190,6 +193,7 @@ def test_phases_scale_with_a_free_duration() -> None:
     assert interpret(program, z, [0.0])["merit"] == pytest.approx(made.judge(z).objective, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_phase_that_sets_nothing_costs_nothing() -> None:
     """The program is that of a problem without phases, operation by operation."""
     plain = {key: value for key, value in SLED.items() if key not in ("phase", "output")}

@@ -84,6 +84,7 @@ def test_one_kernel_is_compiled_for_all_points() -> None:
     assert program.z.size == 6 + 6  # mass, friction, radius, gravity
 
 
+@pytest.mark.slow
 def test_points_that_differ_in_more_have_kernels_of_their_own() -> None:
     """Here in a tolerance, which is a number of the program."""
     found = points("ball.mass=0.5,0.7", "target.there.tolerance=0.01,0.02", tables={})

@@ -89,6 +89,7 @@ def test_discounted_adjoints_end_at_the_termination(ball: Transcription) -> None
     assert gradient[0] == pytest.approx([ball.judge(np.array([1.0, 0, 0])).costs["ahead"], 0, 0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_without_a_termination_it_is_as_if_there_were_none(path: Path) -> None:
     """To the bit."""
     free = path.with_name("free.toml")

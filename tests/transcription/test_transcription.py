@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.pushed import PUSHED
 
 from symphys.problem import load_problem
@@ -82,7 +83,7 @@ def test_constraints_reach_nlp_solvers_step_by_step(pushed):
     assert (pushed.shooting.constraint_upper == 1.5).all()
 
 
-@pytest.mark.parametrize("backend", ["casadi", "auto"])
+@few("backend", ["casadi", "auto"], 1)
 def test_every_evaluation_has_a_price(tmp_path, backend):
     """Also the Jacobian of constraints, where a cost is no sum of squares."""
     file = tmp_path / "priced.toml"

@@ -224,6 +224,7 @@ value = "8 * brick.position[2]"
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("backend", "brick"), [("casadi", True), ("simd", False), thorough("casadi", False), thorough("simd", True)]
 )

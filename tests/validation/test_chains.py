@@ -7,6 +7,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.dynamics.functions import report_function
 from symphys.model.shapes import Plane
@@ -48,15 +49,16 @@ def test_a_cradle_with_gaps_hands_the_blow_on(gap: float) -> None:
     assert cradle.ambiguous == 0
 
 
+@pytest.mark.slow
 def test_enough_cuts_or_a_small_step_resolve_it_in_time() -> None:
     """Four impacts 1 ms apart."""
     assert Cradle(1e-3, Scheme(dt=0.01, cuts=4)).crowded == 0
     assert Cradle(1e-3, Scheme(dt=0.0005)).crowded == 0
 
 
-@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
-@pytest.mark.parametrize("speed", [1.0, 3.0, 10.0])
-@pytest.mark.parametrize("gap", [0.0, 1e-3, 5e-3])
+@few("e", [0.0, 0.5, 1.0], 3)
+@few("speed", [1.0, 3.0, 10.0], 3)
+@few("gap", [0.0, 1e-3, 5e-3], 3)
 def test_a_chain_adds_no_energy(gap: float, speed: float, e: float) -> None:
     """However fast the blow is beside a ball's size in a step."""
     cradle = Cradle(gap, Scheme(dt=0.01), e, speed=speed)

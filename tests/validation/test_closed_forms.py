@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from tools.laboratory import Lab, value_and_gradient
+from tools.repeats import few
 
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
@@ -164,8 +165,8 @@ def test_rolling_friction_slows_a_rolling_ball():
     assert states["ball.position"][-1, 0] == pytest.approx(1 / (2 * a), abs=1e-5)
 
 
-@pytest.mark.parametrize("masses", [(1, 1, 1), (1, 8, 1), (1, 1, 1, 1, 8)])
-@pytest.mark.parametrize("e", [0.0, 0.5])
+@few("masses", [(1, 1, 1), (1, 8, 1), (1, 1, 1, 1, 8)], 1)
+@few("e", [0.0, 0.5], 1)
 def test_stacks_of_spheres_stand(masses, e):
     """Placed with gaps, dropped on each other: at rest at the right heights."""
     balls = [Body.ball(f"s{i}", 0.2, float(m)) for i, m in enumerate(masses)]

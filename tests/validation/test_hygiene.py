@@ -97,6 +97,7 @@ number = st.floats(-1, 1)
 vector = st.tuples(number, number, number)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(vector, vector, vector, vector, st.sampled_from(sorted(LAWS)), st.sampled_from(SMOOTHINGS), st.booleans())
 def test_random_scenes_are_finite(a, b, va, wa, law, smoothing, snap):
@@ -149,6 +150,7 @@ def random_impact():
 POINT = [0.9, 0.9, -0.4, 3.0, 1.3, 0.21, 0.4, 0.6]
 
 
+@pytest.mark.slow
 def test_gradients_agree_with_central_differences():
     """Also in mass, radius, friction and restitution, through impacts with friction of a turning compound."""
     final = random_impact()
@@ -158,6 +160,7 @@ def test_gradients_agree_with_central_differences():
     assert slope == pytest.approx(reference, abs=1e-6 * np.abs(reference).max())
 
 
+@pytest.mark.slow
 def test_the_check_rejects_a_wrong_derivative():
     """The same comparison fails when one path of the derivative is cut."""
     final = random_impact()
@@ -166,6 +169,7 @@ def test_the_check_rejects_a_wrong_derivative():
     assert slope != pytest.approx(reference, abs=1e-6 * np.abs(reference).max())
 
 
+@pytest.mark.slow
 def test_forward_results_do_not_depend_on_gradients():
     """Bit-identical values with and without derivatives in the same function, and from call to call."""
     final = random_impact()

@@ -208,6 +208,7 @@ def test_a_box_lands_on_a_seam(beside: float) -> None:
     assert np.abs(it["angular_velocity"][-1]).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_a_slope_over_a_seam_is_finite_and_that_of_the_closed_form() -> None:
     """How far a box slides by its speed at the start: the time, whatever lies below."""
     cube, speed = boards("cube"), ca.MX.sym("v")

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
-from tools.repeats import first
+from tools.repeats import few, first
 
 from symphys.dynamics.free_rotation import SECOND_ORDER, turned
 from symphys.dynamics.functions import step_function
@@ -53,8 +53,8 @@ def energy(inertia: Any, q: Any, momentum: Array) -> float:
     return float(np.sum(own**2 / np.array(inertia)) / 2)
 
 
-@pytest.mark.parametrize("name", SOLIDS)
-@pytest.mark.parametrize("angle", [0.1, 0.3, 1.0])
+@few("name", SOLIDS, 4)
+@few("angle", [0.1, 0.3, 1.0], 4)
 def test_free_rotation_keeps_its_energy(name: str, angle: float) -> None:
     """L . w is constant; ``angle`` [rad] a step; 200 steps, 10 starts; no drift, bounded by the fourth order."""
     inertia, rng = SOLIDS[name], np.random.default_rng(5)
@@ -141,7 +141,7 @@ def thrown(name: str, speeds: tuple[float, float], count: int) -> Array:
 
 
 @first("speeds", [(5.0, 15.0), (1.0, 5.0)])
-@pytest.mark.parametrize("name", THROWN)
+@few("name", THROWN, 1)
 def test_no_throw_at_a_wall_gains_energy(name: str, speeds: tuple[float, float]) -> None:
     """e = 0.5, mu = 0.5, 10 ms a step: whatever friction and restitution make of a slender body."""
     assert np.all(thrown(name, speeds, 30) < 1 + 1e-6)

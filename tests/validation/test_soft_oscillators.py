@@ -12,6 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from tools.laboratory import Array, Lab
+from tools.repeats import few
 
 from symphys.dynamics.contact.oscillator import response, spring_law
 from symphys.model.joints import BALL, FIXED, SLIDER, Joint, JointFrame
@@ -119,7 +120,7 @@ def test_balls_of_unequal_mass_bounce_off_each_other_softly() -> None:
     assert states["a.position"][-1, 0] == pytest.approx(0.0637 - 0.5 * (0.4 - 0.0637 - 0.1) + 0.25 * 0.1, abs=1e-9)
 
 
-@pytest.mark.parametrize("hz", [10.0, 50.0, 200.0])
+@few("hz", [10.0, 50.0, 200.0], 1)
 def test_a_box_on_soft_ground_gains_no_energy(hz: float) -> None:
     """Up to 12 rad a step, four corners at once; undamped, its energy in flight is at most what it was, within 1 %."""
     side, mass = 0.2, 2.0

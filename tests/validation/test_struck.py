@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from tools.laboratory import Lab
-from tools.repeats import first
+from tools.repeats import few, first
 
 from symphys.model.shapes import Plane
 from symphys.model.world import Body, Law, Pair, Scheme, World, make_world
@@ -49,7 +49,7 @@ def after_cushion(friction: float, e: float = 0.8) -> float:
     return -5 / 7 * e + 2 / 7 * spin
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.1])
+@few("friction", [0.0, 0.1], 1)
 @first("dt", [0.01, 0.0025])
 def test_a_rolling_ball_comes_back_from_a_cushion(friction, dt):
     """Its final speed in closed form; the slope of its final place by its start is that speed too, to order dt."""

@@ -12,6 +12,7 @@ from data.textbook import Array, about_a_point, differences, final, turn
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 from tools.laboratory import Lab
+from tools.repeats import few
 from worlds.linkage import momenta
 
 from symphys.maths import rotation
@@ -101,8 +102,8 @@ def test_free_rotation_converges_at_fourth_order(name: str, turned: float) -> No
     assert errors[:, 2].max() < 1e-11
 
 
-@pytest.mark.parametrize("turned", [0.02, 0.1, 0.3, 0.6, 1.0])
-@pytest.mark.parametrize("name", BODIES)
+@few("turned", [0.02, 0.1, 0.3, 0.6, 1.0], 5)
+@few("name", BODIES, 5)
 def test_free_rotation_keeps_its_energy(name: str, turned: float) -> None:
     """Nothing acts: kinetic energy within 1 %, up to a radian in a step; angular momentum to 1e-9."""
     _, energy_error, momentum_error = turned_freely(name, turned, 0.01)

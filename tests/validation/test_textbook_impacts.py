@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from data.textbook import Array, G, differences, final
 from tools.laboratory import Lab
-from tools.repeats import first
+from tools.repeats import few, first
 from worlds.blocks import turned_by
 
 from symphys.model.shapes import Plane, Sphere
@@ -46,8 +46,8 @@ def two_falling(z: Array, masses: tuple[float, float], e: float, time: float) ->
 
 
 @first("dt", [0.01, 0.001])
-@pytest.mark.parametrize("gap", [0.1, 0.01, 0.001, 1e-5])
-@pytest.mark.parametrize(("masses", "e"), [((5.0, 1.0), 1.0), ((1000.0, 1.0), 1.0), ((8.0, 1.0), 0.8)])
+@few("gap", [0.1, 0.01, 0.001, 1e-5], 4)
+@few(("masses", "e"), [((5.0, 1.0), 1.0), ((1000.0, 1.0), 1.0), ((8.0, 1.0), 0.8)], 4)
 def test_ball_on_ball(masses: tuple[float, float], e: float, gap: float, dt: float) -> None:
     """Harter 1971: dropped together they hit one after the other; a light one leaves almost three times as fast."""
     height, time = 1.0, 0.6
@@ -89,7 +89,7 @@ def stick(e: float, mu: float, dt: float, sweeps: int = 10) -> Lab:
 
 
 @first("dt", [0.01, 0.0025])
-@pytest.mark.parametrize(("mu", "e", "sweeps"), [(0.0, 1.0, 10), (0.0, 0.5, 10), (1.0, 0.5, 60), (1.0, 0.5, 10)])
+@few(("mu", "e", "sweeps"), [(0.0, 1.0, 10), (0.0, 0.5, 10), (1.0, 0.5, 60), (1.0, 0.5, 10)], 1)
 def test_rod_drops_on_its_end(mu: float, e: float, sweeps: int, dt: float) -> None:
     """J = m v (1 + e) / (1 + 3 cos^2) on a smooth floor (Routh); on a rough one the end also stops along it."""
     angle, height, time = 0.6, 0.3, 0.3
@@ -147,8 +147,8 @@ def clattering(angle: float, height: float, e: float, time: float) -> tuple[Arra
         y = y + np.array([0, 0, blow, 12 * lever * blow])
 
 
-@pytest.mark.parametrize("angle", [0.05, 0.2, 0.5])
-@pytest.mark.parametrize("e", [0.5, 0.9])
+@few("angle", [0.05, 0.2, 0.5], 1)
+@few("e", [0.5, 0.9], 1)
 def test_rod_clatters(e: float, angle: float) -> None:
     """Goyal, Papadopoulos, Sullivan 1998: a smooth rod dropped nearly flat strikes with one end after the other."""
     time = 0.3 if e < 0.6 else 0.5

@@ -8,6 +8,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.pushed import PUSHED
 from worlds.toys import require
 
@@ -63,8 +64,8 @@ def test_single_precision_is_off_by_no_more_than_it_says(kind: str) -> None:
     assert throw("simd32").backend.lanes == 2 * throw("simd").backend.lanes
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("backend", BACKENDS)
+@few("kind", KINDS, 1)
+@few("backend", BACKENDS, 1)
 def test_a_row_does_not_depend_on_its_batch(backend: str, kind: str) -> None:
     Z = points(11)
     together, alone = (evaluated(throw(backend, threads), kind, Z) for threads in (2, 1))
@@ -106,6 +107,7 @@ def test_the_first_bad_step_is_named_and_so_is_the_body() -> None:
     assert bad.step < int(str(raised.value).split("from step ")[1].split()[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["c", "simd"])
 def test_constraints_and_their_derivatives_reach_nlp_solvers(backend: str, tmp_path: Path) -> None:
     """A constraint at every step, and costs of controls that share lanes."""
@@ -128,6 +130,7 @@ def test_constraints_and_their_derivatives_reach_nlp_solvers(backend: str, tmp_p
     assert other.jacobian == pytest.approx(one.jacobian, rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_two_problems_of_one_shape_keep_their_numbers_apart() -> None:
     require("simd")
     settings = [{"simulation.duration": 1.0, "body.ball.mass": mass} for mass in (1.0, 2.0)]

@@ -8,6 +8,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.toys import require
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Program, compile_program
@@ -68,9 +69,9 @@ def limbs(count: int = 4, crossed: bool = False, odd: bool = False) -> Program:
     )
 
 
-@pytest.mark.parametrize("count", [2, 4, 6])
-@pytest.mark.parametrize("crossed", [False, True])
-@pytest.mark.parametrize("odd", [False, True])
+@few("count", [2, 4, 6], 1)
+@few("crossed", [False, True], 1)
+@few("odd", [False, True], 1)
 def test_one_rollout_alone_gives_the_same_bits(count: int, crossed: bool, odd: bool, tmp_path: Path) -> None:
     require("simd")
     program, cache = limbs(count, crossed, odd), Cache(tmp_path / "kernels")

@@ -14,6 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Program
 from symphys.codegen.toolchain import warm_start
@@ -87,7 +88,7 @@ def test_calls_are_made_when_somebody_asks_for_them(cache: Cache) -> None:
     assert warm.count == 1
 
 
-@pytest.mark.parametrize("other", ["identity", "package", "seeded", "precision", "library", "damaged", "none"])
+@few("other", ["identity", "package", "seeded", "precision", "library", "damaged", "none"], 2)
 def test_what_has_changed_is_built_again(cache: Cache, other: str, monkeypatch: pytest.MonkeyPatch) -> None:
     compile_source(Made().source, ("merit",), 1, cache=cache)
     again = Made({"identity": "b", "none": None}.get(other, "a"))
@@ -189,7 +190,7 @@ def test_a_problem_with_a_python_function_is_built(monkeypatch: pytest.MonkeyPat
     assert program_identity(replace(problem, parameters={"own": lambda: 1}), True) is None  # type: ignore[dict-item]
 
 
-@pytest.mark.parametrize("name", ["ball_throw", "cart_pole_walls"])
+@few("name", ["ball_throw", "cart_pole_walls"], 1)
 def test_a_second_start_of_a_problem_is_the_first(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path / "kernels"))
     problem: Problem = load_problem(find(name))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 from tools.distances import distance
+from tools.repeats import few
 from worlds.meetings import PLACE, STILL, Array, Thing, met, moved_to, random_thing, rule, shifted
 
 from symphys.dynamics.collision.pairs.box_box import RIM
@@ -167,8 +168,8 @@ def from_surface(name: str, point: Array) -> float:
     return float(np.sqrt(found.fun) * np.sign(point[2] - height(point[0], point[1])))
 
 
-@pytest.mark.parametrize("name", SURFACES)
-@pytest.mark.parametrize("kind", KINDS)
+@few("name", SURFACES, 3)
+@few("kind", KINDS, 3)
 def test_terrain(name: str, kind: str) -> None:
     """Where each ball or corner is, from a little inside to well above."""
     rng, function = np.random.default_rng(2), rule(kind, "", surface=Terrain(name, SURFACES[name]))
@@ -183,6 +184,7 @@ def test_terrain(name: str, kind: str) -> None:
         assert found.gap.min() == pytest.approx(expected, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_every_rule_gives_the_points_that_it_announces() -> None:
     names = {kind.__name__: name for name, kind in SHAPES.items()}
     surfaces = {"Plane": Plane.ground(), "Terrain": Terrain("t", lambda x, y: ca.SX(0))}

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.optimize import brentq, nnls
+from tools.repeats import few
 from worlds.meetings import PLACE, STILL, Array, Thing, course, flying, later, matrix, met, random_thing, rule, shifted
 from worlds.meetings import shape as make
 from worlds.slopes import compared, some_way
@@ -111,8 +112,8 @@ def down(kind: str, name: str) -> Any:
 GROUNDS = {name: ground(name) for name in ("plane", *PLAIN)}
 
 
-@pytest.mark.parametrize("name", GROUNDS)
-@pytest.mark.parametrize("kind", KINDS)
+@few("name", GROUNDS, 3)
+@few("kind", KINDS, 3)
 def test_the_smallest_gap_is_that_of_the_lowest_point(kind: str, name: str) -> None:
     """Of all points of the surface: those of a fine grid, and of a hull all corners.
 
@@ -224,7 +225,7 @@ def test_deep_inside_everything_is_finite(kind: str) -> None:
         assert all(np.isfinite(part).all() for part in (found.gap, found.rate, found.time, found.normal, *found.arms))
 
 
-@pytest.mark.parametrize("pair", [*ROUND, *RODS, ("cylinder", ""), ("ellipsoid", ""), ("convex", "")])
+@few("pair", [*ROUND, *RODS, ("cylinder", ""), ("ellipsoid", ""), ("convex", "")], 3)
 def test_derivatives(pair: tuple[str, str]) -> None:
     """Of gap, rate, time and frame along random ways, against central differences; on waves for those without other."""
     rng, worst = np.random.default_rng(8), []

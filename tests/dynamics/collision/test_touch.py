@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tools.distances import distance
-from tools.repeats import first, thorough
+from tools.repeats import few, first, thorough
 from worlds.meetings import STILL, Array, Meet, Thing, flying, met, moved_to, random_thing, rule, shifted
 
 from symphys.model.shapes import Plane, Terrain
@@ -42,8 +42,8 @@ def fault(a: Thing, b: Thing, found: Meet, dt: float = DT) -> float:
     return float(max(abs(distance(a.at(found.first), b.at(found.first))), -course(a, b, found.first).min()))
 
 
-@pytest.mark.parametrize(("speed", "spin"), [(5.0, 5.0), thorough(1.0, 1.0), thorough(10.0, 0.0)])
-@pytest.mark.parametrize("pair", PAIRS)
+@few(("speed", "spin"), [(5.0, 5.0), thorough(1.0, 1.0), thorough(10.0, 0.0)], 3)
+@few("pair", PAIRS, 3)
 def test_touch_is_where_the_distance_ends(pair: tuple[str, str], speed: float, spin: float) -> None:
     """Hits, misses and instants. Arms are parabolas of time, so that of turning bodies is off by (w dt)^3 / 6 of them.
 
@@ -66,7 +66,7 @@ def test_touch_is_where_the_distance_ends(pair: tuple[str, str], speed: float, s
         assert max(faults) < third + (4 * spin * DT) ** 2
 
 
-@pytest.mark.parametrize("pair", [("sphere", "box"), ("capsule", "capsule"), ("capsule", "box"), ("box", "box")])
+@few("pair", [("sphere", "box"), ("capsule", "capsule"), ("capsule", "box"), ("box", "box")], 1)
 def test_error_is_of_third_order(pair: tuple[str, str]) -> None:
     """Half the step, an eighth of the error: bodies that turn by 0.2 in it."""
     worst = []
@@ -80,8 +80,8 @@ def test_error_is_of_third_order(pair: tuple[str, str]) -> None:
 
 
 @first("travel", [2.0, 0.5])
-@pytest.mark.parametrize("wall", KINDS)
-@pytest.mark.parametrize("kind", KINDS)
+@few("wall", KINDS, 3)
+@few("kind", KINDS, 3)
 def test_nothing_flies_through_thin_walls(kind: str, wall: str, travel: float) -> None:
     """Many times its size and the wall's within one step, straight on or past: hit when, and only when, it must be.
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.contacts import contact_of, momenta_of, numbers, terms_of
 
 from symphys.dynamics.contact.constraint import ZERO, ContactImpulse, known_before
@@ -17,8 +18,8 @@ from symphys.model.world import Law
 MANY = 200
 
 
-@pytest.mark.parametrize("coupled", [False, True])
-@pytest.mark.parametrize("seed", range(6))
+@few("coupled", [False, True], 4)
+@few("seed", range(6), 4)
 def test_a_contact_obeys_its_law(seed: int, coupled: bool) -> None:
     """0 <= normal and u_n >= target, one of them with equality; |tangent| <= mu normal, against the slip if equal."""
     rng = np.random.default_rng(seed)

@@ -76,6 +76,7 @@ def test_commands_to_a_spring_are_of_second_order() -> None:
     assert np.all(np.array(errors[:-1]) > 3.5 * np.array(errors[1:]))
 
 
+@pytest.mark.slow
 def test_a_motor_is_a_force() -> None:
     """A box on the ground, pushed along a rail by a motor or by a force: the same motion, contacts and friction too."""
     box = Body("box", MASS, (0.02, 0.03, 0.04), (Box((0.2, 0.2, 0.1)),))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from tools.laboratory import Lab
+from tools.repeats import few
 from worlds.linkage import ABOUT_Y, Array, chain, energy, hanging, momenta, rod, separations
 
 from symphys.model.joints import KINDS, Joint, JointFrame, Servo
@@ -69,7 +70,7 @@ def test_v7_momenta_are_kept(kind: str) -> None:
     assert np.abs(angular - angular[0]).max() < 1e-6
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@few("kind", KINDS, 2)
 def test_energy_is_kept_to_second_order(kind: str) -> None:
     drifts = []
     for dt in (0.01, 0.005):
@@ -97,7 +98,7 @@ def test_pendulum_swings_in_its_time() -> None:
     assert np.diff(crossings) == pytest.approx(2 * np.pi * np.sqrt(2 * 0.5 / (3 * G)), rel=1e-3)
 
 
-@pytest.mark.parametrize(("sweeps", "dt"), [(4, 0.01), (10, 0.01), (10, 0.0025), (100, 0.01)])
+@few(("sweeps", "dt"), [(4, 0.01), (10, 0.01), (10, 0.0025), (100, 0.01)], 1)
 def test_chains_of_four_hold_whatever_the_sweeps(sweeps: int, dt: float) -> None:
     """They whip; warm start must not feed errors back."""
     world = chain(4)

@@ -96,6 +96,7 @@ def test_clocks_are_in_seconds_and_scales_without_a_unit() -> None:
     assert residuals_of(loaded({}, variable=variables), 1).shared.units == ("s", "")
 
 
+@pytest.mark.slow
 def test_a_recording_without_commands_stands_beside_one_with_them() -> None:
     """There the command is 0, as in a simulation that nothing drives."""
     driven = {"inputs": {"knee.command": "u"}, "table": {**TABLE, "u": [0.1, 0.2, 0.4]}}

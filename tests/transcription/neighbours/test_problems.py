@@ -102,6 +102,7 @@ def pair(request: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[Transc
     return near, transcribe(load_problem(path), exact=True, backend="simd", threads=1)
 
 
+@pytest.mark.slow
 def test_pairs_are_found_or_listed(pair: tuple[Transcription, Transcription]) -> None:
     near, listed = pair
     assert (len(near.rollout.world.pairs), len(listed.rollout.world.pairs)) == (0, 20)
@@ -120,6 +121,7 @@ def test_values_and_gradients_are_those_of_the_list(pair: tuple[Transcription, T
     np.testing.assert_array_equal(pair[0].shooting.evaluator.value(Z[2:3], 0.0).merit, here.merit[2:3])
 
 
+@pytest.mark.slow
 def test_the_judge_and_the_motion_are_those_of_the_list(pair: tuple[Transcription, Transcription]) -> None:
     z = pair[1].shooting.start(3)
     one, other = (made.judge(z) for made in pair)
@@ -148,6 +150,7 @@ def test_what_is_not_known_is_told(pair: tuple[Transcription, Transcription]) ->
     assert survey(near, record) == {}
 
 
+@pytest.mark.slow
 def test_the_examination_compares_gradients_and_finer_steps(pair: tuple[Transcription, Transcription]) -> None:
     told = examine(pair[0], pair[0].shooting.start(0))
     assert set(told) == {"gradient", "refined", "order", "bounds"}
@@ -200,6 +203,7 @@ def test_worlds_of_another_kind_keep_their_limit(more: str, why: str, tmp_path: 
         load_problem(file_of(tmp_path, more, balls=80))
 
 
+@pytest.mark.slow
 def test_others_programs_get_a_list(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A model for MuJoCo has all pairs; C has none to give."""
     problem = found(file_of(tmp_path), monkeypatch)
@@ -212,6 +216,7 @@ def test_others_programs_get_a_list(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         symphys.export(problem, c=tmp_path / "c")
 
 
+@pytest.mark.slow
 def test_a_hundred_balls_from_python() -> None:
     """They fall onto the ground, as one does, and lie still."""
     require("simd")

@@ -195,6 +195,7 @@ def test_a_free_body_turns_on_the_geodesic(tmp_path: Path) -> None:
     assert x["top.angular_velocity"] == pytest.approx([0, 0, 2])
 
 
+@pytest.mark.slow
 def test_a_ball_joint_turns_on_the_geodesic(tmp_path: Path) -> None:
     """The second body against the first, which turns itself; the joint stays closed, also in velocity."""
     states = [

@@ -314,6 +314,7 @@ def test_the_gradient_along_the_steps_is_that_of_the_whole(case: tuple[str, int,
         np.testing.assert_allclose(policy.gradient, gradient, atol=1e-10 * np.abs(gradient).max())
 
 
+@pytest.mark.slow
 @first("case", CASES)
 def test_compiled_terms_are_those_of_the_virtual_machine(
     case: tuple[str, int, str], monkeypatch: pytest.MonkeyPatch
