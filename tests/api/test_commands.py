@@ -81,6 +81,7 @@ def test_a_gradient_that_is_wrong_is_found(problem: symphys.Problem, monkeypatch
     assert found.wrong and "disagrees" in str(found)
 
 
+@pytest.mark.slow
 def test_a_batch_is_every_problem_solver_and_seed(problem: symphys.Problem, tmp_path: Path) -> None:
     """In this order; the folder is that of the command, and the same call does nothing."""
     short = problem.set("solver.gradient.iterations", 3)

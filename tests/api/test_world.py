@@ -33,6 +33,7 @@ def scene() -> World:
     return replace(world, pairs=tuple(pair for pair in pairs if not pair.name.startswith("ball-wall")))
 
 
+@pytest.mark.slow
 def test_a_world_is_what_the_file_says() -> None:
     """The same shapes, masses, laws and gravity; who may touch whom."""
     world, start = scene(), {f"{name}.position": [k, -k, 2.0] for k, name in enumerate(("ball", "die", "club"))}

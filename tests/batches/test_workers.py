@@ -70,6 +70,7 @@ def make(problem_file: Path, tmp_path: Path) -> Callable[..., list[Job]]:
     return jobs
 
 
+@pytest.mark.slow
 def test_one_that_kills_its_process_each_time_fails_and_the_same_command_tries_it_again(
     hurt: ModuleType, make: Any, recorder: Any
 ) -> None:
@@ -84,6 +85,7 @@ def test_one_that_kills_its_process_each_time_fails_and_the_same_command_tries_i
     assert run_batch(jobs, 2, recorder, hurt.transcribe).accepted
 
 
+@pytest.mark.slow
 def test_retries_are_as_many_as_asked_for(hurt: ModuleType, make: Any, recorder: Any) -> None:
     batch = run_batch(make("killed3", "fine"), 2, recorder, hurt.transcribe, limits=BatchLimits(retries=3))
     assert batch.accepted
@@ -111,6 +113,7 @@ def test_everything_is_done_again_where_that_is_asked_for_and_once(make_job: Cal
     assert batch.accepted and recorder.counted("started") == 4
 
 
+@pytest.mark.slow
 def test_workers_that_do_not_start_leave_the_work_to_this_process(
     hurt: ModuleType, make: Any, recorder: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -201,6 +204,7 @@ def test_a_worker_whose_parent_has_gone_ends_and_calls_its_run_no_failure(make: 
     assert not (job.folder.path / "result.json").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [1, 2])
 def test_runs_that_another_command_is_at_are_waited_for_and_taken_from_there(
     make: Any, recorder: Any, processes: int

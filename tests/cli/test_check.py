@@ -81,6 +81,7 @@ def test_check_exits_1_where_a_number_is_not_finite(run: Run, throw: Path) -> No
     assert code == 1 and "not finite from step" in out and "it begins in what controllers and force laws give" in out
 
 
+@pytest.mark.slow
 def test_check_can_look_at_what_a_run_found(run: Run, throw: Path, unreachable: Path) -> None:
     run("solve", throw, "--solver", "least_squares")
     code, out, _ = run("check", throw, "--at", "reports/throw/least_squares-seed0")

@@ -10,6 +10,7 @@ from worlds.swung import pendulum
 from symphys.cli.app import main
 
 
+@pytest.mark.slow
 def test_it_controls_and_reports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "pendulum.toml"
     file.write_text(pendulum(plant={"latency": 0.0, "dt": 0.01}).to_toml(), encoding="utf-8")

@@ -165,6 +165,7 @@ def check(path: Path, folder: Path) -> MjcfModel:
     return made
 
 
+@pytest.mark.slow
 def test_a_model_of_everything(tmp_path: Path) -> None:
     path = tmp_path / "original.xml"
     path.write_text(WALKER, encoding="utf-8")

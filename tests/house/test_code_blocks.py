@@ -187,6 +187,7 @@ def test_c_is_on_pages_with_python() -> None:
     assert [page for page in pages_with("c") if page not in pages_with("python")] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", pages_with("toml"))
 def test_toml_loads(page: str, tmp_path: Path) -> None:
     for block in of("toml", of_page(page)):

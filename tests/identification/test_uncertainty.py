@@ -34,6 +34,7 @@ def known(problem: AnalyticRecordings, options: FitOptions | None = None) -> tup
     return fitted.outcome.state.shared, fitted.outcome.state.own, fitted.uncertainty
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "threshold"),
     [

@@ -39,6 +39,7 @@ def test_masses_and_mass_matrix_at_random_poses(name: str) -> None:
         assert np.abs(match.mass_matrix(qpos) - matrix).max() < ROUNDING * np.abs(matrix).max()
 
 
+@pytest.mark.slow
 @first("name", ["half_cheetah", "ant", "inverted_double_pendulum"])
 def test_free_motion_is_of_second_order(name: str) -> None:
     found = agreement_after(robot(name)[1], 0.2, batch=1)

@@ -110,6 +110,7 @@ def estimates(folder: Path, text: str, dt: float) -> Array:
     return np.array([[e.value, e.lower, e.upper] for e in (found["frequency"], found["ratio"])])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [pytest.param(BALL, id="ball"), pytest.param(RAIL, id="on a rail")])
 def test_frequency_and_ratio_lie_within_their_intervals_at_any_step(tmp_path: Path, text: str) -> None:
     found = [estimates(tmp_path, text, dt) for dt in (0.001, 0.003, 0.01)]

@@ -79,6 +79,7 @@ def double_pendulum() -> symphys.World:
     return make_world(bodies, [ground], Law(friction=0.4), joints=joints, laws=laws)
 
 
+@pytest.mark.slow
 def test_a_robot_moves_as_from_its_tables() -> None:
     """A double pendulum with a servo, bent at the start: every quantity of the motion to 1e-12."""
     made = Problem.from_world(double_pendulum(), duration=0.5, variables={"bend": TABLES["variable"][0]})
@@ -90,6 +91,7 @@ def test_a_robot_moves_as_from_its_tables() -> None:
         assert np.allclose(both[0][name], both[1][name], rtol=0, atol=1e-12), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Body", "Hinge", "make_world"])
 def test_examples_run(name: str) -> None:
     runner = doctest.DocTestRunner()

@@ -56,6 +56,7 @@ def numbers(path: Path) -> dict[str, list[float]]:
     return {name: list(map(float, column)) for name, column in columns(path).items()}
 
 
+@pytest.mark.slow
 def test_every_figure_has_both_files_and_links(pages: Path) -> None:
     """No SVG without its CSV, which has numbers; the pages link to both, and to nothing that is not there."""
     found = {path.relative_to(pages) for path in pages.rglob("figures/*")}

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.report import write_batch_report, write_run_report
 from symphys.results.drawable import LARGEST, OVERSIZED, drawable, oversized
@@ -57,8 +58,8 @@ def text_of(page: Path) -> str:
     return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", page.read_text(encoding="utf-8")))
 
 
-@pytest.mark.parametrize("motion", [True, False])
-@pytest.mark.parametrize("factor", HUGE)
+@few("motion", [True, False], 1)
+@few("factor", HUGE, 1)
 def test_the_page_of_such_a_run(run_dir: Path, factor: float, motion: bool) -> None:
     """It says what is not drawn, why there is no motion, and has its numbers in tables."""
     enlarge(run_dir, factor, motion)

@@ -38,6 +38,7 @@ def placed(solid: Solid, name: str, fixed: bool = False) -> str:
 RAMP = Solid(0.0, SIGNS * [2, 1, 0.1])
 
 
+@pytest.mark.slow
 def test_what_lies_on_a_large_block_is_drawn_after_it() -> None:
     """Also at its far end, where its centre is farther away than that of the block."""
     for x, y in ((-1.8, 0.9), (1.8, 0.9), (1.8, -0.9), (-1.8, -0.9)):

@@ -81,6 +81,7 @@ def test_damage_is_a_message_wherever_it_is(method: int) -> None:
     assert refused > 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_LZMA])
 def test_no_more_is_unpacked_than_the_header_says(method: int) -> None:
     """Of 200 MB in a few kilobytes, under a header of 20 rows, and under one of all; none of it comes to memory."""

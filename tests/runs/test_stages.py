@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tools.repeats import first
+from tools.repeats import few, first
 
 from symphys.batches import run_batch
 from symphys.problem import Problem, load_problem
@@ -59,6 +59,7 @@ def without_times(result: Result) -> list[StageRecord]:
     return [replace(stage, seconds=0.0, equivalents=0.0) for stage in result.stages]
 
 
+@pytest.mark.slow
 def test_each_stage_is_judged_exactly(whole: tuple[Job, Result], tmp_path: Path) -> None:
     (first,) = job(tmp_path, (0.1,))
     part, result = run(first), whole[1]
@@ -96,7 +97,7 @@ def test_files_tell_of_the_stages(whole: tuple[Job, Result]) -> None:
     assert "stage 2 of 3: smoothing 0.01" in log
 
 
-@pytest.mark.parametrize("smoothing", SMOOTHINGS)
+@few("smoothing", SMOOTHINGS, 1)
 def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(
     whole: tuple[Job, Result], tmp_path: Path, smoothing: float
 ) -> None:
@@ -125,6 +126,7 @@ def test_side_by_side(tmp_path: Path, recorder: Any, seeds: int) -> None:
         assert without_times(one) == without_times(other)
 
 
+@pytest.mark.slow
 def test_what_only_the_smoothed_rollout_meets_has_advice(tmp_path: Path) -> None:
     (asked,) = job(tmp_path, (0.1,), "ipopt")
     result = run(asked)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.staged_toys import acrobot, attitude, boxed, pendulum
 from worlds.toys import quadratic, stop_at, through_json
 
@@ -51,6 +52,7 @@ def test_static_entries_are_found_with_the_controls() -> None:
     assert thrown.trace[-1].max_violation < 1
 
 
+@pytest.mark.slow
 def test_limits_of_controls_and_of_the_path() -> None:
     """Some controls are at their bounds and some speeds at their limit, and none beyond; the end is met."""
     chain = pendulum(fast=4.0, knots=11)
@@ -62,7 +64,7 @@ def test_limits_of_controls_and_of_the_path() -> None:
     assert found.trace[-1].max_violation < 1
 
 
-@pytest.mark.parametrize("stop", [0, 4])
+@few("stop", [0, 4], 1)
 def test_what_was_interrupted_comes_to_the_same_answer(stop: int) -> None:
     problem = boxed(pendulum(), 9.0)
     whole = solve(problem)

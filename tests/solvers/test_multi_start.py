@@ -46,6 +46,7 @@ def test_each_is_that_of_the_solve_alone(name: str, problem: Any) -> None:
         same(found, solve(name, problem, seed))
 
 
+@pytest.mark.slow
 @descents
 @few("backend", ["casadi", "auto"], 1)
 def test_on_a_throw(name: str, backend: str) -> None:

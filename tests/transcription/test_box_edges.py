@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tools.parameter_slopes import slopes
+from tools.repeats import few
 
 from symphys import Body, Plane, Problem, SymphysError, make_world
 from symphys.errors import ProblemError
@@ -51,8 +52,8 @@ def gaps(file: Path) -> np.ndarray:
     return np.stack([found[name] for name in names], axis=1)
 
 
-@pytest.mark.parametrize("ground", ["[ground]", '[[terrain]]\nname = "ground"\nheight = "0 * x * y"'])
-@pytest.mark.parametrize("pitch", [0, 30, 60])
+@few("ground", ["[ground]", '[[terrain]]\nname = "ground"\nheight = "0 * x * y"'], 1)
+@few("pitch", [0, 30, 60], 1)
 def test_the_lowest_point_of_a_tilted_crate(tmp_path: Path, ground: str, pitch: float) -> None:
     """At (a - r) sin + (c - r) cos + r below its centre, for half edges a and c."""
     file = box(tmp_path, pitch=pitch, height=0.3)
@@ -68,6 +69,7 @@ def test_it_lies_on_its_faces(tmp_path: Path) -> None:
     assert np.sort(np.abs(found), axis=1)[:, :4] == pytest.approx(np.zeros((6, 4)), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_slopes_by_the_radius(tmp_path: Path) -> None:
     """It lands on an edge, which rolls."""
     file = box(tmp_path, pitch=40, height=0.125, velocity="[0.5, 0, -1]")

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tools.repeats import few
 
 from symphys.errors import ProblemError
 from symphys.problem import Problem, load_problem
@@ -185,7 +186,7 @@ value = "VALUE"
 """
 
 
-@pytest.mark.parametrize(
+@few(
     ("value", "expected"),
     [
         ("crate.accelerometer[2]", 9.81),
@@ -195,6 +196,7 @@ value = "VALUE"
         ("norm(stone.contact_force)", 0.0),
         ("stone.gyro[0]", 1.0),
     ],
+    3,
 )
 def test_what_bodies_feel(tmp_path: Path, value: str, expected: float) -> None:
     """At rest gravity is felt, in free fall nothing; turning is felt in the body's frame."""
@@ -223,6 +225,7 @@ squares = "pivot.angle"
 )
 
 
+@pytest.mark.slow
 def test_function_from_python(tmp_path: Path) -> None:
     """A casadi function does what the same gains do as a linear controller."""
     path = tmp_path / "given.toml"

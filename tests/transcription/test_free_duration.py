@@ -68,6 +68,7 @@ def other() -> Transcription:
     return transcribe(problem_of_tables(fixed), backend="casadi")
 
 
+@pytest.mark.slow
 def test_the_motion_is_that_of_the_fixed_duration(made: Transcription, other: Transcription) -> None:
     motion, expected = made.simulate(made.shooting.start(0)), other.simulate(other.shooting.start(0))
     assert motion.time == pytest.approx(expected.time, rel=1e-14)
@@ -95,6 +96,7 @@ def test_a_free_duration_at_the_value_of_the_file_changes_nothing(name: str, tmp
     assert motion.position == pytest.approx(expected.position, rel=1e-9, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_an_examination_is_of_the_duration_of_z(made: Transcription, other: Transcription) -> None:
     found = examine(made, made.shooting.start(0))
     expected = survey(other, other.record(other.shooting.start(0)))

@@ -178,8 +178,9 @@ value = "integral(bob.velocity[2]**2) / (1 + end.bob.position[2] - start.bob.pos
 
 
 def problems(*texts: str) -> pytest.MarkDecorator:
-    """These problems in every run of the tests, the other hops with ``make thorough``."""
+    """The last of these problems in every run, all with ``make test-all``, the other hops with ``make thorough``."""
     others = (thorough(text) for text in HOPS if text not in texts)
+    texts = (*(pytest.param(text, marks=pytest.mark.slow) for text in texts[:-1]), texts[-1])  # type: ignore[assignment]
     return pytest.mark.parametrize("both", [*texts, *others], indirect=True, ids=named, scope="module")
 
 

@@ -23,6 +23,7 @@ def problem(request: pytest.FixtureRequest, tmp_path) -> Problem:
     return load_problem(find(request.param), shorter)
 
 
+@pytest.mark.slow
 def test_value_and_gradient_are_those_of_the_expression(problem: Problem) -> None:
     transcription = transcribe(problem, backend="casadi")
     program = rollout_program(transcription.rollout)

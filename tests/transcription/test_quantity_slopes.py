@@ -48,6 +48,7 @@ def test_rollouts_have_their_own_lengths(rollout: Rollout) -> None:
     assert whole[1][0, 0] == pytest.approx(z[1, 2], abs=1e-15), "the first sample is the start"
 
 
+@pytest.mark.slow
 def test_what_is_watched_has_values_beside_the_others(rollout: Rollout) -> None:
     z, lasts = decision(rollout, 2), [30, 7]
     made = QuantitySlopes(rollout, {"height": FORMULAS["height"]}, threads=1, watched={"pose": FORMULAS["pose"]})
@@ -58,6 +59,7 @@ def test_what_is_watched_has_values_beside_the_others(rollout: Rollout) -> None:
     assert slopes.shape == (31, 1, 1)
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_adjoints(rollout: Rollout) -> None:
     made, z = QuantitySlopes(rollout, FORMULAS, threads=1), decision(rollout, 2)
     along = np.random.default_rng(1).normal(size=(2, z.shape[1], 6))

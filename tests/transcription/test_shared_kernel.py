@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.thrown import TABLES
 
 from symphys.dynamics.functions import report_function
@@ -43,8 +44,8 @@ def Z() -> np.ndarray:
     return np.random.default_rng(0).normal([1, 0.3, -3, 0, 0, 0], 0.2, (5, 6))
 
 
-@pytest.mark.parametrize("smoothing", [0.0, 0.05])
-@pytest.mark.parametrize("what", ["value", "gradient", "residuals", "jacobian"])
+@few("smoothing", [0.0, 0.05], 2)
+@few("what", ["value", "gradient", "residuals", "jacobian"], 2)
 def test_each_point_is_evaluated_with_its_own_numbers(what: str, smoothing: float, Z: np.ndarray) -> None:
     for shared, own in pairs():
         assert own.shooting.squares

@@ -53,6 +53,7 @@ def test_chain_with_springs_dampers_and_motors() -> None:
     falls_as_a_square(world, state_of(world, angles, rates), 0.1, 1.0, 1e-4)
 
 
+@pytest.mark.slow
 def test_every_kind_of_joint() -> None:
     falls_as_a_square(*mixed(), torque=0.5, time=0.3, largest=1e-5)
 

@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 from tools.agreement import transcribed
 from tools.laboratory import Lab
-from tools.repeats import thorough
+from tools.repeats import few, thorough
 
 from symphys.model.joints import HINGE, SLIDER, Joint, JointFrame, Limits
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
@@ -110,7 +110,7 @@ def cases(name: str) -> list[tuple[Array, float]]:
     return found
 
 
-@pytest.mark.parametrize(("name", "cuts"), CUTS)
+@few(("name", "cuts"), CUTS, 2)
 def test_an_impact_on_the_boundary_keeps_its_slope(name: str, cuts: int | None) -> None:
     """Value and gradient equal the closed form on the boundary, one unit before and one after."""
     end, share = height_at_the_end(name, cuts), 1.0 if len(world_of(name, 1.0).bodies) == 1 else 0.75
@@ -127,7 +127,7 @@ FALLS = [(n, v) for n in range(1, 6) for v in (0.0, -1.0, 0.25) if n * DT * 2 > 
 """Steps until a ball meets the ground under 4 m/s^2, and its velocity at the start."""
 
 
-@pytest.mark.parametrize("shape", ["ball", "box"])
+@few("shape", ["ball", "box"], 1)
 def test_a_slow_impact_on_the_boundary_keeps_its_slope(shape: str) -> None:
     """Released from rest, thrown down and up: at v it rebounds with e v, and is e v s - g s^2 / 2 high after s."""
     g, e, z = 4.0, 0.75, ca.MX.sym("z", 2)

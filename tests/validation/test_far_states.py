@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tools.repeats import few
 from worlds.mixed import mixed
 
 from symphys.dynamics.functions import step_function
@@ -43,7 +44,7 @@ def far(world: World, rng: np.random.Generator, most: float) -> Array:
     return x
 
 
-@pytest.mark.parametrize("name", WORLDS)
+@few("name", WORLDS, 1)
 def test_steps_from_far_states_are_finite(name: str) -> None:
     """Value, forward and reverse derivatives, exact and smoothed."""
     world = WORLDS[name]
@@ -60,7 +61,7 @@ def test_steps_from_far_states_are_finite(name: str) -> None:
             assert np.isfinite(np.array(part)).all(), k
 
 
-@pytest.mark.parametrize("length", [1e-150, 1e-3, 0.5, 2.0, 1e6, 1e150])
+@few("length", [1e-150, 1e-3, 0.5, 2.0, 1e6, 1e150], 1)
 def test_an_orientation_counts_by_its_direction(length: float) -> None:
     """A step from a quaternion of any length is that from the one of length 1."""
     world = WORLDS["box on a plane"]

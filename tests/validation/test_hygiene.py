@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tools.laboratory import Lab, built, central_difference, value_and_gradient
-from tools.repeats import thorough
+from tools.repeats import few, thorough
 
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.state_layout import initial_state
@@ -31,9 +31,7 @@ LAWS = {
     "spins": Law(0.5, 0.5, torsion=0.01, rolling=0.01),
     "soft": Law(0.5, 0.0, frequency=5.0),
 }
-LAWS_BY_TURNS = pytest.mark.parametrize(
-    "law", [thorough(law) if law in ("frictionless", "plastic") else law for law in LAWS]
-)
+LAWS_BY_TURNS = few("law", [thorough(law) if law in ("frictionless", "plastic") else law for law in LAWS], 1)
 """What is left for ``make thorough`` are special cases of the first."""
 
 

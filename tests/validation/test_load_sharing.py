@@ -43,6 +43,7 @@ def turned() -> float:
     return float(plate.slid([2.4, 0.27, 2.67])[2])
 
 
+@pytest.mark.slow
 def test_a_turning_crate_goes_as_with_linear_loads() -> None:
     """Without sharing it goes elsewhere."""
     assert abs(slid(0.01) - turned()) < 0.005

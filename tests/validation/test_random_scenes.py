@@ -22,12 +22,14 @@ def not_finite(structure: Structure, count: int, cuts: int | None) -> set[int]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("structure", [STRUCTURES[k] for k in FEW], ids="-".join)
 def test_random_scenes_are_finite(structure: Structure) -> None:
     """Touching, overlapping, coincident, aligned, at rest; by state, sizes, place, mass, law and smoothing."""
     assert not_finite(structure, 80, cuts=0) == set()
 
 
+@pytest.mark.slow
 def test_a_smoothed_contact_that_waits_for_its_impact_is_not_pulled() -> None:
     """It carried load, so that what gapes is closed, but in this part of the step it gives no impulse."""
     parts, rng = lot(*STRUCTURES[1]), np.random.default_rng(1)

@@ -102,6 +102,7 @@ def world_of(name: str) -> World:
     return make_world([RESTS[name][0]], [Plane.ground()], law)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name if name in ("drum on its face", "egg") else thorough(name) for name in RESTS])
 def test_what_is_dropped_comes_to_rest_on_the_ground(name: str) -> None:
     """At its height, with its weight on it; then no corner of a hull is deeper than a millionth of its size.

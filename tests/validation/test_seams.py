@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tools.repeats import first, thorough
+from tools.repeats import few, first, thorough
 from worlds.blocks import block, rod, turned_by
 
 from symphys.dynamics.functions import InlineSteps
@@ -34,7 +34,7 @@ def bodies() -> dict[str, Body]:
 
 
 class Boards:
-    """A body over two boards; the numbers of the second are parameters of its step."""
+    """A body over two boards; the numbers of the second are parameters of its step, built without Newton's start."""
 
     def __init__(self, kind: str, tiles: bool = False):
         self.numbers = [ca.SX.sym(name) for name in ("dt", "higher", "gap")]
@@ -49,8 +49,8 @@ class Boards:
         self.layout, self.world, self.steps = Layout(world), world, InlineSteps(world, (), self.numbers)
 
     @cache  # noqa: B019
-    def step(self, sweeps: int) -> ca.Function:
-        return self.steps.step(Scheme(dt=self.dt, sweeps=sweeps))
+    def step(self, sweeps: int, newton: bool) -> ca.Function:
+        return self.steps.step(Scheme(dt=self.dt, sweeps=sweeps, newton_start=newton))
 
     def states(
         self,
@@ -60,12 +60,13 @@ class Boards:
         higher: float = 0.0,
         gap: float = 0.0,
         sweeps: int = 20,
+        newton: bool = False,
     ) -> dict[str, Array]:
         """Position, velocity, turning of the body: (steps + 1, 3) each."""
         x, found = initial_state(self.world, {f"it.{name}": value for name, value in start.items()}), []
         for _ in range(round(time / dt)):
             found.append(x)
-            x = self.step(sweeps)(x, ca.DM(0, 1), [dt, higher, gap], 0)
+            x = self.step(sweeps, newton)(x, ca.DM(0, 1), [dt, higher, gap], 0)
         columns = np.array(ca.horzcat(*found, x)).T
         names = ("position", "velocity", "angular_velocity")
         return {name: columns[:, self.layout[f"it.{name}"]] for name in names}
@@ -94,20 +95,23 @@ LEVEL = (0.0, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6)
 UNEVEN = (1e-4, -1e-4, 1e-3, -1e-3)
 
 
-@first("sweeps", [20, 4, 10, 14, 50, 200])
+@few(("sweeps", "newton"), [(20, False), (20, True), *(thorough(n, True) for n in (4, 10, 14, 50, 200))], 1)
 @pytest.mark.parametrize("higher", [*LEVEL[:1], *LEVEL[4:6], *map(thorough, (*LEVEL[1:4], *LEVEL[6:]))])
 @pytest.mark.parametrize(
     ("speed", "dt"), [(3.0, 0.005), thorough(0.3, 0.005), thorough(1.0, 0.02), thorough(10.0, 0.01)]
 )
-def test_a_box_slides_over_a_seam_as_on_one_board(sweeps: int, higher: float, speed: float, dt: float) -> None:
+def test_a_box_slides_over_a_seam_as_on_one_board(
+    sweeps: int, newton: bool, higher: float, speed: float, dt: float
+) -> None:
     """By the closed form of sliding friction, without turning; a corner that struck a side stopped the box."""
     time, start = round(min(0.12, speed / 2.5) / dt) * dt, sliding(speed, min(0.02, speed / 20))
-    it = boards("cube").states(start, time, dt, higher, sweeps=sweeps)
+    it = boards("cube").states(start, time, dt, higher, sweeps=sweeps, newton=newton)
     assert it["position"][-1, 0] - start["position"][0] == pytest.approx(slid(speed, time), abs=1e-5)
     assert np.abs(it["angular_velocity"]).max() < 0.05
     assert it["position"][-1, 2] == pytest.approx(HALF + higher, abs=2e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("higher", [*UNEVEN[:1], UNEVEN[2], *map(thorough, (UNEVEN[1], UNEVEN[3]))])
 @first("sweeps", [20, 4, 200])
 @first("speed", [3.0, 1.0, 10.0])
@@ -127,6 +131,7 @@ def test_a_box_goes_over_a_step_of_up_to_a_millimetre(sweeps: int, higher: float
     assert np.diff(energy).max() < max(1.1 * lift, 1e-6) + 1e-3 * speed**2 / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap", [1e-3, *map(thorough, (-1e-3, -1e-6, -1e-9, 1e-9, 1e-6, 1e-4))])
 @first("yaw", [0.5, 0.0, 0.1, np.pi / 4])
 def test_boards_may_overlap_or_leave_a_gap(gap: float, yaw: float) -> None:
@@ -212,7 +217,7 @@ def test_a_box_lands_on_a_seam(beside: float) -> None:
 def test_a_slope_over_a_seam_is_finite_and_that_of_the_closed_form() -> None:
     """How far a box slides by its speed at the start: the time, whatever lies below."""
     cube, speed = boards("cube"), ca.MX.sym("v")
-    step = cube.step(20)
+    step = cube.step(20, newton=False)
     x = initial_state(
         cube.world, {"it.position": [SEAM - HALF - 0.02, 0, HALF], "it.velocity": ca.vertcat(speed, 0, 0)}
     )

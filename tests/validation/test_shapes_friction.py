@@ -44,6 +44,7 @@ def slides(kind: str, share: float, heading: float, time: float) -> tuple[Array,
     return np.linalg.norm(states["b.velocity"], axis=1), G * (np.sin(slope) - MU * np.cos(slope)) * time
 
 
+@pytest.mark.slow
 @first("kind", ["plane", "box"])
 def test_v10_block_sticks_below_the_cone(kind: str) -> None:
     """At 0.998 of it, in every direction: it creeps while the first steps find the forces, then does not move."""

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from tools.laboratory import Lab
-from tools.repeats import thorough
+from tools.repeats import few, thorough
 from worlds.blocks import among, block, drift, rod, stack, turned_by, unrest
 
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Static
@@ -34,7 +34,7 @@ def lab(body: str, ground: str) -> Lab:
     return Lab(make_world([BODIES[body][0]], [GROUNDS[ground]], Law(0.5, e)), Scheme(), parameters=[e])
 
 
-@pytest.mark.parametrize(
+@few(
     ("body", "ground"),
     [
         thorough("cube", "plane"),
@@ -44,6 +44,7 @@ def lab(body: str, ground: str) -> Lab:
         thorough("brick", "slab"),
         ("rod", "slab"),
     ],
+    1,
 )
 def test_what_is_put_down_stays(body: str, ground: str) -> None:
     """Ten seconds at rest, ten sweeps. The first steps find the forces; from then on nothing moves at all."""
@@ -63,6 +64,7 @@ def test_v11_box_dropped_from_1_rests_at_half(restitution: float) -> None:
     assert unrest(states, "b") < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("body", "height"), [("brick", 0.1), ("rod", 0.1)])
 @pytest.mark.parametrize("ground", GROUNDS)
 def test_what_falls_turned_comes_to_rest(body: str, height: float, ground: str) -> None:
@@ -74,6 +76,7 @@ def test_what_falls_turned_comes_to_rest(body: str, height: float, ground: str) 
     assert drift(states, "b", since=500)[0] < STILL
 
 
+@pytest.mark.slow
 def test_v11_box_on_box() -> None:
     """Brax: of half sizes .2 and .1, rests at .2 and .5 (on top .3 more)."""
     world = stack([block("low", (0.2, 0.2, 0.2)), block("high", (0.1, 0.1, 0.1))], Law(0.5, 0.0))
@@ -83,6 +86,7 @@ def test_v11_box_on_box() -> None:
     assert max(unrest(states, name) for name in ("low", "high")) < STILL
 
 
+@pytest.mark.slow
 def test_v11_capsules_rest_on_each_other() -> None:
     """Brax: rest heights .5, .25 and 1.25: one on end, one on its side, a short one (a ball) on top of the first."""
     tall = Body("tall", 1.0, (0.05, 0.05, 0.02), (Capsule(0.25, 0.25),))
@@ -95,6 +99,7 @@ def test_v11_capsules_rest_on_each_other() -> None:
         assert unrest(states, name) < STILL
 
 
+@pytest.mark.slow
 def test_rods_lie_across_rods() -> None:
     """Two side by side carry one across them, which touches each in one point."""
     bodies = [rod("left", 0.1, 0.5), rod("right", 0.1, 0.5), rod("top", 0.1, 0.5)]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from data.textbook import Array, G, about_a_point, differences, final, turn
 from tools.laboratory import Lab
+from tools.repeats import few
 from worlds.blocks import turned_by
 
 from symphys.model.joints import BALL, HINGE, Joint, JointFrame
@@ -42,7 +43,7 @@ def exact_top(tilt: float, w: Array, time: float) -> tuple[Array, Array]:
     return about_a_point(ABOUT_TIP, [0, 0, ARM], MASS * G, turned_by((1, 0, 0), tilt), w, time)
 
 
-@pytest.mark.parametrize("spin", [20.0, 40.0, 100.0])
+@few("spin", [20.0, 40.0, 100.0], 1)
 def test_lagranges_top(spin: float) -> None:
     """Precession and nutation of a heavy symmetric top with its tip fixed, by its spin too: second order in dt."""
     tilt, time = 0.6, 0.5

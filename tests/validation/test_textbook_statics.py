@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from data.textbook import G, final
 from tools.laboratory import Lab
-from tools.repeats import first
+from tools.repeats import few, first
 from worlds.blocks import turned_by
 
 from symphys.model.shapes import Plane, Sphere
@@ -61,8 +61,8 @@ def ladder(mu_floor: float, mu_wall: float) -> Lab:
     return Lab(replace(world, pairs=pairs), Scheme(sweeps=30))
 
 
-@pytest.mark.parametrize(("mu_floor", "mu_wall"), [(0.4, 0.0), (0.4, 0.3), (0.25, 0.8)])
-@pytest.mark.parametrize("over", [0.98, 1.02])
+@few(("mu_floor", "mu_wall"), [(0.4, 0.0), (0.4, 0.3), (0.25, 0.8)], 1)
+@few("over", [0.98, 1.02], 1)
 def test_ladder_against_a_wall(mu_floor: float, mu_wall: float, over: float) -> None:
     """Both ends on the point of slipping: it stands iff tan(theta) >= (1 - mu_f mu_w) / (2 mu_f), from the floor."""
     theta = float(np.arctan(over * (1 - mu_floor * mu_wall) / (2 * mu_floor)))
@@ -79,6 +79,7 @@ def test_ladder_against_a_wall(mu_floor: float, mu_wall: float, over: float) -> 
         assert away > 0.02
 
 
+@pytest.mark.slow
 @first("dt", [0.01, 0.0025])
 def test_ladder_slides_down_smooth_walls(dt: float) -> None:
     """Energy: theta'^2 = 3 g / L (sin(theta0) - sin(theta)) for a length L; it leaves the wall at 2/3 sin(theta0)."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.findings.energy import balance_finding, gains_finding, stop_findings
 from symphys.findings.examination import Energy, Examination, Gain
@@ -210,7 +211,7 @@ tolerance = 1.0
 """
 
 
-@pytest.mark.parametrize(("edge", "trips"), [(0.0, False), (0.01, True)])
+@few(("edge", "trips"), [(0.0, False), (0.01, True)], 1)
 def test_a_trip_over_an_edge_is_told_with_what_it_takes(make, edge, trips):
     """A cube slides off one board onto the next: flush, nothing but friction takes energy; an edge of 1 cm stops it.
 

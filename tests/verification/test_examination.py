@@ -58,6 +58,7 @@ def test_wrong_gradients_are_rejected(throw):
     assert max(errors) > 1e-2
 
 
+@pytest.mark.slow
 def test_a_jump_is_told_from_a_wrong_gradient():
     """The kick of the guess meets the crate after 0.05 s, the very end of a step: either side agrees."""
     knock = transcribe(load_problem(find("knock"), {"simulation.duration": 0.3}), backend="casadi")
@@ -89,6 +90,7 @@ def test_examination_reports_refinements_and_contacts(throw):
     assert found["fault"] == ""
 
 
+@pytest.mark.slow
 def test_refined_answers_are_those_of_the_refined_problem(coarse, halved):
     """The same numbers as a file with half the step, or twice the sweeps; on a shot that depends on both."""
     made, z, found = coarse

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
+from tools.repeats import few
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers import SOLVERS, MultipleShootingOptions, Outcome
@@ -22,8 +22,8 @@ SWING = 98.637754
 """The least objective of the acrobot's swing-up that is known."""
 LINE = ((0.0, 0.0, 0.0, 0.0), (np.pi, 0.0, 0.0, 0.0))
 WAYS = [("ipopt", "gauss-newton"), ("ipopt", "exact"), ("fatrop", "gauss-newton"), ("fatrop", "exact")]
-every_way = pytest.mark.parametrize(("backend", "hessian"), WAYS)
-every_backend = pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
+every_way = few(("backend", "hessian"), WAYS, 1)
+every_backend = few("backend", ["ipopt", "fatrop"], 1)
 
 
 def solve(problem: ShootingProblem, start: Any = None, **options: Any) -> Outcome:

@@ -40,7 +40,7 @@ def evaluated(transcription: Transcription, kind: str, Z: np.ndarray, smoothing:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("backend", ["c", "simd"])
+@few("backend", ["simd", "c"], 1)
 def test_all_agree(backend: str, kind: str) -> None:
     for smoothing in (0.0, 1e-3):
         expected = evaluated(throw("casadi"), kind, points(5), smoothing)

@@ -60,6 +60,7 @@ def test_gradients_that_are_far_off_are_doubted(factor: float, words: str, monke
         rollout.gradient(rollout.z())
 
 
+@pytest.mark.slow
 def test_adjoints_of_a_step_and_of_quantities_are_doubted(monkeypatch: pytest.MonkeyPatch) -> None:
     require("simd32")
     doctored(monkeypatch, 0.6)

@@ -51,6 +51,7 @@ tolerance = 0.1
 PAIRS = [("crate", "slab"), ("rod", "slab"), ("rod", "hills"), ("crate", "hills")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("smoothing", [0.0, 1e-3])
 @first("meet", PAIRS)
 def test_a_kernel_gives_what_casadi_does(meet: tuple[str, str], smoothing: float) -> None:

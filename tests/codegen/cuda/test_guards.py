@@ -31,6 +31,7 @@ def entries_of(program: Program, phase: str) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["spheres", thorough("capsules"), thorough("a box"), thorough("soft")])
 @pytest.mark.parametrize("warps", [4, thorough(1)])
 def test_a_heap_is_the_processors_and_that_of_all_calls(name: str, warps: int, tmp_path: Path, cache: Cache) -> None:

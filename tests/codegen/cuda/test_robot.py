@@ -66,6 +66,7 @@ def agree(there: Kernel, here: Kernel, Z: Any, within: float) -> None:
     np.testing.assert_allclose(gradient, slopes, atol=within * np.abs(slopes).max())
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_hundred_steps_with_contact_are_the_processors(tmp_path: Path) -> None:
     here = compile_program(hopping(), seeded=SEEDED, threads=1)
@@ -74,6 +75,7 @@ def test_a_hundred_steps_with_contact_are_the_processors(tmp_path: Path) -> None
     agree(there, here, points(5), 1e-9)
 
 
+@pytest.mark.slow
 def test_nvrtc_compiles_and_links_it_for_recent_architectures() -> None:
     pytest.importorskip("cuda.bindings.nvrtc", reason="NVRTC is part of the extra symphys[cuda]")
     texts = device_sources(plan(hopping(), SEEDED, FAST_MEMORY), hopping().steps, 32, 4, single=False)

@@ -38,6 +38,7 @@ def spoil(kernel: ProcessorKernel) -> None:
         memory[:words] = np.nan
 
 
+@pytest.mark.slow
 def test_values_and_gradients_are_the_same_to_the_last_bit(heap_program: Program, cache: Cache) -> None:
     guess = np.random.default_rng(2).uniform(-2, 2, (11, heap_program.z.size))
     results = []
@@ -58,6 +59,7 @@ def test_values_and_gradients_are_the_same_to_the_last_bit(heap_program: Program
     assert np.array_equal(gradients, expected)
 
 
+@pytest.mark.slow
 def test_most_calls_of_a_heap_are_guarded(heap_program: Program, request: pytest.FixtureRequest) -> None:
     """Sections are what steps without an impact leave out; soft contacts have none."""
     guarding = plan(heap_program, ["merit"]).guarding
@@ -67,6 +69,7 @@ def test_most_calls_of_a_heap_are_guarded(heap_program: Program, request: pytest
     assert (guarding.count("sections") > 0) == ("soft" not in request.node.name)
 
 
+@pytest.mark.slow
 def test_plain_c_leaves_out_the_same(tmp_path: Path, cache: Cache) -> None:
     program = program_of("spheres")
     program = replace(program, outputs={"merit": program.outputs["merit"]})

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tools.repeats import thorough
+from tools.repeats import few, thorough
 from tools.waiting import until
 from worlds import programs
 from worlds.heaps import heap
@@ -82,13 +82,14 @@ def same(found: Any, wanted: Any) -> None:
         np.testing.assert_array_equal(found[0][name], values)
 
 
-@pytest.mark.parametrize(
+@few(
     ("name", "single"),
     [
         *((name, single) for name in ("pendulum", "chain", "operations") for single in (False, True)),
-        ("spheres", False),
+        pytest.param("spheres", False, marks=pytest.mark.slow),
         thorough("spheres", True),
     ],
+    3,
 )
 def test_the_interpreter_gives_the_same_bits(
     name: str, single: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -28,6 +28,7 @@ def robot() -> Program:
     return rollout_program(symbolic_rollout(symphys.load("cart_pole")), exact=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "rows"), [("chain", 9), ("chain", 1), ("robot", 1), thorough("robot", 9)])
 def test_values_and_gradients_do_not_depend_on_the_level(
     name: str, rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from tools.repeats import thorough
+from tools.repeats import few, thorough
 from worlds import programs
 from worlds.heaps import heap
 from worlds.toys import require
@@ -67,13 +67,14 @@ def test_the_rows_choose_the_lanes() -> None:
 
 
 @pytest.mark.usefixtures("never")
-@pytest.mark.parametrize(
+@few(
     ("name", "precision"),
     [
         *((name, precision) for name in ("pendulum", "chain") for precision in ("double", "single")),
-        ("spheres", "double"),
+        pytest.param("spheres", "double", marks=pytest.mark.slow),
         thorough("spheres", "single"),
     ],
+    1,
 )
 def test_all_widths_give_the_same_bits(name: str, precision: Literal["double", "single"], own: Cache) -> None:
     program = falling(own.folder.parent) if name == "spheres" else getattr(programs, name)()

@@ -39,6 +39,7 @@ def compare(functions: list[Any], cache: Cache, z: Any, precision: Any = "double
         np.testing.assert_allclose(gradient[i], slope, **close)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(st.lists(step, min_size=1, max_size=25), min_size=4, max_size=4),
@@ -74,6 +75,7 @@ def test_constants_in_a_row_are_written_by_a_loop(cache: Cache) -> None:
     assert len(lines(1020)) == len(lines(20)) and sum("for (" in line for line in lines(20)) == 3
 
 
+@pytest.mark.slow
 def test_a_long_function_is_cut(cache: Cache) -> None:
     compare([long_function()], cache, np.array([[0.1, -0.2, 0.3, 0.4, -0.5]]))
 

@@ -33,6 +33,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Cache:
     return Cache(tmp_path_factory.mktemp("kernels"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["spheres", thorough("capsules"), thorough("a box"), thorough("soft")])
 def test_a_heap_is_that_of_all_calls_to_the_last_bit(name: str, tmp_path: Path, cache: Cache) -> None:
     path = tmp_path / "heap.toml"

@@ -44,6 +44,7 @@ def same(one: ca.Function, other: ca.Function, world: World) -> None:
     assert moved
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["balls", "box"])
 def test_steps_that_are_built_together_are_those_built_alone(name: str) -> None:
     world = world_of(name)

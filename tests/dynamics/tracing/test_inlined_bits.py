@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
+import pytest
 
 from symphys import Body, Law, Plane, Scheme, step_function
 from symphys.codegen.program.interpret import interpret
@@ -18,6 +19,7 @@ VELOCITIES = np.random.default_rng(3).uniform(-1.5, 1.5, (4, 3))
 """With these the two differed from the fourteenth step on."""
 
 
+@pytest.mark.slow
 def test_a_heap_step_by_step() -> None:
     places = [(0.24 * (i % 2) - 0.12, 0.24 * (i // 2), 0.15) for i in range(4)]
     balls = tuple(Body.ball(f"b{i}", radius=0.1, mass=1.0, position=place) for i, place in enumerate(places))

@@ -85,10 +85,12 @@ def test_so_they_are_on_the_virtual_machine(name: str, tmp_path: Path) -> None:
     assert off_by(problem_of(name, tmp_path), "casadi", 0.01) < 1e-10
 
 
+@pytest.mark.slow
 def test_controllers_are_part_of_the_step() -> None:
     assert off_by(symphys.load(TABLES), "casadi") < 1e-10
 
 
+@pytest.mark.slow
 def test_a_start_beside_the_tangent_counts(tmp_path: Path) -> None:
     """The velocity of one body of a robot alone breaks its joints, and yet its slope is exact."""
     problem = problem_of(

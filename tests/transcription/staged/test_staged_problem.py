@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tools.repeats import first
+from tools.repeats import few
 
 from symphys.errors import SymphysError
 from symphys.problem import Problem, load_problem
@@ -254,12 +254,12 @@ value = "integral(rail.command**2) + 0.01 * sumsqr(push)"
 upper = 5
 """
 CASES = [
-    (WHOLE, 30, "constant"),
-    (WHOLE, 4, "linear"),
+    (BALL, 10, "constant"),
+    (CART, 5, "linear"),
     (CART, 30, "constant"),
     (CART, 4, "constant"),
-    (CART, 5, "linear"),
-    (BALL, 10, "constant"),
+    (WHOLE, 30, "constant"),
+    (WHOLE, 4, "linear"),
 ]
 
 
@@ -281,7 +281,7 @@ def made(text: str, knots: int, interpolation: str) -> tuple[Transcription, Stag
     return transcription, staged, staged.roll_out(transcription.shooting.start(3), 0.0)
 
 
-@pytest.mark.parametrize("case", CASES)
+@few("case", CASES, 3)
 def test_measures_are_those_of_the_whole(case: tuple[str, int, str]) -> None:
     transcription, staged, motion = made(*case)
     Z = np.stack([motion.z, transcription.shooting.start(4)])
@@ -296,7 +296,7 @@ def test_measures_are_those_of_the_whole(case: tuple[str, int, str]) -> None:
     np.testing.assert_array_equal(staged.upper, shooting.constraint_upper)
 
 
-@pytest.mark.parametrize("case", CASES)
+@few("case", CASES, 3)
 def test_the_gradient_along_the_steps_is_that_of_the_whole(case: tuple[str, int, str]) -> None:
     transcription, staged, motion = made(*case)
     size, rollout, terms = len(motion.z), transcription.rollout, transcription.terms
@@ -315,7 +315,7 @@ def test_the_gradient_along_the_steps_is_that_of_the_whole(case: tuple[str, int,
 
 
 @pytest.mark.slow
-@first("case", CASES)
+@few("case", CASES[4:], 1)
 def test_compiled_terms_are_those_of_the_virtual_machine(
     case: tuple[str, int, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -350,7 +350,7 @@ def state_slopes(staged: StagedProblem, motion: StagedMotion) -> Array:
     return slopes
 
 
-@pytest.mark.parametrize("case", CASES)
+@few("case", CASES, 3)
 def test_slopes_of_limits_are_those_of_the_whole(case: tuple[str, int, str]) -> None:
     transcription, staged, motion = made(*case)
     values, by_x, by_u, by_s = staged.limit_slopes(motion)

@@ -7,7 +7,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from tools.repeats import thorough
+from tools.repeats import few, thorough
 from worlds.staged_worlds import problem_of
 
 from symphys.model.state_layout import Layout
@@ -32,6 +32,7 @@ def states_of(name: str, folder: Path) -> tuple[Tangent, np.ndarray, np.ndarray]
     return made.tangent, np.array(states), p
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WORLDS)
 def test_states_of_a_rollout_lie_in_each_others_tangents(name: str, tmp_path: Path) -> None:
     tangent, states, p = states_of(name, tmp_path)
@@ -43,7 +44,7 @@ def test_states_of_a_rollout_lie_in_each_others_tangents(name: str, tmp_path: Pa
     assert np.abs(found - after).max() < 1e-13 * max(1.0, np.abs(after).max())
 
 
-@pytest.mark.parametrize("name", WORLDS)
+@few("name", WORLDS, 1)
 def test_difference_undoes_retract(name: str, tmp_path: Path) -> None:
     tangent, states, p = states_of(name, tmp_path)
     d = np.random.default_rng(0).normal(0, 0.3, (len(states), tangent.size))
@@ -54,6 +55,7 @@ def test_difference_undoes_retract(name: str, tmp_path: Path) -> None:
     assert len(set(tangent.names)) == tangent.size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WORLDS)
 def test_basis_and_projection_are_their_slopes(name: str, tmp_path: Path) -> None:
     tangent, states, p = states_of(name, tmp_path)
