@@ -77,6 +77,7 @@ def sup(exponent: int) -> str:
     return str(exponent).translate(str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("which", "factor"),
     [

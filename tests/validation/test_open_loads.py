@@ -100,6 +100,7 @@ def landing(width: float, restitution: float, sweeps: int = 10) -> Lab:
     return Lab(make_world([block("crate", CRATE)], [pedestal], law), Scheme(dt=0.01, sweeps=sweeps))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sweeps", "reverse"), [pytest.param(4, False, marks=pytest.mark.thorough), (4, True)])
 def test_a_hip_on_two_flat_feet_stands_straight(sweeps: int, reverse: bool) -> None:
     """Eight corners of two feet share the weight: no rate but those of rounding."""

@@ -110,6 +110,7 @@ def _in_order(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pgs, "projection_order", lambda constraints: list(range(len(constraints))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kinds", "law"),
     [
