@@ -68,7 +68,7 @@ def write_bytes(path: Path, content: bytes, at_once: bool = True) -> None:
             make_folder(path.parent)
             write_through(written, content)
         if at_once:
-            written.replace(path)
+            rename(written, path)
         whole = True
     except OSError as error:
         raise FileError(f"cannot write {path}: {reason(error)}") from error
@@ -84,6 +84,17 @@ def write_through(path: Path, content: bytes) -> None:
     if os.environ.get(FSYNC):
         with path.open("rb+") as file:
             os.fsync(file.fileno())
+
+
+def rename(written: Path, path: Path) -> None:
+    """Put a file in the place of another; its name waits for the disk as contents do. OSError if that cannot be."""
+    written.replace(path)
+    if os.environ.get(FSYNC) and hasattr(os, "O_DIRECTORY"):
+        folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
 
 
 def write_text(path: Path, text: str, at_once: bool = True) -> None:

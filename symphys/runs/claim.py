@@ -154,7 +154,7 @@ class Claim:
         made, path = self.path / name, self.folder / name
         try:
             put(made, content)
-            made.replace(path)
+            files.rename(made, path)
         except (FileNotFoundError, NotADirectoryError) as error:
             raise self.lost() from error
         except OSError as error:

@@ -301,3 +301,25 @@ def test_a_folder_that_cannot_be_written_fails_its_run_and_nothing_else(make_job
     assert "cannot make the folder" in result.advice
     (tmp_path / "out").unlink()
     assert run(make_job()).solved
+
+
+def test_the_files_of_a_run_wait_for_the_disk_where_that_is_asked_for(
+    make_job: MakeJob, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Contents before their names: what is done survives a power cut."""
+    waited: list[int] = []
+    whole = os.fsync
+
+    def fsync(descriptor: int) -> None:
+        waited.append(os.fstat(descriptor).st_ino)
+        whole(descriptor)
+
+    monkeypatch.setenv("SYMPHYS_FSYNC", "1")
+    monkeypatch.setattr(os, "fsync", fsync)
+    job = make_job()
+    run(job)
+    folder = job.folder.path
+    for file in folder.iterdir():
+        assert not file.is_file() or file.stat().st_ino in waited, file.name
+    result = waited.index((folder / "result.json").stat().st_ino)
+    assert folder.stat().st_ino in waited[result:], "the name of the result"
