@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from functools import cache
 
 import numpy as np
@@ -17,11 +18,17 @@ from symphys.transcription import Transcription, transcribe
 Array = NDArray[np.float64]
 
 
-HEAVY = {"load on two boards"}
-"""What takes a minute to build."""
-every = pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in HEAVY)) for name in FEATURES]
-)
+HEAVY = {"load on two boards", "inertia and centre of mass", "loop of joints"}
+"""What takes seconds to build, or minutes."""
+COMPILED = {"impacts with friction", "smoothed contact", "references", "universal joint", "sensors and controllers"}
+"""What is compiled in every run of the tests; kernels of the others in those of ``make test-all``."""
+
+
+def every(later: Container[str]) -> pytest.MarkDecorator:
+    """All features; those in ``later`` with ``make test-all``."""
+    return pytest.mark.parametrize(
+        "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in later)) for name in FEATURES]
+    )
 
 
 @cache
@@ -46,7 +53,7 @@ def merit_and_slope(name: str, backend: str) -> tuple[Array, Array]:
     return found.merit, found.gradient
 
 
-@every
+@every(later=FEATURES.keys() - COMPILED)
 def test_a_kernel_gives_what_the_virtual_machine_gives(name: str) -> None:
     merit, slope = merit_and_slope(name, "casadi")
     compiled, compiled_slope = merit_and_slope(name, "simd")
@@ -54,7 +61,7 @@ def test_a_kernel_gives_what_the_virtual_machine_gives(name: str) -> None:
     np.testing.assert_allclose(compiled_slope, slope, rtol=1e-8, atol=1e-9 * np.abs(slope).max())
 
 
-@every
+@every(later=HEAVY)
 def test_slopes_are_those_of_differences(name: str) -> None:
     """At the guess, where each counts."""
     evaluator, h = made(name).shooting.evaluator, 1e-6
@@ -79,7 +86,7 @@ def chained(staged: StagedProblem, z: Array) -> tuple[float, Array]:
     return costs.value, gradient
 
 
-@every
+@every(later=HEAVY)
 def test_stages_give_what_the_whole_gives(name: str) -> None:
     problem, whole = made(name), made(name).shooting
     assert whole.staged is not None
