@@ -83,7 +83,7 @@ def test_values_that_cannot_be(text: str, pattern: str) -> None:
 
 def test_none_and_a_key_twice() -> None:
     assert read_axes(["none", "a=1"]) == ((Levels("a", (1,)),), True)
-    with pytest.raises(SweepError, match="a is swept twice"):
+    with pytest.raises(SweepError, match=r"a .*twice"):
         read_axes(["a=1", "a=2"])
 
 

@@ -140,5 +140,5 @@ def test_what_cannot_be_names_table_and_key(change: dict[str, Any], message: str
 
 
 def test_a_single_step_has_no_free_duration() -> None:
-    with pytest.raises(SymphysError, match="a variable sets the duration, and a single step"):
+    with pytest.raises(SymphysError, match=r"duration.*single step"):
         compile_open_step(problem_of_tables(TABLES), backend="casadi")

@@ -113,7 +113,7 @@ def test_where_a_part_is_not_finite_is_said(tmp_path: Path) -> None:
 
 
 def test_a_single_step_has_no_whole_motion(tmp_path: Path) -> None:
-    with pytest.raises(SymphysError, match=r"integral.* is of a whole motion, and this is a single step"):
+    with pytest.raises(SymphysError, match=r"integral.*whole motion"):
         compile_open_step(load(tmp_path, BALL), backend="casadi")
 
 

@@ -297,5 +297,5 @@ def test_what_cannot_be_names_table_and_key(tables: dict[str, Any], message: str
 
 def test_a_single_step_has_no_phases() -> None:
     push = {"name": "push", "sets": "sled.force", "knots": 2}
-    with pytest.raises(SymphysError, match=r'phase "ice".sets: holds in a phase of a whole motion; this is one step'):
+    with pytest.raises(SymphysError, match=r'phase "ice".sets: .*whole motion'):
         compile_open_step(changed(variable=[push]), backend="casadi")

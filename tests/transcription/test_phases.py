@@ -169,8 +169,8 @@ def test_what_cannot_be_names_table_and_key(change: dict[str, Any], message: str
 
 
 def test_a_single_step_has_no_phases() -> None:
-    with pytest.raises(SymphysError, match="is a phase of a whole motion; this is one step"):
+    with pytest.raises(SymphysError, match="phase of a whole motion"):
         compile_open_step(problem_of_tables(TABLES), backend="casadi")
-    with pytest.raises(SymphysError, match=r'force "drag".during: is a phase of a whole motion; this is one step'):
+    with pytest.raises(SymphysError, match=r'force "drag".during: .*whole motion'):
         push = {"name": "push", "sets": "ball.force", "knots": 2}
         compile_open_step(problem_of_tables({**WADING, "variable": [push]}), backend="casadi")

@@ -140,13 +140,13 @@ def test_the_old_name_goes_on_working(path: Path) -> None:
     assert new.termination == old.termination
     assert [cost.formula.text for cost in new.costs] == [cost.formula.text for cost in old.costs]
     path.write_text(BALL.replace("[termination]", "[fall]").replace("- 0.5", "- 1.5"), encoding="utf-8")
-    with pytest.raises(ProblemError, match=r"fall\.margin: is -0.5"):
+    with pytest.raises(ProblemError, match=r"fall\.margin: .*-0.5"):
         load_problem(path)
 
 
 def test_both_names_are_refused(path: Path) -> None:
     path.write_text(f'{BALL}\n[fall]\nmargin = "1"\n', encoding="utf-8")
-    with pytest.raises(ProblemError, match=r"fall: is the old name of \[termination\], which is given too"):
+    with pytest.raises(ProblemError, match=r"fall: .*\[termination\]"):
         load_problem(path)
 
 
