@@ -68,8 +68,8 @@ def test_values() -> None:
 @pytest.mark.parametrize(
     ("table", "where", "message"),
     [
-        ({"iteratons": 5}, "solver.gradient.iteratons", 'did you mean "iterations"'),
-        ({"iterations": "5"}, "solver.gradient.iterations", 'whole number, not the text "5"'),
+        ({"iteratons": 5}, "solver.gradient.iteratons", '"iterations"'),
+        ({"iterations": "5"}, "solver.gradient.iterations", '"5"'),
         ({"iterations": 2.5}, "solver.gradient.iterations", "whole number, not 2.5"),
         ({"iterations": True}, "solver.gradient.iterations", "whole number, not true"),
         ({"iterations": 0}, "solver.gradient", "iterations must be at least 1"),

@@ -71,8 +71,8 @@ def test_a_fault_of_a_point_is_that_of_the_problem_and_names_the_point(load: Loa
 @pytest.mark.parametrize(
     ("text", "pattern"),
     [
-        ("ball.mas=1,2", 'did you mean "mass"'),
-        ("bal.mass=1,2", 'no "bal"; did you mean .*"ball"'),
+        ("ball.mas=1,2", '"mass"'),
+        ("bal.mass=1,2", '"ball"'),
         ("ball.mass=0,1", "greater than 0"),
         ("simulation.dt=0.01,0.03", "no whole number of steps"),
         ("title=1:2:2", "must be a name"),

@@ -143,24 +143,24 @@ FREE = {"name": "T", "sets": "simulation.duration"}
     [
         (
             {"output": [{"name": "o", "at": "end of flght", "value": "time"}]},
-            r'"o".at: there is no phase "flght"; did',
+            r'"o".at: .*"flght"',
         ),
-        ({"cost": [{"name": "c", "during": "fligt", "value": "time"}]}, r'"c".during: .*did you mean "flight"'),
+        ({"cost": [{"name": "c", "during": "fligt", "value": "time"}]}, r'"c".during: .*"flight"'),
         ({"cost": [{"name": "c", "during": "push", "at": "always", "value": "time"}]}, r"stands instead of at"),
         ({"cost": [{"name": "c", "during": "push", "value": "end.time"}]}, r"is of the whole motion"),
-        ({"phase": [{"name": "push"}, {"name": "short"}, {"name": "flight"}]}, r'phase "push".until: is needed'),
+        ({"phase": [{"name": "push"}, {"name": "short"}, {"name": "flight"}]}, r'phase "push".until: .*needed'),
         ({"phase": [{"name": "push", "until": 0.2, "share": 0.2}]}, r"stands instead of until"),
         ({"phase": [{"name": "push", "until": 0.205}]}, r"falls between two steps"),
         (
             {"phase": [{"name": "push", "until": 0.3}, {"name": "short", "until": 0.2}]},
-            r'"short".until: the phase before',
+            r'"short".until: .*before',
         ),
         (
             {"force": [{"name": "f", "on": "ball.force[0]", "value": "1", "during": "pusch"}]},
-            r'force "f".during: there is no phase "pusch"; did you mean "push"',
+            r'force "f".during: .*"push"',
         ),
         ({"phase": []}, r"there is no \[\[phase\]\]"),
-        ({"variable": [FREE]}, r'"push".until: is not known, since a variable sets the duration; give share'),
+        ({"variable": [FREE]}, r'"push".until: .*variable'),
     ],
 )
 def test_what_cannot_be_names_table_and_key(change: dict[str, Any], message: str) -> None:

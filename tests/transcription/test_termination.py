@@ -110,9 +110,9 @@ def test_without_a_termination_it_is_as_if_there_were_none(path: Path) -> None:
         (
             'name = "ahead"',
             'name = "termination"',
-            r'cost "termination"\.name: "termination" is the name of the cost that .termination. adds',
+            r'cost "termination"\.name: .*"termination"',
         ),
-        ("cost = 2", "cost = -2", r"termination\.cost: must be at least 0"),
+        ("cost = 2", "cost = -2", r"termination\.cost: .*at least 0"),
     ],
 )
 def test_bad_terminations_are_named(path: Path, old: str, new: str, told: str) -> None:
