@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from worlds import flights, hops, slides, swings
 from worlds.plate import Plate
 
+from symphys import problems
 from symphys.codegen.backends import BEST
 from symphys.solvers import Outcome, Status
 from symphys.trajectory import Trajectory
@@ -100,7 +101,8 @@ class Must:
 
     def cases(self) -> Iterable[Any]:
         """One a seed."""
-        what = "-".join((self.problem, self.solver, *("polished",) * self.polish))
+        stages = (f"stages {self.smoothing}",) if self.smoothing else ()
+        what = "-".join((self.problem, self.solver, *("polished",) * self.polish, *stages))
         for seed in range(self.seeds):
             marks = (pytest.mark.thorough,) if seed else self.marks
             yield pytest.param(self, seed, id=f"{what}-{seed}", marks=marks)
@@ -543,17 +545,17 @@ TABLE = [
     *rows("free_kick", "least_squares", quick="least_squares", law=curls_into_the_corner, polish=True),
     *rows("hopper_gait", "ipopt", law=closes_the_gait, finer=1, seeds=2),
     *rows("hopper_jump", "gradient", "gradient", of=3, wanted=2, law=jumps_half_a_metre),
-    *rows("ice_and_asphalt", "least_squares ilqr", "ilqr", law=stops_on_asphalt, backend="casadi"),
+    *rows("ice_and_asphalt", "least_squares ilqr", "ilqr", law=stops_on_asphalt),
     *rows("juggle", {"gradient": 60, "least_squares": 6, "ipopt": 30, "cma": 1500}, law=brings_bat_and_ball_back,
           seeds=2, backend="casadi"),
     *rows("juggle", "least_squares", quick="least_squares", law=meets_the_ball_with_the_speed_of_the_formula,
           polish=True, backend="casadi"),
-    *rows("knock", {"least_squares": 7}, answer=slides.KICK, within=[1e-4, 2e-3, 1e-4], polish=True, backend="casadi"),
+    *rows("knock", {"least_squares": 7}, answer=slides.KICK, within=[1e-4, 2e-3, 1e-4], polish=True),
     *rows("knock", {"gradient": 40, "ipopt": 18, "cma": 350}, "gradient ipopt cma", law=goes_along_as_fast, seeds=2),
     *rows("mini_cheetah_ahead", "ilqr", "ilqr", below=2.0, finer=1, law=lifts_every_foot),
     *rows("parcel", {"least_squares": 6}, answer=[3.6643, 0.5606, 3.7407], within=5e-4,
-          law=brings_the_plate(1e-4, 3e-3), polish=True, backend="casadi"),
-    *rows("parcel", {"gradient": 14}, law=brings_the_plate(0.01, np.inf), seeds=2, backend="casadi"),
+          law=brings_the_plate(1e-4, 3e-3), polish=True),
+    *rows("parcel", {"gradient": 14}, law=brings_the_plate(0.01, np.inf), seeds=2),
     *rows("parcel", {"ipopt": 15, "cma": 350}, "ipopt cma", law=brings_the_plate(0.01, np.inf), seeds=2),
     *rows("pendulum", "ilqr", quick="ilqr", below=44.827183 * (1 + 1e-3), law=swings_up_pendulum, seeds=5),
     *rows("planar_hopper", "ilqr", "ilqr", of=3, law=flies_a_parabola),
@@ -597,6 +599,19 @@ def test_shipped_problem(must: Must, seed: int) -> None:
         must.law(each)
     if must.finer:
         assert sum(each.halved.judge(each.z).worst < 1 for each in found) >= must.finer
+
+
+ELSEWHERE = {
+    *("ball_throw", "bounce_recorded"),
+    *("ant_walk", "half_cheetah_run", "hopper_run", "walker2d_walk"),
+    *("gait_robot_build", "gait_robot_fast", "gait_robot_trot", "quadruped_walk", "quadruped_walk_net"),
+    *("mini_cheetah_mpc", "planar_hopper_mpc"),
+}
+"""What has tests of its own: in ``tests/solvers``, of recordings, imported models and walks, and in ``tests/mpc``."""
+
+
+def test_every_shipped_problem_has_a_row() -> None:
+    assert {row.problem for row in TABLE} == set(problems.catalogue()) - ELSEWHERE
 
 
 @pytest.mark.thorough
