@@ -126,7 +126,7 @@ def test_an_interrupted_batch_goes_on(problem: symphys.Problem, tmp_path: Path) 
             signal.raise_signal(signal.SIGINT)
 
     asked: dict[str, Any] = {"solvers": ["least_squares"], "seeds": 2, "backend": "casadi", "folder": tmp_path}
-    with pytest.raises(KeyboardInterrupt, match="1 of 2 runs are done"):
+    with pytest.raises(KeyboardInterrupt, match="1 of 2 runs"):
         symphys.solve_all([problem], progress=press, **asked)
     assert [each.solved for each in symphys.solve_all([problem], **asked)] == [True, True]
 

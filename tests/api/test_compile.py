@@ -43,7 +43,7 @@ def test_variables_by_name(rollout: symphys.CompiledRollout) -> None:
     assert np.array_equal(parts["push"], np.full((3, 1), 2)) and np.array_equal(parts["throw"], [1, 2, 3])
     assert np.array_equal(rollout.z(parts), z)
     assert np.array_equal(rollout.z(push=[1, 2, 3]), rollout.z(push=[[1], [2], [3]]))
-    with pytest.raises(symphys.SymphysError, match=r'"push" takes numbers of shape \(3, 1\), \(knots, components\)'):
+    with pytest.raises(symphys.SymphysError, match=r'"push" .*\(3, 1\)'):
         rollout.z(push=[1, 2])
     with pytest.raises(symphys.SymphysError, match="push"):
         rollout.z(pusch=1)
@@ -72,6 +72,6 @@ def test_without_squares_there_are_no_residuals(backend: str) -> None:
     tables = {**TABLES, "cost": [{"name": "low", "value": "ball.position[2]"}]}
     rollout = symphys.compile(tables, backend=backend)
     for asked in (rollout.residuals, rollout.jacobian):
-        with pytest.raises(symphys.SymphysError, match="problem: its value is no sum of squares"):
+        with pytest.raises(symphys.SymphysError, match=r"problem: .*squares"):
             asked(rollout.z())
     assert np.isfinite(rollout.gradient(rollout.z())).all()

@@ -83,7 +83,5 @@ def test_a_robot_is_changed_by_its_own_names() -> None:
 def test_settings_in_a_file_must_be_a_table(tmp_path: Path) -> None:
     path = tmp_path / "bad.toml"
     path.write_text("set = 3\n" + symphys.load("ball_throw").text, encoding="utf-8")
-    with pytest.raises(
-        symphys.ProblemError, match=r'set: must be a table of dotted keys, not 3; .*"body.ball.mass" = 2'
-    ):
+    with pytest.raises(symphys.ProblemError, match=r'set: .*"body.ball.mass" = 2'):
         symphys.load(path)

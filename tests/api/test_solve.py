@@ -112,7 +112,7 @@ def test_a_run_that_fails_raises(problem: symphys.Problem, monkeypatch: pytest.M
 )
 def test_a_backend_that_is_none(call: Callable[[], object], valid: str) -> None:
     """Such as a name that is one of an option of a solver."""
-    with pytest.raises(SymphysError, match=f"there is no backend 'ipopt'; valid: auto, simd, simd32, cuda, {valid}$"):
+    with pytest.raises(SymphysError, match=f"'ipopt'.*auto, simd, simd32, cuda, {valid}$"):
         call()
 
 
@@ -123,7 +123,7 @@ def test_read_names_what_is_no_run(tmp_path: Path) -> None:
 
 def test_a_batch_has_limits_and_does_again_what_is_asked_for(tmp_path: Path) -> None:
     for given in ({"rerun": "faild"}, {"retries": -1}, {"timeout": 0.0}, {"budget": -1.0}):
-        with pytest.raises(SymphysError, match=r"failed|retries must be"):
+        with pytest.raises(SymphysError, match=r"failed|retries"):
             symphys.solve_all(["ball_throw"], ["least_squares"], folder=tmp_path, **given)  # type: ignore[arg-type]
     written = []
     for rerun in (None, None, "all"):

@@ -74,14 +74,14 @@ def test_joints_move_alike() -> None:
 def test_joints_that_do_not_hold_are_refused() -> None:
     """A body beside its joint; a loop whose coordinates are not 0."""
     world, start = mixed()
-    with pytest.raises(SymphysError, match=r"joint 'hinge0': its two sides are 0\.1 m and .* rad from where"):
+    with pytest.raises(SymphysError, match=r"joint 'hinge0': .*0\.1 m"):
         Problem.from_world(world, start | {"b1.position": start["b1.position"] + [0.1, 0, 0]}, duration=0.3)
     rod = Body("rod", 1.0, 0.1)
     frames = (JointFrame((0, 0, 0.5)), JointFrame())
     loop = World((rod,), joints=tuple(Joint(name, HINGE, 0, None, frames) for name in ("one", "other")))
     turned = {"rod.orientation": [np.cos(0.2), np.sin(0.2), 0, 0]}
     turned["rod.position"] = [0, 0.5 * np.sin(0.4), -0.5 * np.cos(0.4)]
-    with pytest.raises(SymphysError, match="'other': its coordinates are not 0 at the start, and it closes a loop"):
+    with pytest.raises(SymphysError, match=r"'other': .*loop"):
         Problem.from_world(loop, turned, duration=0.3)
 
 

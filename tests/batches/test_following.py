@@ -173,7 +173,7 @@ def test_a_machine_that_does_not_see_the_folder_says_so(make_job: MakeJob, tmp_p
     board = Board.hang(tmp_path / "out")
     task = DriverTask(board, (make_job(0),), transcribe, BatchLimits())
     shutil.rmtree(tmp_path / "out")
-    with pytest.raises(FileError, match=r"does not see .*out: runs must be written to a folder"):
+    with pytest.raises(FileError, match="out: "):
         drive(task)
 
 
@@ -222,7 +222,7 @@ def test_a_driver_leaves_out_what_another_has_ended(make_job: MakeJob, tmp_path:
 
 
 def test_engines_that_are_none_are_named(tmp_path: Path) -> None:
-    with pytest.raises(EngineError, match="no such engine 'dusk'; did you mean \"dask\""):
+    with pytest.raises(EngineError, match=r"'dusk'.*dask"):
         open_engine("dusk", "", 1, tmp_path)
 
 
@@ -233,5 +233,5 @@ def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.M
         raise ModuleNotFoundError("No module named 'dask'", name="dask")
 
     monkeypatch.setattr("symphys.batches.engines.import_module", missing)
-    with pytest.raises(EngineError, match=r'dask needs the package dask: pip install "symphys\[dask\]"'):
+    with pytest.raises(EngineError, match=r'pip install "symphys\[dask\]"'):
         open_engine("dask", "", 1, tmp_path)

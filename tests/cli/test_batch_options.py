@@ -20,7 +20,7 @@ def test_times_have_units() -> None:
     texts = ("90", "90s", "1.5 min", "2h", "1d")
     assert [read_time("--budget", text) for text in texts] == [90, 90, 90, 7200, 86400]
     for text in ("0", "-1", "ten", "5 m", "1..2", ""):
-        with pytest.raises(UsageFault, match=r"--budget .*such as 90, 90s, 10min, 2h or 1d"):
+        with pytest.raises(UsageFault, match=r"--budget .*10min"):
             read_time("--budget", text)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from symphys import problems
 from symphys.codegen.backends import BEST
 from symphys.problem import load_problem, validate_options
-from symphys.solvers import Outcome, Status, solver
+from symphys.solvers import Outcome, solver
 from symphys.transcription import Transcription, transcribe
 
 Array = NDArray[np.float64]
@@ -25,9 +25,9 @@ def seeds(count: int) -> pytest.MarkDecorator:
 
 
 @cache
-def shipped(name: str, backend: str = BEST) -> Transcription:
+def shipped(name: str, backend: str = BEST, settings: tuple[tuple[str, object], ...] = ()) -> Transcription:
     """A shipped problem; "casadi" is cheaper than a kernel where few rollouts are asked for."""
-    return transcribe(load_problem(problems.find(name)), backend=backend)
+    return transcribe(load_problem(problems.find(name), dict(settings)), backend=backend)
 
 
 def solve(name: str, made: Transcription, seed: int = 0, polish: bool = False) -> Outcome:
@@ -44,7 +44,7 @@ def met(name: str, made: Transcription, of: int, wanted: int) -> list[Outcome]:
     found: list[Outcome] = []
     for seed in range(of):
         outcome = solve(name, made, seed)
-        found += [outcome] if outcome.status == Status.MET else []
+        found += [outcome] if made.judge(outcome.z).solved else []
         if len(found) == wanted:
             return found
     raise AssertionError(f"only {len(found)} of {of} seeds met all")

@@ -37,7 +37,7 @@ def test_what_is_not_ours_stays_and_nothing_is_written(tmp_path: Path, kind: str
         target.mkdir()
     else:
         target.symlink_to(other)
-    with pytest.raises(ExportError, match=r"b\.c was not written by symphys, or was changed since"):
+    with pytest.raises(ExportError, match=r"b\.c"):
         write_folders({tmp_path / "first": CONTENT, tmp_path / "here": CONTENT})
     assert not (tmp_path / "first").exists()
     assert not (tmp_path / "here" / "a.c").exists()
@@ -64,8 +64,8 @@ def test_an_interrupted_export_can_be_done_again(tmp_path: Path, monkeypatch: py
 
 def test_a_list_that_is_none_is_named(tmp_path: Path) -> None:
     (tmp_path / LIST).write_text("[1]", "utf-8")
-    with pytest.raises(ExportError, match="is not a list of exported files"):
+    with pytest.raises(ExportError, match="exported files"):
         write_folders({tmp_path: CONTENT})
     (tmp_path / LIST).write_text("{", "utf-8")
-    with pytest.raises(files.FileError, match="is not valid JSON"):
+    with pytest.raises(files.FileError, match="JSON"):
         write_folders({tmp_path: CONTENT})

@@ -123,7 +123,7 @@ def test_what_mjcf_cannot_say_is_named(world: World, words: str) -> None:
 
 def test_many_names_are_not_listed() -> None:
     balls = [Body.ball(f"ball{k}", 0.1, 1.0) for k in range(4)]
-    with pytest.raises(ExportError, match=r"ball0-ball1 and 5 more: restitution"):
+    with pytest.raises(ExportError, match=r"ball0-ball1 .*restitution"):
         mjcf(make_world(balls, [Plane.ground()], Law(0.5, 0.8)), {}, 0.01)
 
 

@@ -197,7 +197,7 @@ def test_what_is_left_out_is_in_the_world_without_it() -> None:
 
 def test_a_joint_that_does_not_fit_is_refused_in_any_case() -> None:
     arm = Joint("arm", HINGE, 0, None, (JointFrame((0, 0, 1)), JointFrame()))
-    with pytest.raises(ExportError, match="arm: a joint that does not fit"):
+    with pytest.raises(ExportError, match=r"arm: .*joint"):
         mjcf_model(World((Body("rod", 2.0, 0.1),), joints=(arm,)), {}, 0.01, approximate=True)
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-MOST_TERMS = 60
 MADE = {"build/kernels"}
 """Paths that are made by running something."""
 WRITTEN = {"api.md", "problem_reference.md"}
@@ -17,28 +16,24 @@ WRITTEN = {"api.md", "problem_reference.md"}
 PAGES = sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name not in WRITTEN)
 DOCUMENTS = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", *(f"docs/{page}" for page in PAGES)]
 FRONT_PAGE = "docs/index.md"
-MOST_LINES, MOST_WORDS = 200, 1500
-"""Of README.md, and of ARCHITECTURE.md: what is more goes to docs/."""
 
 
-def entries() -> list[tuple[str, str, str]]:
-    """(term, meaning, where) of the glossary."""
+def entries() -> list[tuple[str, str]]:
+    """(term, where) of the glossary."""
     lines = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8").splitlines()
     rows = [line.strip("|").split("|") for line in lines if line.startswith("| ")][1:]
-    return [(term.strip(), meaning.strip(), where.strip()) for term, meaning, where in rows]
+    return [(term.strip(), where.strip()) for term, _, where in rows]
 
 
-def test_the_glossary_is_short_sorted_and_one_fact_a_sentence() -> None:
-    terms = [term.casefold() for term, _, _ in entries()]
-    assert len(terms) <= MOST_TERMS
+def test_the_glossary_is_sorted_and_has_each_term_once() -> None:
+    terms = [term.casefold() for term, _ in entries()]
     assert terms == sorted(set(terms))
-    assert [term for term, meaning, _ in entries() if not meaning.endswith(".")] == []
 
 
 def test_every_term_lives_where_the_glossary_says() -> None:
     missing = [
         (term, path)
-        for term, _, where in entries()
+        for term, where in entries()
         for path in re.findall(r"`([^`]+)`", where)
         if not (ROOT / path).exists()
     ]
@@ -65,11 +60,6 @@ def test_every_page_is_named_on_the_front_page() -> None:
     """With a link that people see; the contents beside it are tested with the site."""
     text = (ROOT / FRONT_PAGE).read_text(encoding="utf-8")
     assert [page for page in PAGES if page != "index.md" and f"({page})" not in text] == []
-
-
-def test_the_documents_that_people_open_first_are_short() -> None:
-    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= MOST_LINES
-    assert len((ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8").split()) <= MOST_WORDS
 
 
 @cache

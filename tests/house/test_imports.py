@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-MOST_MODULES = 15
 PACKAGE = "symphys"
 ROOMS: dict[str, tuple[str, str, str]] = {
     "version": ("", "", "the version of the package"),
@@ -193,14 +192,6 @@ def test_reading_a_problem_takes_no_time_step() -> None:
     assert of_step <= modules().keys()
     assert "symphys.dynamics.observation.queries" in parts
     assert not of_step & parts
-
-
-def test_folders_are_small() -> None:
-    """At most so many modules, ``__init__`` aside."""
-    sizes: dict[Path, int] = {}
-    for path in modules().values():
-        sizes[path.parent] = sizes.get(path.parent, 0) + (path.stem not in FACADE)
-    assert {str(folder.relative_to(ROOT)): size for folder, size in sizes.items() if size > MOST_MODULES} == {}
 
 
 def test_public_classes_have_names_of_their_own() -> None:

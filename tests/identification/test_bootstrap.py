@@ -80,5 +80,5 @@ def test_skewed_draws_move_the_interval() -> None:
 def test_few_recordings_and_few_draws_make_none() -> None:
     found = identify(recordings(TRUTHS["slide"], 0))
     assert "needs at least 5, there are 3" in found.bootstrap_note and np.isnan(found["friction"].bootstrap_lower)
-    with pytest.raises(IdentificationError, match="at least 100"):
+    with pytest.raises(IdentificationError, match="100"):
         identify(many("slide", 0), IdentificationOptions(draws=10))

@@ -87,9 +87,9 @@ def test_what_is_no_record_is_an_error_that_names_the_file(found: Identification
             read_identification(tmp_path)
     del table["merit"]
     (tmp_path / IDENTIFICATION).write_text(json.dumps(table), encoding="utf-8")
-    with pytest.raises(SymphysError, match="lacks merit"):
+    with pytest.raises(SymphysError, match="merit"):
         read_identification(tmp_path)
-    with pytest.raises(KeyError, match="there are gravity, restitution"):
+    with pytest.raises(KeyError, match="gravity, restitution"):
         found["friction"]
 
 
@@ -123,7 +123,7 @@ def broken_below(height: float) -> Model:
 def test_a_start_that_is_not_finite_is_an_error_with_the_recording() -> None:
     problem = bounces()
     problem.model, problem.own.guess[4] = broken_below(0.6), 0.5
-    with pytest.raises(IdentificationError, match="toss/0004 is not finite at the guess"):
+    with pytest.raises(IdentificationError, match="toss/0004"):
         identify(problem)
 
 

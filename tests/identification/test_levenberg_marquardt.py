@@ -184,13 +184,13 @@ def test_memory_is_linear_in_the_recordings() -> None:
 
 
 def test_options_and_parameters_say_what_is_valid() -> None:
-    with pytest.raises(IdentificationError, match="damping is 0: it must be above 0"):
+    with pytest.raises(IdentificationError, match="damping is 0"):
         FitOptions(damping=0)
-    with pytest.raises(IdentificationError, match="friction: the guess must lie between the bounds"):
+    with pytest.raises(IdentificationError, match=r"friction: .*bounds"):
         fit_parameters(("mass", "friction"), [1.0, 0.5], upper=[2.0, 0.4])
-    with pytest.raises(IdentificationError, match="mass: the scale must be a number above 0"):
+    with pytest.raises(IdentificationError, match=r"mass: .*scale"):
         fit_parameters(("mass", "friction"), [1.0, 0.5], scale=[0.0, 1.0])
     problem = recordings(TRUTHS["slide"], 0)
     problem.held_back[:] = True
-    with pytest.raises(IdentificationError, match="all are held back"):
+    with pytest.raises(IdentificationError, match="held back"):
         RecordingFit(problem, FitOptions())

@@ -67,5 +67,5 @@ def test_the_seed_alone_decides() -> None:
 
 
 def test_options_say_what_is_valid() -> None:
-    with pytest.raises(IdentificationError, match="starts is 0: it must be at least 1"):
+    with pytest.raises(IdentificationError, match=r"starts is 0.* 1"):
         SearchOptions(starts=0)

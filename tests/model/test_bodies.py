@@ -86,10 +86,10 @@ def test_the_start_is_no_part_of_a_body() -> None:
         (lambda: Body.capsule("b", 1.0, 1e-9, 1.0), "use a sphere"),
         (lambda: Body.compound("b", [Sphere(0.1, (1.0, 0, 0))], 1.0), r"1 m from the body's origin, at \[1, 0, 0\]"),
         (lambda: Body.compound("b", [], 1.0), "needs shapes"),
-        (lambda: Body.ball("b", 0.1, 1.0, positon=(0, 0, 0)), 'did you mean "position"'),
+        (lambda: Body.ball("b", 0.1, 1.0, positon=(0, 0, 0)), '"position"'),
         (lambda: Body.ball("b", 0.1, 1.0, velocity=ca.SX.sym("v", 3)), "symbols go into initial_state"),
         (lambda: Body.ball("b", 0.1, 1.0, velocity=(0, 0)), "velocity must be 3 numbers"),
-        (lambda: Body.ball("b", 0.1, 1.0, orientation=(0, 0, 0, 0)), "orientation: a quaternion must not be zero"),
+        (lambda: Body.ball("b", 0.1, 1.0, orientation=(0, 0, 0, 0)), r"orientation: .*quaternion"),
         (lambda: Body.ball("b", 0.1, 1.0, orientation={"yaw": 1}), "has no yaw; valid: roll_deg"),
     ],
 )

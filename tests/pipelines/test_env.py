@@ -67,5 +67,5 @@ def test_spaces(problem: symphys.Problem) -> None:
 def test_a_motion_that_is_not_finite_is_said(problem: symphys.Problem) -> None:
     env = symphys.env.Env(problem)
     env.reset(seed=0)
-    with pytest.raises(symphys.SymphysError, match=r"environment 0: cart.position.* not finite after step 1"):
+    with pytest.raises(symphys.SymphysError, match=r"environment 0: cart.position.*step 1"):
         env.step([np.nan])

@@ -85,5 +85,5 @@ def test_quantities_over_time(problem: symphys.Problem) -> None:
         return (value + position.pow(3).sum((1, 2)) + 2 * place[:, 7, 0]).sum()
 
     assert torch.autograd.gradcheck(loss, (Z[:1].detach().requires_grad_(),), eps=1e-6, atol=1e-5, rtol=1e-5)
-    with pytest.raises(symphys.SymphysError, match=r'there is no "ball.positon"; did you mean "ball.position"'):
+    with pytest.raises(symphys.SymphysError, match=r'"ball.positon".*"ball.position"'):
         symphys.torch.rollout(problem, "ball.positon")

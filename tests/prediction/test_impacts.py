@@ -105,11 +105,11 @@ def test_starts_of_what_is_held_back_come_from_where_the_setting_says() -> None:
 
 def test_settings_are_checked() -> None:
     tables = problem()
-    with pytest.raises(symphys.SymphysError, match=r"must be a list of shares above 0 that rise to 1"):
+    with pytest.raises(symphys.SymphysError, match=r"above 0 .*1"):
         symphys.load(dropped(0.4) | {"identify": {"horizons": [0.5, 0.3]}})
     with pytest.raises(symphys.SymphysError, match="held_back_starts"):
         symphys.identify(tables, threads=1, held_back_starts="after impact")
-    with pytest.raises(symphys.SymphysError, match=r"loss is 'hubber'.*huber"):
+    with pytest.raises(symphys.SymphysError, match=r"'hubber'.*huber"):
         symphys.identify(tables, threads=1, loss="hubber")
     grown = symphys.identify(tables, threads=1, horizons=[0.5, 1])
     assert grown["bounce"].value == pytest.approx(0.7, abs=0.005)

@@ -47,7 +47,7 @@ def test_exact_recordings_of_unknown_noise_are_met_exactly() -> None:
 
 
 def test_nothing_to_fit_to_is_said() -> None:
-    with pytest.raises(symphys.SymphysError, match="no recording has a number of ball"):
+    with pytest.raises(symphys.SymphysError, match="ball"):
         found({"time": [0.0, 0.1], "z": [NAN, NAN]})
-    with pytest.raises(symphys.SymphysError, match="all are held back"):
+    with pytest.raises(symphys.SymphysError, match="held back"):
         found(TABLE, held_back=True)

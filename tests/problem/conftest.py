@@ -8,63 +8,10 @@ from pathlib import Path
 
 import pytest
 from worlds.included import MAIN, ROBOT
+from worlds.two_balls import TWO_BALLS
 
 from symphys.errors import ProblemError
 from symphys.problem import Problem, load_problem
-
-VALID = """
-title = "Two balls"
-
-[simulation]
-duration = 1.0
-dt = 0.01
-
-[[body]]
-name = "ball"
-shape = { sphere = { radius = 0.5 } }
-mass = 2.0
-position = [0, 0, 1]
-friction = 0.5
-
-[[body]]
-name = "marble"
-shape = { sphere = { radius = 0.1 } }
-density = 1000.0
-position = [2, 0, 1]
-
-[ground]
-friction = 0.8
-restitution = 0.5
-
-[[variable]]
-name = "throw"
-sets = "ball.velocity"
-guess = [1, 2, 3]
-
-[[variable]]
-name = "push"
-sets = "marble.force[0:2]"
-knots = 4
-
-[[cost]]
-name = "effort"
-at = "always"
-squares = "marble.force"
-
-[[target]]
-name = "lands there"
-value = "ball.position - [1, 0, 0.5]"
-tolerance = 0.01
-
-[[constraint]]
-name = "stays low"
-at = "always"
-value = "ball.position[2]"
-upper = 5
-
-[solver.gradient]
-iterations = 10
-"""
 
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]
@@ -72,14 +19,14 @@ Refused = Callable[..., ProblemError]
 
 @pytest.fixture(scope="session")
 def valid() -> str:
-    return VALID
+    return TWO_BALLS
 
 
 @pytest.fixture
 def load(tmp_path: Path) -> Load:
     """A function that loads a text, by default the valid one, with pairs of old and new pieces."""
 
-    def load(*changes: tuple[str, str], text: str = VALID, settings: Mapping[str, object] | None = None) -> Problem:
+    def load(*changes: tuple[str, str], text: str = TWO_BALLS, settings: Mapping[str, object] | None = None) -> Problem:
         for old, new in changes:
             assert text.count(old) >= 1, f"{old!r} is not in the text"
             text = text.replace(old, new, 1)
@@ -95,7 +42,7 @@ def refused(load: Load) -> Refused:
     """The error that a changed text raises."""
 
     def refused(
-        *changes: tuple[str, str], text: str = VALID, settings: Mapping[str, object] | None = None
+        *changes: tuple[str, str], text: str = TWO_BALLS, settings: Mapping[str, object] | None = None
     ) -> ProblemError:
         with pytest.raises(ProblemError) as caught:
             load(*changes, text=text, settings=settings)
@@ -138,16 +85,3 @@ def load_both(write_both: Callable[..., Path]) -> Load:
         return load_problem(write_both(**changes), settings or {})
 
     return load
-
-
-@pytest.fixture
-def refused_both(write_both: Callable[..., Path]) -> Callable[..., list[str]]:
-    """The lines of the error, with paths from the problem's folder on."""
-
-    def refused(*, settings: Mapping[str, object] | None = None, **changes: object) -> list[str]:
-        path = write_both(**changes)
-        with pytest.raises(ProblemError) as caught:
-            load_problem(path, settings or {})
-        return str(caught.value).replace(f"{path.parent}/", "").splitlines()
-
-    return refused

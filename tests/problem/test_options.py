@@ -68,8 +68,8 @@ def test_values() -> None:
 @pytest.mark.parametrize(
     ("table", "where", "message"),
     [
-        ({"iteratons": 5}, "solver.gradient.iteratons", 'did you mean "iterations"'),
-        ({"iterations": "5"}, "solver.gradient.iterations", 'whole number, not the text "5"'),
+        ({"iteratons": 5}, "solver.gradient.iteratons", '"iterations"'),
+        ({"iterations": "5"}, "solver.gradient.iterations", '"5"'),
         ({"iterations": 2.5}, "solver.gradient.iterations", "whole number, not 2.5"),
         ({"iterations": True}, "solver.gradient.iterations", "whole number, not true"),
         ({"iterations": 0}, "solver.gradient", "iterations must be at least 1"),
@@ -93,15 +93,15 @@ def test_refused(table: dict[str, object], where: str, message: str) -> None:
 
 
 def test_a_required_option() -> None:
-    with pytest.raises(ProblemError, match=r"solver\.x\.population: this key is required"):
+    with pytest.raises(ProblemError, match=r"solver\.x\.population: .*required"):
         validate_options(Needy, {}, "file.toml", "solver.x")
 
 
 def test_names_of_solvers() -> None:
     require_solvers(["cma"], ["gradient"], ["cma", "gradient"], "file.toml")
-    with pytest.raises(ProblemError, match=r'solver\.gradeint: there is no solver "gradeint"; did you mean "gradient"'):
+    with pytest.raises(ProblemError, match=r'solver\.gradeint: .*"gradient"'):
         require_solvers(["cma", "gradeint"], [], ["cma", "gradient"], "file.toml")
-    with pytest.raises(ProblemError, match=r'solvers\[1\]: there is no solver "cmaes"; did you mean "cma"'):
+    with pytest.raises(ProblemError, match=r'solvers\[1\]: .*"cma"'):
         require_solvers([], ["gradient", "cmaes"], ["cma", "gradient"], "file.toml")
 
 
@@ -116,9 +116,7 @@ def renamed(table: dict[str, object]) -> Renamed:
 
 def test_old_names_go_on_working() -> None:
     assert renamed({"forget": 5}) == renamed({"adjoint_discount": 5}) == Renamed(5.0)
-    with pytest.raises(
-        ProblemError, match=r"solver.gradient.forget: is the old name of adjoint_discount, which is given"
-    ):
+    with pytest.raises(ProblemError, match=r"solver.gradient.forget: .*adjoint_discount"):
         renamed({"forget": 5, "adjoint_discount": 5})
 
 

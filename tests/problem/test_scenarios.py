@@ -137,5 +137,5 @@ def test_nothing_differs_twice(load: Load) -> None:
     twice = table('sets = "torso.velocity"', "shift = 0.1") + table('robot = "leg"', "velocity = 0.1").replace(
         '"s"', '"t"'
     )
-    with pytest.raises(ProblemError, match=r'scenario "t"\.robot: torso.velocity\[0\] is set by scenario s already'):
+    with pytest.raises(ProblemError, match=r'scenario "t"\.robot: torso.velocity\[0\] .*scenario s'):
         load(twice)

@@ -18,7 +18,7 @@ from symphys.results.trace import read_trace
 from symphys.results.trajectories import read_trajectory
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
-WORDS = "this is a named pipe, a regular file is needed"
+PIPE = "named pipe"
 ARM = """
 include = [{ file = "arm.toml" }]
 [simulation]
@@ -74,30 +74,31 @@ def pipe(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
     ],
 )
 def test_a_pipe_is_refused(pipe: Callable[[str], Path], read: Callable[[Path], object], name: str) -> None:
-    with pytest.raises(SymphysError, match=f"{name}: .*{WORDS}"):
+    with pytest.raises(SymphysError, match=f"{name}: .*{PIPE}"):
         read(pipe(name))
 
 
 def test_a_trace_that_is_a_pipe(pipe: Callable[[str], Path]) -> None:
     faults = list[str]()
     assert read_trace(pipe("trace.csv"), faults).columns == {}
-    assert faults == [f"trace.csv: {WORDS}"]
+    (fault,) = faults
+    assert fault.startswith("trace.csv: ") and PIPE in fault
 
 
 @pytest.mark.parametrize(("text", "name"), [(ARM, "arm.toml"), (NET, "w.npy")])
 def test_a_pipe_that_a_problem_names(pipe: Callable[[str], Path], tmp_path: Path, text: str, name: str) -> None:
     pipe(name)
     (tmp_path / "problem.toml").write_text(text, "utf-8")
-    with pytest.raises(SymphysError, match=rf"{name}\b.* cannot be read: {WORDS}"):
+    with pytest.raises(SymphysError, match=rf"{name}\b.*{PIPE}"):
         load_problem(tmp_path / "problem.toml")
 
 
 def test_a_pipe_in_the_way_of_an_export(pipe: Callable[[str], Path], tmp_path: Path) -> None:
     pipe("README.txt")
-    with pytest.raises(ExportError, match=r"README.txt was not written by symphys"):
+    with pytest.raises(ExportError, match=r"README.txt"):
         write_folders({tmp_path: {"README.txt": b"text"}})
 
 
 def test_a_device_is_refused() -> None:
-    with pytest.raises(ReportError, match="this is a device"):
+    with pytest.raises(ReportError, match="device"):
         read_words(Path("/dev/zero"))

@@ -168,5 +168,5 @@ def test_a_block_keeps_its_place() -> None:
 
 
 def test_joints_follow_a_start_only_where_they_hold() -> None:
-    with pytest.raises(SymphysError, match=r"joint 'shoulder': its two sides are 1\.2 m and 0 rad from where"):
+    with pytest.raises(SymphysError, match=r"joint 'shoulder': .*1\.2 m and 0 rad"):
         Problem.from_world(double_pendulum(), {"upper.position": [0, 0, 2]}, duration=0.5)

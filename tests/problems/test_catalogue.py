@@ -119,7 +119,7 @@ def test_a_path_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("name", ["ball_thro", "problems/ball_thro.toml", "Ball_Throw.toml"])
 def test_the_nearest_name_is_offered(name: str) -> None:
-    with pytest.raises(SymphysError, match='did you mean "ball_throw"'):
+    with pytest.raises(SymphysError, match='"ball_throw"'):
         problems.find(name)
 
 
@@ -135,7 +135,7 @@ def test_the_folder_is_no_package_of_its_own() -> None:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    with pytest.raises(ImportError, match=r"symphys\.problems, but was imported as 'problems'"):
+    with pytest.raises(ImportError, match=r"symphys\.problems"):
         spec.loader.exec_module(module)
 
 

@@ -61,7 +61,7 @@ def test_what_is_not_finite_is_cut_off(tmp_path: Path) -> None:
 
 def test_joints_that_do_not_fit_are_named(tmp_path: Path) -> None:
     np.savez(tmp_path / "trajectory.npz", **BODIES, **{**JOINTS, "joint_rate": VALUE[:3]})
-    with pytest.raises(ReportError, match="joint_rate has shape"):
+    with pytest.raises(ReportError, match="joint_rate"):
         read_trajectory(tmp_path / "trajectory.npz")
 
 
@@ -88,14 +88,14 @@ def test_what_takes_too_much_memory_is_refused_before_it_is_unpacked(
     tmp_path: Path, shape: tuple[int, ...], kind: str, size: str
 ) -> None:
     declaring(tmp_path / "trajectory.npz", velocity=(shape, kind))
-    with pytest.raises(ReportError, match=rf"trajectory.npz: velocity takes .*{size} in memory; at most 1 GiB"):
+    with pytest.raises(ReportError, match=rf"trajectory.npz: velocity .*{size}.* 1 GiB"):
         read_trajectory(tmp_path / "trajectory.npz")
 
 
 def test_what_takes_too_much_together_is_refused(tmp_path: Path) -> None:
     torque = (3, 14 * 2**20, 3), "|i1"
     declaring(tmp_path / "guess.npz", velocity=((4, 2**23, 2), "<f8"), torque=torque)
-    with pytest.raises(ReportError, match=r"torque takes 0.984 GiB in memory, 1.48 GiB with the arrays before it"):
+    with pytest.raises(ReportError, match=r"torque .*0.984 GiB.* 1.48 GiB"):
         read_trajectory(tmp_path / "guess.npz")
 
 
@@ -103,5 +103,5 @@ def test_quantities_that_are_absent_are_not_made_up_beyond_memory(tmp_path: Path
     names = np.array(["c"] * 10_000)
     many = {"time": np.zeros(10_000), "position": np.zeros((10_000, 1, 3)), "contact_names": names}
     np.savez_compressed(tmp_path / "guess.npz", **many)
-    with pytest.raises(ReportError, match="10000 times, 1 bodies, 10000 contacts and 0 joints are too many"):
+    with pytest.raises(ReportError, match=r"10000 times.* 10000 contacts"):
         read_trajectory(tmp_path / "guess.npz")

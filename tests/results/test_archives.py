@@ -112,5 +112,5 @@ def test_an_array_of_another_shape_is_not_read() -> None:
     for shape in ((20, 4), (10**30,)):
         with pytest.raises(OtherShape, match=str(shape[0])):
             read_array(io.BytesIO(array(ROWS, shape)), (20, 3))
-    with pytest.raises(ArchiveError, match="ends before its last number"):
+    with pytest.raises(ArchiveError, match="last number"):
         read_array(io.BytesIO(array(ROWS)[:-1]), (20, 3))

@@ -124,11 +124,11 @@ def test_what_does_not_fit_is_said(cart: Problem, found: Solution) -> None:
 
 
 def test_nothing_that_fits_is_an_error(cart: Problem, found: Solution, tmp_path: Path) -> None:
-    with pytest.raises(SymphysError, match=r"nothing of .* fits ball_throw: the run has push, the problem throw, spin"):
+    with pytest.raises(SymphysError, match=r"ball_throw: .*push.*throw, spin"):
         symphys.solve("ball_throw", "least_squares", backend="casadi", guess=found)
-    with pytest.raises(SymphysError, match=r"is no run folder; one is, for instance, .*multiple_shooting-seed0"):
+    with pytest.raises(SymphysError, match=r"no run folder.*multiple_shooting-seed0"):
         symphys.solve(cart, "gradient", guess=found.folder.parent)
-    with pytest.raises(SymphysError, match="is no run folder"):
+    with pytest.raises(SymphysError, match="no run folder"):
         symphys.solve(cart, "gradient", guess=tmp_path / "nowhere")
 
 

@@ -116,18 +116,18 @@ def test_interrupted_at_once(name: str) -> None:
 def test_a_checkpoint_that_does_not_fit(name: str) -> None:
     good = through_json(solve(name, rosenbrock(), monitor=stop_at(3)).checkpoint)
     other = next(each for each in SOLVERS if each != name)
-    with pytest.raises(SymphysError, match="of the solver"):
+    with pytest.raises(SymphysError, match="solver"):
         solve(other, rosenbrock(), checkpoint=good)
     with pytest.raises(SymphysError, match="damaged"):
         solve(name, rosenbrock(), checkpoint={key: good[key] for key in good if key != "rows"})
     with pytest.raises(SymphysError, match="damaged"):
         solve(name, rosenbrock(), checkpoint=good | {"state": {"iteration": "many"}})
     long = good["best"] | {"z": [0.0, 0.0, 0.0]}
-    with pytest.raises(SymphysError, match="3 variables, the problem 2"):
+    with pytest.raises(SymphysError, match="3 variables"):
         solve(name, rosenbrock(), checkpoint=good | {"best": long})
 
 
 def test_a_replay_that_drifts_is_noticed() -> None:
     good = through_json(solve("cma", rosenbrock(), monitor=stop_at(5)).checkpoint)
-    with pytest.raises(SymphysError, match="leads elsewhere"):
+    with pytest.raises(SymphysError, match="elsewhere"):
         solve("cma", rosenbrock(), checkpoint=good | {"state": good["state"] | {"sigma": 77.0}})

@@ -150,7 +150,7 @@ def test_side_by_side() -> None:
 @every_solver
 @pytest.mark.parametrize("bad", [0.0, -1.0, float("nan")])
 def test_a_time_that_cannot_be(name: str, bad: float) -> None:
-    with pytest.raises(ValueError, match="max_seconds must be above 0"):
+    with pytest.raises(ValueError, match="max_seconds"):
         SOLVERS[name].Options(max_seconds=bad)
 
 

@@ -146,7 +146,7 @@ def test_fatrop_takes_no_constraint_across_intervals() -> None:
 
     chain.limit_slopes = across  # type: ignore[method-assign]
     assert solve(boxed(chain, 8.0)).status is Status.CONVERGED
-    with pytest.raises(SymphysError, match=r"number 1 depends on several: use backend = 'ipopt'"):
+    with pytest.raises(SymphysError, match=r"number 1 .*backend = 'ipopt'"):
         solve(boxed(chain, 8.0), backend="fatrop")
 
 

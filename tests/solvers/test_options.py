@@ -35,11 +35,9 @@ def test_names() -> None:
     ]
     for name in SOLVERS:
         assert solver(name).name == name
-    with pytest.raises(
-        SymphysError, match=r"did you mean 'gradient'\? valid: gradient, .*, cma, stochastic, evolution"
-    ):
+    with pytest.raises(SymphysError, match=r"'gradient'.*cma, stochastic, evolution"):
         solver("gradent")
-    with pytest.raises(SymphysError, match="valid: gradient"):
+    with pytest.raises(SymphysError, match="gradient"):
         solver("xyz")
 
 
@@ -186,7 +184,7 @@ def test_an_old_name_of_an_option_is_still_read() -> None:
         read(table={"forget": 5.0}) == read(table={"adjoint_discount": 5.0}) == StochasticOptions(adjoint_discount=5.0)
     )
     assert recorded_options(StochasticOptions(adjoint_discount=5.0))["forget"] == 5.0
-    with pytest.raises(ProblemError, match=r"forget: is the old name of adjoint_discount"):
+    with pytest.raises(ProblemError, match=r"forget: .*adjoint_discount"):
         read(table={"forget": 5.0, "adjoint_discount": 5.0})
     with pytest.raises(ProblemError, match="adjoint_discount"):
         read(table={"forget": -1.0})

@@ -136,5 +136,5 @@ def test_a_joint_of_a_loop_has_no_anchor_that_varies(tmp_path: Path) -> None:
         LEG.format(knee=-0.15, guess=-0.15, upper=0.5, trunk=0.7, more="")
         + '[[joint]]\nname = "lock"\nbetween = ["trunk", "lower"]\nball = {}\nanchors = [[0, 0, -0.35], [0, 0, 0.15]]\n'
     )
-    with pytest.raises(ProblemError, match=r"knee\.anchor cannot vary: the joint is part of a loop"):
+    with pytest.raises(ProblemError, match=r"knee\.anchor .*loop"):
         load_problem(file)

@@ -83,16 +83,16 @@ def test_slopes_by_the_radius(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("edge", [0.05, -0.01])
 def test_a_radius_that_leaves_no_box(tmp_path: Path, edge: float) -> None:
-    with pytest.raises(ProblemError, match=r"shape.box.edge: .*(less than half|at least 0)"):
+    with pytest.raises(ProblemError, match=r"shape.box.edge: .*(half|0)"):
         load_problem(box(tmp_path, edge))
-    with pytest.raises(SymphysError, match='body "crate": the radius of its edges must be less than half'):
+    with pytest.raises(SymphysError, match=r'body "crate": .*half'):
         Body.box("crate", (0.2, 0.3, 0.1), 2, edge=edge)
 
 
 def test_sharp_edges_have_no_radius_to_vary(tmp_path: Path) -> None:
     file = box(tmp_path, 0)
     file.write_text(f'{file.read_text()}[[variable]]\nname = "edge"\nsets = "crate.edge"\n')
-    with pytest.raises(ProblemError, match=r"crate states no edge: give it a value above 0 there first"):
+    with pytest.raises(ProblemError, match=r"crate .*edge: .*above 0"):
         load_problem(file)
 
 

@@ -111,12 +111,12 @@ def test_an_examination_is_of_the_duration_of_z(made: Transcription, other: Tran
     [
         (
             {"target": [{"name": "t", "value": "time", "at": 0.3, "tolerance": 1}]},
-            r'"t".at: is no time of a step, since',
+            r'"t".at: .*since',
         ),
         ({"variable": [{"name": "T", "sets": "simulation.duration", "lower": 0}]}, r"must be greater than 0"),
-        ({"variable": [{"name": "T", "sets": "simulation.duration", "knots": 3}]}, r'"T".knots: only a force'),
+        ({"variable": [{"name": "T", "sets": "simulation.duration", "knots": 3}]}, r'"T".knots: .*force'),
         ({"variable": [{"name": "T", "sets": ["simulation.duration", "ball.mass"]}]}, r"different kinds"),
-        ({"variable": [{"name": "T", "sets": "simulation.dt"}]}, r'did you mean "simulation.duration"'),
+        ({"variable": [{"name": "T", "sets": "simulation.dt"}]}, '"simulation.duration"'),
     ],
 )
 def test_what_cannot_be_names_table_and_key(change: dict[str, Any], message: str) -> None:
@@ -125,5 +125,5 @@ def test_what_cannot_be_names_table_and_key(change: dict[str, Any], message: str
 
 
 def test_a_single_step_has_no_free_duration() -> None:
-    with pytest.raises(SymphysError, match="a variable sets the duration, and a single step"):
+    with pytest.raises(SymphysError, match=r"duration.*single step"):
         compile_open_step(problem_of_tables(TABLES), backend="casadi")

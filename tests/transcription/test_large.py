@@ -377,9 +377,9 @@ def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyP
     )
     problem = load_problem(path)
     monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
-    with pytest.raises(ProblemError, match='cost "effort": looks at weights'):
+    with pytest.raises(ProblemError, match=r'cost "effort": .*weights'):
         transcribe(problem)
-    with pytest.raises(ProblemError, match=r'controller "brain"\.net: has \d+ weights; export takes up to 10'):
+    with pytest.raises(ProblemError, match=r'controller "brain"\.net: .*10'):
         require_small_nets(problem, "export")
 
 
@@ -387,5 +387,5 @@ def test_the_duration_cannot_be_free(tmp_path: Path, monkeypatch: pytest.MonkeyP
     path = tmp_path / "large.toml"
     path.write_text(f'{LIFTS[1]}\n[[variable]]\nname = "T"\nsets = "simulation.duration"\n')
     monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
-    with pytest.raises(ProblemError, match=r'variable "T".sets: sets the duration, which a problem with a net'):
+    with pytest.raises(ProblemError, match=r'variable "T".sets: .*net'):
         transcribe(load_problem(path))

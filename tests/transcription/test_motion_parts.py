@@ -97,7 +97,7 @@ def test_where_a_part_is_not_finite_is_said(tmp_path: Path) -> None:
 
 
 def test_a_single_step_has_no_whole_motion(tmp_path: Path) -> None:
-    with pytest.raises(SymphysError, match=r"integral.* is of a whole motion, and this is a single step"):
+    with pytest.raises(SymphysError, match=r"integral.*whole motion"):
         compile_open_step(load(tmp_path, BALL), backend="casadi")
 
 
@@ -107,9 +107,9 @@ def test_a_single_step_has_no_whole_motion(tmp_path: Path) -> None:
         (
             'at = "always"\nvalue = "',
             'at = "always"\nvalue = "end.time + ',
-            r'"running".at: has end.time, .* take "end"',
+            r'"running".at: .*"end"',
         ),
-        ("end.ball.velocity", "end.bal.velocity", r'unknown name "bal.velocity"'),
+        ("end.ball.velocity", "end.bal.velocity", '"bal.velocity"'),
         ("average(ball.position[2])", "average(ball.position[3])", r"no component 3"),
         ("average(ball.position[2])", "average(end.time)", r"what has an average is of one instant"),
     ],

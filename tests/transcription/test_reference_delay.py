@@ -86,5 +86,5 @@ def test_what_cannot_be(tmp_path: Path, delay: str, message: str) -> None:
 def test_a_column_called_delay(tmp_path: Path) -> None:
     file = drive(tmp_path)
     file.write_text(file.read_text().replace("u = [0, 2]", "u = [0, 2], delay = [0, 1]"))
-    with pytest.raises(ProblemError, match="there is a column of this name"):
+    with pytest.raises(ProblemError, match="column"):
         load_problem(file)

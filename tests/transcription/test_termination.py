@@ -111,9 +111,9 @@ def test_without_a_termination_it_is_as_if_there_were_none(path: Path) -> None:
         (
             'name = "ahead"',
             'name = "termination"',
-            r'cost "termination"\.name: "termination" is the name of the cost that .termination. adds',
+            r'cost "termination"\.name: .*"termination"',
         ),
-        ("cost = 2", "cost = -2", r"termination\.cost: must be at least 0"),
+        ("cost = 2", "cost = -2", r"termination\.cost: .*at least 0"),
     ],
 )
 def test_bad_terminations_are_named(path: Path, old: str, new: str, told: str) -> None:
@@ -141,13 +141,13 @@ def test_the_old_name_goes_on_working(path: Path) -> None:
     assert new.termination == old.termination
     assert [cost.formula.text for cost in new.costs] == [cost.formula.text for cost in old.costs]
     path.write_text(BALL.replace("[termination]", "[fall]").replace("- 0.5", "- 1.5"), encoding="utf-8")
-    with pytest.raises(ProblemError, match=r"fall\.margin: is -0.5"):
+    with pytest.raises(ProblemError, match=r"fall\.margin: .*-0.5"):
         load_problem(path)
 
 
 def test_both_names_are_refused(path: Path) -> None:
     path.write_text(f'{BALL}\n[fall]\nmargin = "1"\n', encoding="utf-8")
-    with pytest.raises(ProblemError, match=r"fall: is the old name of \[termination\], which is given too"):
+    with pytest.raises(ProblemError, match=r"fall: .*\[termination\]"):
         load_problem(path)
 
 

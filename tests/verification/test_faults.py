@@ -84,14 +84,14 @@ def test_a_derivative_of_a_formula_that_is_not_finite(make):
 def test_a_step_that_is_not_finite(make):
     throw = make(THROW.format(more=MASS))
     z = np.array([1.0, 0, 0, 0.0, 0, 0, 1])
-    with pytest.raises(NotFinite, match=r"from step 1 \(t = 0.02 s\) on: 'ball'.* from t = 0 s: 0 / 0.* ball.mass"):
+    with pytest.raises(NotFinite, match=r"step 1 \(t = 0.02 s\).*'ball'.*t = 0 s: 0 / 0.*ball.mass"):
         throw.record(z)
 
 
 def test_a_start_that_is_not_finite(make):
     throw = make(THROW.format(more=TURN))
     z = np.array([1.0, 0, 0, 0, 0, 0, 0])
-    with pytest.raises(NotFinite, match=r"from step 0 .*begins with ball.orientation, as the variables set it"):
+    with pytest.raises(NotFinite, match=r"step 0 .*ball.orientation"):
         throw.record(z)
 
 

@@ -56,7 +56,7 @@ def test_gradients_that_are_far_off_are_doubted(factor: float, words: str, monke
     require("simd32")
     doctored(monkeypatch, factor)
     rollout = symphys.compile(problem(), backend="simd32")
-    with pytest.warns(RuntimeWarning, match=f"single precision are off by {words} of their length"):
+    with pytest.warns(RuntimeWarning, match=f"single precision .*{words}"):
         rollout.gradient(rollout.z())
 
 
@@ -68,12 +68,12 @@ def test_adjoints_of_a_step_and_of_quantities_are_doubted(monkeypatch: pytest.Mo
     state, observation, _ = step.start(2)
     action = np.ones((2, step.action_size))
     after = step(state, action)
-    with pytest.warns(RuntimeWarning, match="cart_pole: gradients in single precision are off by 60 %"):
+    with pytest.warns(RuntimeWarning, match="cart_pole: .*single precision .*60 %"):
         step.pull(state, action, np.ones_like(after.state), np.zeros_like(observation), np.ones(2))
     thrown = symphys.compile(problem(), backend="simd32")
     recording, Z = thrown.recording("ball.position"), thrown.z()[None]
     value, found = recording.forward(Z)
-    with pytest.warns(RuntimeWarning, match="ball_throw: gradients in single precision are off by 60 %"):
+    with pytest.warns(RuntimeWarning, match="ball_throw: .*single precision .*60 %"):
         recording.pull(Z, np.ones_like(value), {name: np.ones_like(each) for name, each in found.items()})
 
 
@@ -115,5 +115,5 @@ def test_a_device_in_single_precision_is_compared_with_the_processor(
     rollout = symphys.compile(problem(), backend="cuda32")
     get = Emulated.get
     monkeypatch.setattr(Emulated, "get", lambda self, array: 1.5 * get(self, array))
-    with pytest.warns(RuntimeWarning, match="off by 50 %"):
+    with pytest.warns(RuntimeWarning, match="50 %"):
         rollout.gradient(rollout.z())

@@ -74,11 +74,11 @@ def test_steps_that_are_skipped(discounted: Any, skipped: int) -> None:
 
 
 def test_more_steps_than_there_are_cannot_be_skipped(discounted: Any) -> None:
-    with pytest.raises(ProgramError, match="cannot be skipped"):
+    with pytest.raises(ProgramError, match="skipped"):
         discounted.gradient(np.zeros(STEPS), [1, 0, 0], [GRAVITY], skipped=STEPS + 1)
 
 
 def test_what_is_discounted_must_last() -> None:
     program = programs.pendulum()
-    with pytest.raises(ProgramError, match=r"discounted state: .* outside the memory"):
+    with pytest.raises(ProgramError, match=r"discounted state: .*memory"):
         replace(program, discounted=AdjointDiscount(Place(program.size, 2, 2)))

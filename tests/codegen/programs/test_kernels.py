@@ -120,7 +120,7 @@ def test_trajectories_lie_in_the_memory(pendulum: Kernel) -> None:
     np.testing.assert_array_equal(states[:, 0], np.tile([1.0, 0.0], (9, 1)))
     residuals = pendulum.forward(z, gravity(pendulum))["residuals"]
     np.testing.assert_array_equal(states[:, -1] - [1, 0], residuals)
-    with pytest.raises(ProgramError, match="do not lie in the memory"):
+    with pytest.raises(ProgramError, match="memory"):
         pendulum.trajectory(z, programs.PENDULUM_STATE, programs.STEPS + 2, gravity(pendulum))
 
 
@@ -149,18 +149,18 @@ def test_only_seeded_outputs_are_differentiated(chain: Kernel, cache: Cache) -> 
     assert merit.report.functions < chain.report.functions
     z = draw(chain, 3)
     np.testing.assert_array_equal(merit.gradient(z, [1])[1], chain.gradient(z, [1, 0, 0, 0, 0])[1])
-    with pytest.raises(ProgramError, match="no seeded output is called 'work'; there are merit"):
+    with pytest.raises(ProgramError, match=r"'work'.*merit"):
         merit.jacobian(z[0], "work")
-    with pytest.raises(ProgramError, match="no output is called 'cost'"):
+    with pytest.raises(ProgramError, match="'cost'"):
         compile_program(chain.program, cache=cache, seeded=["cost"])
 
 
 def test_wrong_shapes_are_named(pendulum: Kernel) -> None:
-    with pytest.raises(ProgramError, match="lanes must be a power of two from 1 to 64, not 3"):
+    with pytest.raises(ProgramError, match=r"lanes .*1 to 64"):
         compile_program(pendulum.program, lanes=3)
-    with pytest.raises(ProgramError, match=r"z has the shape \(3,\); wanted is \(batch, 30\) or \(30,\)"):
+    with pytest.raises(ProgramError, match=r"z .*\(3,\).*\(batch, 30\)"):
         pendulum.forward(np.ones(3), [1.0])
-    with pytest.raises(ProgramError, match=r"the batch sizes \[2, 3\] of z, parameters differ"):
+    with pytest.raises(ProgramError, match=r"\[2, 3\] of z, parameters"):
         pendulum.forward(np.ones((3, 30)), np.ones((2, 1)))
 
 

@@ -87,9 +87,9 @@ def test_rows_take_only_the_calls_that_reach_them() -> None:
 
 
 def test_what_is_wrong_is_said(kernel: SlopeKernel) -> None:
-    with pytest.raises(ProgramError, match="of one step"):
+    with pytest.raises(ProgramError, match="one step"):
         slope_plan(replace(chain()[0], steps=0, body=(), outputs={"out": chain()[0].z}), "out", 4)
-    with pytest.raises(ProgramError, match=r"wanted is \(batch, 5\)"):
+    with pytest.raises(ProgramError, match=r"\(batch, 5\)"):
         kernel.jacobians(np.ones((2, 3)), np.ones((2, 1)))
     with pytest.raises(ProgramError, match="differ"):
         kernel.jacobians(np.ones((2, SIZE)), np.ones((3, 1)))

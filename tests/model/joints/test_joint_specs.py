@@ -132,19 +132,17 @@ def test_loops_of_starts_and_names_are_refused() -> None:
         Slider("j", ("world", "a"), axis=(0, 0, 1), start=0.1),
         Slider("k", ("world", "a"), axis=(0, 0, 1), start=0.1),
     ]
-    with pytest.raises(SymphysError, match='joint "k": this joint closes a loop'):
+    with pytest.raises(SymphysError, match=r'joint "k": .*loop'):
         make_world(rods(), joints=loop)
-    with pytest.raises(SymphysError, match=r'write \("ball", "ground"\): Law\(.*not \(.a., .b.\): 0.5'):
+    with pytest.raises(SymphysError, match=r'\("ball", "ground"\): Law\('):
         make_world(rods(), laws={("a", "b"): 0.5})  # type: ignore[dict-item]
-    with pytest.raises(SymphysError, match=r"must be Hinge, .*, not Body"):
+    with pytest.raises(SymphysError, match=r"Hinge.*Body"):
         make_world(rods(), joints=rods())  # type: ignore[arg-type]
-    with pytest.raises(SymphysError, match='a body is called "world"'):
+    with pytest.raises(SymphysError, match='"world"'):
         make_world([Body.ball("world", 0.1, 1.0)], joints=[FixedJoint("j", ("world", "world"))])
-    with pytest.raises(SymphysError, match='are called "a"; rename one'):
+    with pytest.raises(SymphysError, match='"a"'):
         make_world([*rods(), *rods()])
-    with pytest.raises(
-        SymphysError, match='laws: no body and no static surface is called "grund"; did you mean "ground"'
-    ):
+    with pytest.raises(SymphysError, match=r'laws: .*"grund".*"ground"'):
         make_world(rods(), [Plane.ground()], laws={("a", "grund"): Law()})
-    with pytest.raises(SymphysError, match=r"laws: b and a never touch.*collide=True"):
+    with pytest.raises(SymphysError, match=r"laws: b and a.*collide=True"):
         make_world(rods(), joints=[FixedJoint("j", ("a", "b"))], laws={("b", "a"): Law()})

@@ -53,15 +53,15 @@ def test_until_offset_clock_and_files_count(tmp_path: Path) -> None:
 
 
 def test_without_recordings_it_is_missing() -> None:
-    with pytest.raises(ProblemError, match=r"simulation.duration: this key is required without"):
+    with pytest.raises(ProblemError, match=r"simulation.duration: .*required"):
         problem_of_tables({"simulation": {"dt": 0.01}, "body": [BALL]})
 
 
 def test_times_that_no_simulation_takes_are_refused_with_what_may_be_wrong() -> None:
     epoch = {"time": [1.7e9, 1.7e9 + 0.1], "z": [1.0, 1.0]}
-    with pytest.raises(ProblemError, match=r"recording.*samples go on to 1.7e\+09 s, 1.7e\+11 steps.*first row"):
+    with pytest.raises(ProblemError, match=r"recording.* 1.7e\+09 s, 1.7e\+11 steps"):
         loaded({"table": epoch})
-    with pytest.raises(ProblemError, match='has no column "time"'):
+    with pytest.raises(ProblemError, match='"time"'):
         loaded({"table": {"t": [0.0, 0.1], "z": [1.0, 1.0]}})
 
 

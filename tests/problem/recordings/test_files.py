@@ -47,7 +47,7 @@ def test_the_text_of_a_problem_is_read_anywhere(large: bool, tmp_path: Path) -> 
     assert again.text == problem.text
     shutil.rmtree(tmp_path / "one")
     if large:
-        with pytest.raises(ProblemError, match=r'recording "drop".files: a.csv is no longer at .*one.a.csv'):
+        with pytest.raises(ProblemError, match=r'recording "drop".files: a.csv .*one.a.csv'):
             load_problem(kept)
     else:
         assert load_problem(kept).identity == problem.identity
@@ -56,7 +56,7 @@ def test_the_text_of_a_problem_is_read_anywhere(large: bool, tmp_path: Path) -> 
 def test_data_that_changed_are_refused(tmp_path: Path) -> None:
     problem = written(tmp_path / "one", large=True)
     (tmp_path / "one" / "a.csv").write_text("\n".join([*ROWS, "0.3,0.6"]), encoding="utf-8")
-    with pytest.raises(ProblemError, match=r"a\.csv has changed since this problem was kept"):
+    with pytest.raises(ProblemError, match=r"a\.csv has changed"):
         problem.set("ball.mass", 2.0)
 
 

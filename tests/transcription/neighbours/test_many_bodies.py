@@ -191,7 +191,7 @@ def test_no_number_is_read_before_it_is_computed() -> None:
     for one, other in zip(*found, strict=True):
         assert np.isfinite(one).all()
         assert (one == other).all()
-    with pytest.raises(ProgramError, match=r"starts have the shape \(2, 3\); wanted is \(batch, 115\)"):
+    with pytest.raises(ProgramError, match=r"\(2, 3\).*\(batch, 115\)"):
         kernel.rollouts(rows[:, :3], given(kernel, 2), 1)
 
 
@@ -218,8 +218,8 @@ def test_what_cannot_be_is_refused() -> None:
     """By the name of the body or the surface."""
     balls = bodies(["sphere"] * 3)
     heavy = Body.ball("heavy", radius=0.1, mass=100.0, position=(0, 0, 1))
-    with pytest.raises(SymphysError, match="masses must not differ by more than a factor of 20"):
+    with pytest.raises(SymphysError, match=r"masses .*20"):
         crowd_of(World((*balls, heavy)), LAW, SCHEME)
     hills = Terrain("hills", lambda x, y: 0.1 * x * y)
-    with pytest.raises(SymphysError, match='"hills" must be a plane'):
+    with pytest.raises(SymphysError, match=r'"hills" .*plane'):
         crowd_of(World(balls, (hills,)), LAW, SCHEME)

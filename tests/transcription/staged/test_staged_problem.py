@@ -389,5 +389,5 @@ def test_an_integral_of_knots_is_refused_by_name() -> None:
     )
     staged = transcribe(problem, backend="casadi").shooting.staged
     assert staged is not None
-    with pytest.raises(SymphysError, match=r"cheap: integral.* integrate rail.command"):
+    with pytest.raises(SymphysError, match=r"cheap: .*rail.command"):
         staged()

@@ -1,7 +1,8 @@
-"""What the numbers of an exported problem with joints are: sizes and units."""
+"""The numbers of an exported problem have sizes and units."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -59,18 +60,19 @@ def test_commands_have_their_sizes_and_units(tmp_path: Path) -> None:
     file.write_text(ARM, encoding="utf-8")
     problem = load_problem(file)
     rollout = symbolic_rollout(problem)
-    squeezed = [" ".join(line.split()) for line in words.decision_lines(problem) + words.input_lines(rollout)]
-    assert squeezed == [
-        "z[0..1] push: rail.command [N]; 2 knots, constant, one after the other",
-        "z[2..3] aim: wrist.command [rad]",
-        "z[4] strong: wrist.torque [N m]",
-        "u[0] rail.command [N]",
-        "u[1..2] wrist.command [rad]",
+    lines = words.decision_lines(problem) + words.input_lines(rollout) + words.parameter_lines(rollout)
+    named = [found.groups() for line in lines if (found := re.match(r"(\S+).*?(\w+\.\w+) (\[.*?\])", line))]
+    assert named == [
+        ("z[0..1]", "rail.command", "[N]"),
+        ("z[2..3]", "wrist.command", "[rad]"),
+        ("z[4]", "wrist.torque", "[N m]"),
+        ("u[0]", "rail.command", "[N]"),
+        ("u[1..2]", "wrist.command", "[rad]"),
+        ("p[0]", "wrist.torque", "[N m]"),
     ]
-    states = [" ".join(line.split()) for line in words.state_lines(rollout)]
+    states = words.state_lines(rollout)
     assert any(line.endswith("rail.motor [N]") for line in states)
     assert any(line.endswith("wrist.motor [N m]") for line in states)
-    assert [" ".join(line.split()) for line in words.parameter_lines(rollout)] == ["p[0] wrist.torque [N m]"]
 
 
 def test_a_free_duration_and_numbers_of_laws_are_named() -> None:
@@ -88,6 +90,6 @@ def test_a_free_duration_and_numbers_of_laws_are_named() -> None:
         "T: simulation.duration [s]",
         "c: drag.c[0]",
     ]
-    with pytest.raises(ExportError, match="drag: a force law; MuJoCo has no formulas"):
+    with pytest.raises(ExportError, match="drag"):
         problem_model(problem)
     assert "drag" in problem_model(problem, approximate=True).text
