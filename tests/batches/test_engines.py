@@ -91,7 +91,7 @@ def test_a_killed_dask_worker_costs_its_own_run_only(marking: Any, make: Any, re
 def test_runs_with_a_timeout_are_possible_on_dask(marking: Any, make: Any, recorder: Any, tmp_path: Path) -> None:
     """A run with a timeout has a process of its own, which workers of a local cluster may start."""
     pytest.importorskip("distributed")
-    limits = BatchLimits(timeout=60.0)
+    limits = BatchLimits(timeout=1e6)
     batch = run_on("dask", "", make("fine"), 1, recorder, marking.transcribe, tmp_path / "out", limits)
     assert batch.accepted and marks(tmp_path, "fine") == 1
 

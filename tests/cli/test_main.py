@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tools.waiting import FOREVER
 
 import symphys
 from symphys import problems
@@ -285,7 +286,7 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(throw: Path, tmp_path: Path, 
         for _ in range(jobs):
             assert process.stderr.readline().endswith("begins\n")
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=FOREVER)
     assert process.returncode == 130
     assert "Traceback" not in err
     assert "the same command goes on from there" in err

@@ -7,7 +7,7 @@ import json
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 from rich.progress import Progress
@@ -50,11 +50,13 @@ class Job:
             smoothing = (0.0,)
 
 
+@settings(deadline=None)
 @given(st.recursive(st.booleans() | st.integers(-(2**60), 2**60) | st.floats(allow_nan=False), st.lists, max_leaves=5))
 def test_a_toml_value_is_read_as_such(value: object) -> None:
     assert read_value(json.dumps(value).replace("Infinity", "inf")) == value
 
 
+@settings(deadline=None)
 @given(st.text())
 def test_anything_else_is_text(text: str) -> None:
     assert read_value(f"no {text}") == f"no {text}"

@@ -17,6 +17,10 @@ print(compile_program(pendulum()).report.cached)
 """
 
 
+HANGS = "exec sleep 100000"
+"""The end of a script that hangs, in the process of the script."""
+
+
 def fake(folder: Path, script: str) -> str:
     """A compiler that knows its version and then does as the script says."""
     path = folder / "fakecc"

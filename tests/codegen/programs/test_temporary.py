@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 import pytest
-from fakes.compilers import building, fake
-from tools.waiting import FOREVER, wait_for
+from fakes.compilers import HANGS, building, fake
+from tools.waiting import FOREVER, end, wait_for
 
 from symphys.codegen.toolchain.temporary import LOCK, OLD, YOUNG, TemporaryFolder
 
@@ -44,7 +44,7 @@ def made(place: Path, name: str, locked: bool = False) -> Path:
 
 
 def test_what_a_killed_build_left_goes_with_the_next(tmp_path: Path, place: Path) -> None:
-    process = building(tmp_path, fake(tmp_path, f"echo $$ > {tmp_path}/started; exec sleep 5"))
+    process = building(tmp_path, fake(tmp_path, f"echo $$ > {tmp_path}/started; {HANGS}"))
     try:
         wait_for(tmp_path / "started")
         (left,) = place.iterdir()
@@ -53,6 +53,7 @@ def test_what_a_killed_build_left_goes_with_the_next(tmp_path: Path, place: Path
             assert left.is_dir(), "its process is at work"
     finally:
         process.kill()
+        end(tmp_path / "started")
         process.communicate(timeout=FOREVER)
     aged(left, 2 * YOUNG)
     with TemporaryFolder(KIND) as own:
