@@ -189,6 +189,9 @@ def main(given: list[str] | None = None) -> int:
             check=False,
         )
         calm = time.monotonic() - began
+        if Watcher(folder / "calm").look() < seeds * len(SOLVERS):
+            print("an undisturbed batch is not whole either")
+            return 1
         began = time.monotonic()
         watcher, killed, drivers, started = disturbed(
             arguments, folder / "wild", asked.kills, asked.drivers, asked.pause, asked.seed, seeds * len(SOLVERS)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import subprocess
 import time
 from collections.abc import Callable
@@ -30,12 +28,6 @@ def assert_gone(started: Path) -> None:
     """Wait until every process has ended whose number is in the file, which is missing where none came that far."""
     numbers = started.read_text("utf-8").split() if started.exists() else []
     until(lambda: not any(alive(int(number)) for number in numbers))
-
-
-def end(started: Path) -> None:
-    """Kill every process whose number is in the file."""
-    for number in started.read_text("utf-8").split():
-        os.kill(int(number), signal.SIGKILL)
 
 
 def alive(number: int) -> bool:

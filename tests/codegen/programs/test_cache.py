@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 from fakes.compilers import HANGS, building, fake, logged, waits
-from tools.waiting import FOREVER, end, until, wait_for
+from tools.waiting import FOREVER, until, wait_for
 from worlds import programs
 
 from symphys.codegen import Cache, Kernel, KernelUnavailable, compile_program, default_cache
@@ -29,7 +29,6 @@ def test_a_builder_that_is_killed_holds_up_nobody(tmp_path: Path) -> None:
     process = building(tmp_path, fake(tmp_path, f"echo $$ > {tmp_path}/started; {HANGS}"))
     wait_for(tmp_path / "started")
     process.kill()
-    end(tmp_path / "started")
     process.communicate(timeout=FOREVER)
     kernel = compile_program(programs.pendulum(), cache=Cache(tmp_path / "cache"), threads=1)
     assert not kernel.report.cached

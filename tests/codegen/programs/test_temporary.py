@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from fakes.compilers import HANGS, building, fake
-from tools.waiting import FOREVER, end, wait_for
+from tools.waiting import FOREVER, wait_for
 
 from symphys.codegen.toolchain.temporary import LOCK, OLD, YOUNG, TemporaryFolder
 
@@ -53,7 +53,6 @@ def test_what_a_killed_build_left_goes_with_the_next(tmp_path: Path, place: Path
             assert left.is_dir(), "its process is at work"
     finally:
         process.kill()
-        end(tmp_path / "started")
         process.communicate(timeout=FOREVER)
     aged(left, 2 * YOUNG)
     with TemporaryFolder(KIND) as own:

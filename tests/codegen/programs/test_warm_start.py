@@ -14,6 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from worlds.toys import require
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Program
 from symphys.codegen.toolchain import warm_start
@@ -191,6 +192,7 @@ def test_a_problem_with_a_python_function_is_built(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("name", ["ball_throw", "cart_pole_walls"])
 def test_a_second_start_of_a_problem_is_the_first(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    require("simd")
     monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path / "kernels"))
     problem: Problem = load_problem(find(name))
     cold = transcribe(problem, exact=True, threads=1)
