@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-rest test-all test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports bench-idto bench-tosses profiles gallery clean
+.PHONY: help demo demo-walk test test-quick test-rest test-all test-loaded test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports bench-idto bench-tosses profiles gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -25,6 +25,11 @@ test-rest: $(VENV)/.developing  ## run what test leaves out: whole solves, pages
 	$(BIN)/pytest -n auto --dist worksteal -m "slow and not thorough" $(ARGS)
 
 test-all: test test-rest  ## run all tests but those of thorough
+
+test-loaded: $(VENV)/.developing  ## run the tests beside four busy loops, which end with them, and with a random PYTHONHASHSEED
+	@for loop in 1 2 3 4; do (while kill -0 $$$$; do :; done) > /dev/null 2>&1 & done; \
+	export PYTHONHASHSEED=$$($(BIN)/python -c 'import random; print(random.randrange(2**32))'); \
+	echo "PYTHONHASHSEED=$$PYTHONHASHSEED"; $(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
 test-pipelines: $(VENV)/.pipelining  ## run the tests of symphys.torch, symphys.jax and symphys.env, and install what they need
 	$(BIN)/pytest tests/pipelines tests/house/test_code_blocks.py -k pipelines -m "not thorough" $(ARGS)

@@ -59,11 +59,13 @@ class Watcher:
     """Looks at the results while they are written.
 
     Attributes:
+        begun: folders of runs.
         seen: the first stamp of each result, by its folder.
         again: folders whose result was written again.
     """
 
     out: Path
+    begun: set[Path] = field(default_factory=set)
     seen: dict[Path, str] = field(default_factory=dict)
     again: set[Path] = field(default_factory=set)
 
@@ -71,6 +73,7 @@ class Watcher:
         """Note what is new or other; how many results there are."""
         count = 0
         for path in self.out.glob("*/*-seed*"):
+            self.begun.add(path)
             stamp = stamped(path / "result.json")
             if path in self.seen and stamp != self.seen[path]:
                 self.again.add(path)
@@ -114,7 +117,7 @@ class Commands:
 def disturbed(
     arguments: list[str], out: Path, kills: int, drivers: int, pause: float, seed: int, runs: int
 ) -> tuple[Watcher, int, int, int]:
-    """Kill so often, as long as runs are left, and let the rest be done.
+    """Kill so often, each time after a pause in which a run has begun, as long as runs are left; let the rest be done.
 
     What was seen; how many kills there were, how many of them of drivers; how many commands were started.
     """
@@ -123,9 +126,8 @@ def disturbed(
     hit, left = 0, kills
     while left and watcher.look() < runs:
         commands.fill()
-        until = time.monotonic() + random.uniform(0.2, 1.8) * pause
-        while time.monotonic() < until:
-            watcher.look()
+        until, begun = time.monotonic() + random.uniform(0.2, 1.8) * pause, len(watcher.begun)
+        while watcher.look() < runs and (time.monotonic() < until or len(watcher.begun) == begun):
             time.sleep(0.02)
         victims = commands.processes()
         if victims:
@@ -169,7 +171,7 @@ def main(given: list[str] | None = None) -> int:
     parser.add_argument(
         "--step", type=float, default=0.001, help="seconds of a time step: the smaller, the longer runs take"
     )
-    parser.add_argument("--pause", type=float, default=1.0, help="seconds between two kills")
+    parser.add_argument("--pause", type=float, default=1.0, help="seconds between two kills, at least")
     parser.add_argument("--folder", type=Path, help="where the folders go; else a temporary one")
     asked = parser.parse_args(given)
     with tempfile.TemporaryDirectory(prefix="symphys-killing-") as temporary:
@@ -187,6 +189,9 @@ def main(given: list[str] | None = None) -> int:
             check=False,
         )
         calm = time.monotonic() - began
+        if Watcher(folder / "calm").look() < seeds * len(SOLVERS):
+            print("an undisturbed batch is not whole either")
+            return 1
         began = time.monotonic()
         watcher, killed, drivers, started = disturbed(
             arguments, folder / "wild", asked.kills, asked.drivers, asked.pause, asked.seed, seeds * len(SOLVERS)

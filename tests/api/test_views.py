@@ -11,6 +11,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from worlds.toys import require
 
 import symphys
 
@@ -31,6 +32,7 @@ def test_importing_is_cheap() -> None:
 
 def test_a_start_loads_no_scipy() -> None:
     """Loading and compiling a problem need none of it, and it takes a third of a second."""
+    require("simd")
     code = "import sys, symphys; symphys.compile(symphys.load('ball_throw')); print('scipy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
@@ -39,6 +41,7 @@ def test_a_start_loads_no_scipy() -> None:
 @pytest.mark.slow
 def test_a_second_start_loads_nothing_that_makes_kernels(tmp_path: Path) -> None:
     """It has neither the step of the dynamics nor what writes C; the first start has both."""
+    require("simd")
     makers = ("codegen.emit.plan", "codegen.slopes", "codegen.cuda", "dynamics.step", "transcription.staged.tangent")
     code = (
         "import sys, symphys; made = symphys.compile('ball_throw'); made.gradient(made.z()); made.finish(); "

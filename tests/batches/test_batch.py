@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tools.repeats import few
+from tools.waiting import FOREVER
 
 from symphys.batches import run_batch
 from symphys.problem import Problem, load_problem
@@ -136,7 +137,7 @@ def test_workers_do_what_one_process_does(problem_file: Path, tmp_path: Path, re
 def test_a_job_survives_the_way_to_a_new_process_and_back(problem: Problem, tmp_path: Path) -> None:
     (job,) = make_jobs([problem], ["gradient"], [3], {"simulation.dt": 0.02}, tmp_path)
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        back = pool.submit(copy.copy, job).result(timeout=60)
+        back = pool.submit(copy.copy, job).result(FOREVER)
     assert (back.name, back.config, back.options, back.folder) == (job.name, job.config, job.options, job.folder)
     assert back.problem.targets == job.problem.targets
     z = np.array([1.0, 2.0, 3.0])

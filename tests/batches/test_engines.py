@@ -5,13 +5,15 @@ from __future__ import annotations
 import importlib
 import os
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tools.waiting import FOREVER
 
-from symphys.batches import BatchLimits, run_batch, run_on
+from symphys.batches import BatchLimits, following, run_batch, run_on
 from symphys.problem import load_problem
 from symphys.results.result import read_result
 from symphys.runs import Job, make_jobs
@@ -46,6 +48,14 @@ def marking(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 @pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drivers are waited for, however long they take to start and to end."""
+    monkeypatch.setattr(following, "GRACE", FOREVER)
+    if find_spec("distributed"):
+        monkeypatch.setattr("symphys.batches.engines.dask.PATIENCE", FOREVER)
+
+
+@pytest.fixture
 def make(problem_file: Path, tmp_path: Path) -> Callable[..., list[Job]]:
     """Jobs of least squares, a seed each, for problems of these names."""
 
@@ -73,6 +83,7 @@ def check_same(one: Job, other: Job) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("patient")
 def test_a_killed_dask_worker_costs_its_own_run_only(marking: Any, make: Any, recorder: Any, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     names = ["one", "two", "killed1", "three"]
@@ -88,15 +99,17 @@ def test_a_killed_dask_worker_costs_its_own_run_only(marking: Any, make: Any, re
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("patient")
 def test_runs_with_a_timeout_are_possible_on_dask(marking: Any, make: Any, recorder: Any, tmp_path: Path) -> None:
     """A run with a timeout has a process of its own, which workers of a local cluster may start."""
     pytest.importorskip("distributed")
-    limits = BatchLimits(timeout=60.0)
+    limits = BatchLimits(timeout=1e6)
     batch = run_on("dask", "", make("fine"), 1, recorder, marking.transcribe, tmp_path / "out", limits)
     assert batch.accepted and marks(tmp_path, "fine") == 1
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("patient")
 def test_submitted_jobs_give_the_same_results(marking: Any, make: Any, recorder: Any, tmp_path: Path) -> None:
     pytest.importorskip("submitit")
     jobs, here = make("one", "killed1"), make("one", "killed1", out="here")

@@ -7,13 +7,14 @@ import shutil
 import signal
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fakes.thread_engine import Threads
-from tools.waiting import FOREVER
+from tools.waiting import FOREVER, until
 
 from symphys.batches import BatchLimits, BatchResult, following, limits, run_on
 from symphys.batches.engines import EngineError, driver, open_engine
@@ -94,8 +95,7 @@ def test_ctrl_c_stops_drivers_where_they_can_go_on(run: Any, make_job: MakeJob, 
 
     def slow(problem: Any, exact: bool) -> Any:
         stopped.wait(FOREVER)
-        while not (boards(tmp_path)[0] / "stop").exists():
-            stopped.wait(0.01)
+        until(lambda: (boards(tmp_path)[0] / "stop").exists())
         return transcribe(problem, exact)
 
     told = recorder.started
@@ -126,8 +126,7 @@ def test_the_time_of_a_batch_ends_it(
 
     def slow(problem: Any, exact: bool) -> Any:
         begun.append(problem)
-        while not (boards(tmp_path)[0] / "stop").exists():
-            threading.Event().wait(0.01)
+        until(lambda: (boards(tmp_path)[0] / "stop").exists())
         return transcribe(problem, exact)
 
     jobs = [make_job(seed, iterations=5) for seed in range(2)]
@@ -158,7 +157,6 @@ def test_a_run_that_kills_its_drivers_is_given_up_and_the_same_command_tries_it_
             (folder / ".claim" / death).mkdir(parents=True)
             (folder / ".claim" / death / "owner").write_text(json.dumps(claim), "utf-8")
             task.board.tell(BEGUN, index, death)
-            threading.Event().wait(0.1)
 
     monkeypatch.setattr(following, "is_over", lambda path, owner: owner.token == "second")
     batch, _ = run(jobs[:1], Dying())
@@ -186,12 +184,21 @@ def test_a_driver_that_begins_when_all_is_over_does_nothing(make_job: MakeJob, t
 
 
 def test_a_run_of_another_command_is_waited_for(run: Any, make_job: MakeJob, recorder: Any) -> None:
+    """It is released when the other run has ended."""
     jobs = [make_job(seed) for seed in range(2)]
-    held = claimed(jobs[0].folder.path)
-    held.__enter__()
-    threading.Timer(0.3, lambda: held.__exit__(None, None, None)).start()
-    batch, _ = run(jobs)
-    assert batch.accepted and recorder.events[-1] == ("met", jobs[0].name)
+    told = recorder.ended
+    with ExitStack() as held:
+        held.enter_context(claimed(jobs[0].folder.path))
+
+        def ended(*news: Any, **more: Any) -> None:
+            told(*news, **more)
+            held.close()
+
+        recorder.ended = ended
+        batch, _ = run(jobs)
+    assert batch.accepted and [each for each in recorder.events if each[0] == "met"] == [
+        ("met", job.name) for job in reversed(jobs)
+    ]
 
 
 def test_news_come_once_and_damage_is_passed_over(tmp_path: Path) -> None:

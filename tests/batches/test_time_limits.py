@@ -1,11 +1,13 @@
 """A limit of time ends a run whatever it is at, and leaves what it has found; the same command goes on with it.
 
-No test waits for a time: the clock of the limits jumps once the run has come to where it hangs for ever.
+No test waits for a time: the clock of the limits counts how often it is read, and jumps once the run has come to where
+it hangs for ever.
 """
 
 from __future__ import annotations
 
 import importlib
+import itertools
 import signal
 import subprocess
 import sys
@@ -77,8 +79,10 @@ def hanging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     importlib.invalidate_caches()
     found = importlib.reload(importlib.import_module("hanging_transcription"))
 
+    readings = itertools.count()
+
     def monotonic() -> float:
-        return time.monotonic() + 10 * LONG * found.MARK.exists()
+        return next(readings) + 10 * LONG * found.MARK.exists()
 
     monkeypatch.setattr(pool, "time", SimpleNamespace(monotonic=monotonic, sleep=time.sleep))
     monkeypatch.setattr(limits, "monotonic", monotonic)

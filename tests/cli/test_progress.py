@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import io
 import math
-import time
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
 from rich.console import Console
+from tools.waiting import until
 
 from symphys.batches import progress as batch_progress
 from symphys.batches.progress import BatchShare, StepProgress
@@ -191,23 +194,27 @@ def test_steps_say_what_is_done_and_the_time_at_the_pace_so_far(clock: Clock) ->
 
 
 def test_a_heartbeat_ends_with_its_body() -> None:
-    beats: list[float] = []
-    with heartbeat(lambda: beats.append(time.monotonic()), 0.01):
-        while len(beats) < 3:
-            time.sleep(0.005)
-    count = len(beats)
-    time.sleep(0.05)
-    assert len(beats) == count
+    beats: list[threading.Thread] = []
+    with heartbeat(lambda: beats.append(threading.current_thread()), 0.01):
+        until(lambda: len(beats) >= 3)
+    assert len(set(beats)) == 1 and not beats[0].is_alive()
 
 
 def test_work_without_a_terminal_says_now_and_then_where_it_is(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    clock: Clock, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(heartbeats, "EVERY", 0.01)
-    said = ""
+    """It beats when the test does."""
+    beats: list[Callable[[], None]] = []
+
+    @contextmanager
+    def by_hand(beat: Callable[[], None], every: float) -> Iterator[None]:
+        beats.append(beat)
+        yield
+
+    monkeypatch.setattr(heartbeats, "heartbeat", by_hand)
     with working("check throw", {"one": 1.0, "two": 1.0}) as tell:
         tell("one")
+        clock.now += 5
         tell("two")
-        while "\n" not in said:
-            said += capsys.readouterr().err
-    assert said.splitlines()[0].startswith("check throw: two: 50 % done, about ")
+        beats[0]()
+    assert capsys.readouterr().err == "check throw: two: 50 % done, about 5 s left\n"

@@ -17,6 +17,10 @@ print(compile_program(pendulum()).report.cached)
 """
 
 
+HANGS = "while kill -0 $PPID; do sleep 0.1; done"
+"""The end of a script that hangs as long as the process lives that has called it."""
+
+
 def fake(folder: Path, script: str) -> str:
     """A compiler that knows its version and then does as the script says."""
     path = folder / "fakecc"

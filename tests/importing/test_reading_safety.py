@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from tools.waiting import FOREVER
 
 from symphys.importing.options import ImportOptions
 from symphys.importing.problem import ImportProblem
@@ -130,13 +131,17 @@ def test_included_files_are_checked_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("code", "why"), [("import os; os.abort()", "without an answer"), ("import time; time.sleep(60)", "longer")]
+    ("code", "limit", "why"),
+    [
+        ("import os; os.abort()", FOREVER, "without an answer"),
+        ("import time; time.sleep(100000)", 0.5, "longer than 0.5 s"),
+    ],
 )
 def test_a_crash_or_a_hang_of_mujoco_is_a_message(
-    tmp_path: Path, code: str, why: str, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, code: str, limit: float, why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(isolated, "CALL", code)
-    monkeypatch.setattr(isolated, "LONGEST", 0.5)
+    monkeypatch.setattr(isolated, "LONGEST", limit)
     with pytest.raises(ImportProblem, match=why):
         read_source(model(tmp_path, ""))
 

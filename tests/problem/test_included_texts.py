@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds.included import ROBOT
 
@@ -55,6 +55,7 @@ def test_faults_of_what_is_kept(load_both: Load, tmp_path: Path) -> None:
 TEXT = st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"]) | st.sampled_from("\n\t\"\\'"))
 
 
+@settings(deadline=None)
 @given(TEXT, TEXT)
 def test_any_text_is_kept_as_it_is(file: str, text: str) -> None:
     assert tomllib.loads("a = 1" + appendix({file: text}))["included"] == [{"file": file, "text": text}]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from symphys.problem.checks.inertia import inertia_fault
@@ -34,6 +34,7 @@ MOMENT = st.floats(1e-6, 1e3)
 CORRELATION = st.floats(-1, 1)
 
 
+@settings(deadline=None)
 @given(st.tuples(MOMENT, MOMENT, MOMENT), st.tuples(CORRELATION, CORRELATION, CORRELATION))
 def test_bounds_alone_keep_it_physical(moments: tuple[float, ...], correlations: tuple[float, ...]) -> None:
     found = tensor(inertia(moments, correlations))

@@ -86,8 +86,7 @@ def test_a_zombie_holds_nothing(folder: Path) -> None:
     process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(1800)"])
     leave(folder, of_process(process.pid))
     process.kill()
-    while claims.beginning(process.pid) != "over":
-        time.sleep(0.01)
+    until(lambda: claims.beginning(process.pid) == "over")
     with claimed(folder) as claim:
         assert claim.held
     process.wait()

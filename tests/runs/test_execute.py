@@ -233,11 +233,11 @@ def test_a_run_whose_time_is_up_is_over(problem_file: Path, tmp_path: Path) -> N
     assert not (job.folder.path / "checkpoint.json").exists()
     assert "max_seconds" in (job.folder.path / "log.txt").read_text(encoding="utf-8")
     assert run(job, interrupt_at(0)) == first
-    assert run(throw(problem_file, tmp_path / "out", max_seconds=1000)).solved
+    assert run(throw(problem_file, tmp_path / "out", max_seconds=1e6)).solved
 
 
 def test_an_interrupted_run_with_a_time_goes_on(problem_file: Path, tmp_path: Path) -> None:
-    job = throw(problem_file, tmp_path / "out", max_seconds=1000)
+    job = throw(problem_file, tmp_path / "out", max_seconds=1e6)
     stopped = run(job, interrupt_at(1))
     assert (stopped.status, stopped.iterations) == ("interrupted", 1)
     seen: list[int] = []

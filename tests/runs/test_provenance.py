@@ -154,7 +154,7 @@ def test_odd_repositories_have_no_commit(tmp_path: Path, monkeypatch: pytest.Mon
 def test_a_program_that_does_not_answer_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(provenance, "PATIENCE", 0.05)
     monkeypatch.setenv("PATH", f"{tmp_path}:/bin")
-    for text in ("#!/bin/sh\nexec sleep 5\n", "#!/nowhere\n", "#!/bin/sh\nexit 3\n"):
+    for text in ("#!/bin/sh\nexec sleep 100000\n", "#!/nowhere\n", "#!/bin/sh\nexit 3\n"):
         (tmp_path / "sysctl").write_text(text, encoding="utf-8")
         (tmp_path / "sysctl").chmod(0o755)
         assert provenance.answer("sysctl", "-n") is None

@@ -98,10 +98,10 @@ def test_the_best_so_far_is_kept(name: str) -> None:
 @every_solver
 def test_seconds_go_on(name: str) -> None:
     part = solve(name, rosenbrock(), monitor=stop_at(4))
-    checkpoint = through_json(part.checkpoint) | {"seconds": 1000.0}
+    checkpoint = through_json(part.checkpoint) | {"seconds": 1e6}
     rest = solve(name, rosenbrock(), checkpoint=checkpoint)
-    assert rest.trace[4].seconds < 100
-    assert rest.trace[-1].seconds > 1000
+    assert rest.trace[4].seconds < 1e6
+    assert rest.trace[-1].seconds > 1e6
 
 
 @every_solver

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 import threading
-import time
+from collections.abc import Iterator
 from dataclasses import astuple, replace
 from typing import Any
 
 import numpy as np
 import pytest
 from tools.repeats import few
-from worlds.toys import Counted, counted, failing, quadratic, rosenbrock, solve, stop_at, target
+from worlds.toys import counted, failing, quadratic, rosenbrock, solve, stop_at, target
 
 from symphys.errors import SymphysError
 from symphys.problem import load_problem
 from symphys.problems import find
-from symphys.shooting import Values
-from symphys.solvers import Outcome, Status, solve_multi_start, solver
+from symphys.solvers import Outcome, Status, TraceRow, solve_multi_start, solver
+from symphys.solvers.core.multi_start import EvaluationBatcher
 from symphys.transcription import transcribe
 
 descents = pytest.mark.parametrize("name", ["gradient", "least_squares"])
@@ -82,23 +83,40 @@ def test_what_an_evaluation_raises_reaches_every_solve(name: str) -> None:
     assert not [each for each in threading.enumerate() if each.name.startswith("symphys-solve")]
 
 
-class Pressed(Counted):
-    """Presses Ctrl-C at the third call."""
+@pytest.fixture
+def one_press() -> Iterator[None]:
+    """Ctrl-C is heard once: presses that follow it do nothing."""
+    presses = itertools.count()
 
-    def evaluate(self, kind: str, Z: Any, smoothing: float) -> Values:
-        if sum(self.calls.values()) == 2:
-            os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(1)  # until the main thread hears of it
-        return super().evaluate(kind, Z, smoothing)
+    def hear(*_: object) -> None:
+        if not next(presses):
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, hear)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @descents
-def test_ctrl_c_ends_all_solves_and_leaves_no_thread(name: str) -> None:
-    problem = rosenbrock()
-    pressed = Pressed(problem.evaluator)
+@pytest.mark.usefixtures("one_press")
+def test_ctrl_c_ends_all_solves_and_leaves_no_thread(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Solves press it after an iteration until the main thread has heard; from then on nothing is evaluated."""
+    problem, watch = counted(rosenbrock())
+    heard, calls, close = threading.Event(), list[int](), EvaluationBatcher.close
+
+    def closing(batcher: EvaluationBatcher) -> None:
+        close(batcher)
+        calls.append(sum(watch.calls.values()))
+        heard.set()
+
+    def press(row: TraceRow) -> None:
+        while row.iteration == 1 and not heard.wait(0.02):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(EvaluationBatcher, "close", closing)
     with pytest.raises(KeyboardInterrupt):
-        together(name, replace(problem, evaluator=pressed))
-    assert sum(pressed.calls.values()) <= 4
+        together(name, problem, monitors=[press] * 5)
+    assert calls == [sum(watch.calls.values())]
     assert not [each for each in threading.enumerate() if each.name.startswith("symphys-solve")]
 
 

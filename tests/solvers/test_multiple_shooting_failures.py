@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 import threading
-import time
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from tools.repeats import few
+from tools.waiting import FOREVER
 from worlds.shots_of_toys import LINE, SWING, every_backend, solve
 from worlds.staged_toys import Chain, acrobot, boxed, pendulum
 from worlds.toys import quadratic, stop_at, through_json
@@ -47,25 +48,28 @@ def test_what_an_evaluation_raises(backend: str, kind: str, error: BaseException
 
 
 @every_backend
-@pytest.mark.parametrize("after", [0.1, 0.15, 0.2, 0.25])
-def test_a_signal_is_not_lost(backend: str, after: float) -> None:
-    """Wherever it comes: in Python, in the library, or on the way between the two."""
-    timer = threading.Timer(after, lambda: os.kill(os.getpid(), signal.SIGINT))
-    slow, chain = [0.0], acrobot()
+@pytest.mark.parametrize("call", [1, 3, 5])
+def test_a_signal_is_not_lost(backend: str, call: int) -> None:
+    """Wherever it comes from this call of Python on: in Python, in the library, or on the way between the two."""
+    chain, begun, sent, count = acrobot(), threading.Event(), threading.Event(), itertools.count(1)
     whole = chain.linearize
 
     def lasting(motion: Any) -> Any:
-        time.sleep(slow[0])
+        number = next(count)
+        if number == call:
+            begun.set()
+        assert number <= call or sent.wait(FOREVER)
         return whole(motion)
 
+    def press() -> None:
+        if begun.wait(FOREVER):
+            os.kill(os.getpid(), signal.SIGINT)
+            sent.set()
+
     chain.linearize = lasting  # type: ignore[method-assign]
-    problem = boxed(chain)
-    solve(problem, nodes=LINE, backend=backend, iterations=1)
-    slow[0] = 0.05
-    timer.start()
-    found = solve(problem, nodes=LINE, backend=backend)
-    timer.join()
-    assert found.status is Status.INTERRUPTED
+    threading.Thread(target=press, daemon=True).start()
+    found = solve(boxed(chain), nodes=LINE, backend=backend)
+    assert sent.is_set() and found.status is Status.INTERRUPTED
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 

@@ -8,6 +8,7 @@ import subprocess
 from typing import Any
 
 import pytest
+from tools.waiting import FOREVER
 
 from symphys.report.pages.markup import HERE, SCRIPTS
 
@@ -60,10 +61,13 @@ def plays_to_the_end(motion: dict[str, Any]) -> None:
     const half = parts.output.textContent;
     parts.select.value = "1";
     listeners[".play click"]();
-    setTimeout(() => console.log(half, "|", parts.output.textContent, "|", parts[".play"].textContent), 800);
+    setImmediate(function shown() {
+      if (frames < 400 && parts[".play"].textContent !== "▶") return setImmediate(shown);
+      console.log(half, "|", parts.output.textContent, "|", parts[".play"].textContent);
+    });
     """
     code = f"const DATA = {data};{STAGE}{script}{acts}"
-    played = subprocess.run(["node", "-"], input=code, capture_output=True, text=True, timeout=30, check=False)
+    played = subprocess.run(["node", "-"], input=code, capture_output=True, text=True, timeout=FOREVER, check=False)
     assert played.stderr == ""
     half, end, button = played.stdout.strip().split(" | ")
     last = half.split(" / ")[1]

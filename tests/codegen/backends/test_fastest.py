@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -11,7 +10,7 @@ from fakes.emulated import Emulated, needs_compiler
 from worlds.toys import require
 
 from symphys.codegen import KernelUnavailable, ProcessorKernel, compile_program
-from symphys.codegen.backends import BEST, build_kernel
+from symphys.codegen.backends import BEST, build_kernel, fastest
 from symphys.codegen.backends.fastest import FastestKernel
 from symphys.codegen.backends.kernels import described
 from symphys.codegen.cuda import DeviceKernel, compile_on
@@ -38,16 +37,19 @@ def there(here: ProcessorKernel, tmp_path_factory: pytest.TempPathFactory) -> De
     return compile_on(Emulated(tmp_path_factory.mktemp("device")), here.program)
 
 
-class Slowed:
-    """A kernel's ``_run`` that takes its time, and counts."""
+class Timed:
+    """A kernel's ``_run`` that takes so many seconds of its clock, and keeps the rows of each call."""
 
     def __init__(self, run: Callable[[RolloutBatch], None], seconds: float) -> None:
-        self.run, self.seconds, self.rows = run, seconds, list[int]()
+        self.run, self.seconds, self.rows, self.now = run, seconds, list[int](), 0.0
 
     def __call__(self, batch: RolloutBatch) -> None:
         self.rows.append(batch.rows)
-        time.sleep(self.seconds)
+        self.now += self.seconds
         self.run(batch)
+
+    def clock(self) -> float:
+        return self.now
 
 
 def points(kernel: ProcessorKernel, count: int) -> np.ndarray:
@@ -59,8 +61,9 @@ def points(kernel: ProcessorKernel, count: int) -> np.ndarray:
 def test_a_large_batch_goes_where_the_first_of_its_size_was_faster(
     here: ProcessorKernel, there: DeviceKernel, faster: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = Slowed(there._run, 0.0 if faster else 0.1)
+    run = Timed(there._run, 1.0)
     monkeypatch.setattr(there, "_run", run)
+    monkeypatch.setattr(fastest, "perf_counter", run.clock)
     kernel = FastestKernel(here, lambda: there, LARGE)
     if faster:
         monkeypatch.setattr(kernel, "_expected", lambda batch: 1e6)

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from fakes.compilers import building, fake
+from fakes.compilers import HANGS, building, fake
 from tools.waiting import FOREVER, wait_for
 
 from symphys.codegen.toolchain.temporary import LOCK, OLD, YOUNG, TemporaryFolder
@@ -44,7 +44,7 @@ def made(place: Path, name: str, locked: bool = False) -> Path:
 
 
 def test_what_a_killed_build_left_goes_with_the_next(tmp_path: Path, place: Path) -> None:
-    process = building(tmp_path, fake(tmp_path, f"echo $$ > {tmp_path}/started; exec sleep 5"))
+    process = building(tmp_path, fake(tmp_path, f"echo $$ > {tmp_path}/started; {HANGS}"))
     try:
         wait_for(tmp_path / "started")
         (left,) = place.iterdir()

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from tools.repeats import few
+from worlds.toys import require
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Program
 from symphys.codegen.toolchain import warm_start
@@ -192,6 +193,7 @@ def test_a_problem_with_a_python_function_is_built(monkeypatch: pytest.MonkeyPat
 
 @few("name", ["ball_throw", "cart_pole_walls"], 1)
 def test_a_second_start_of_a_problem_is_the_first(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    require("simd")
     monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path / "kernels"))
     problem: Problem = load_problem(find(name))
     cold = transcribe(problem, exact=True, threads=1)
