@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tools.waiting import FOREVER
 
 from symphys.cli import main
 from symphys.report.pages.run import PAGE
@@ -32,6 +33,14 @@ value = "ball.position[0:2] - [0.5, 0]"
 tolerance = 0.01
 """
 Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(autouse=True)
+def _without_lines_of_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines that come every few seconds have tests of their own; a slow machine puts them between any others."""
+    monkeypatch.setattr("symphys.cli.watching.plain.monotonic", lambda: 0.0)
+    monkeypatch.setattr("symphys.cli.watching.heartbeat.EVERY", FOREVER)
+    monkeypatch.setattr("symphys.cli.finding.shown.QUIET", FOREVER)
 
 
 @pytest.fixture

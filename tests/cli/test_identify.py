@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pytest
 from identify_coverage import BOUNCES, recorded
+from worlds.toys import require
 
 from symphys.cli.app import main
 
 
 def test_a_fit_whose_spins_are_not_determined_has_converged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Exit code 0: nothing is doubted, and what is vague is named."""
+    require("simd")
     file = tmp_path / "throws.toml"
     file.write_text(recorded(BOUNCES, 0).text, encoding="utf-8")
     code = main(["identify", str(file), "--threads", "1", "--out", str(tmp_path / "runs")])
@@ -23,6 +25,7 @@ def test_a_fit_whose_spins_are_not_determined_has_converged(tmp_path: Path, caps
 
 def test_a_fit_of_a_wrong_model_is_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Exit code 1: gravity is another one."""
+    require("simd")
     file = tmp_path / "moon.toml"
     file.write_text(recorded(BOUNCES, 0).text + "\n[world]\ngravity = [0, 0, -9]\n", encoding="utf-8")
     assert main(["identify", str(file), "--threads", "1", "--out", str(tmp_path / "runs")]) == 1
