@@ -57,6 +57,7 @@ def test_a_plan_costs_what_the_staged_problem_says() -> None:
     assert plan().cost == pytest.approx(merit(plan().v.ravel()), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_plan_is_a_motion_of_the_model() -> None:
     assert plan().x == pytest.approx(motion(plan().v.ravel()).x, abs=1e-10)
 

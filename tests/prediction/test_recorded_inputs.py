@@ -64,6 +64,7 @@ def test_where_jumps_meet_ends_of_steps_the_derivative_is_that_towards_later() -
     np.testing.assert_allclose(step_means(signal, 8, DT, 0.0)[1], later / 1e-6, atol=1e-6)
 
 
+@pytest.mark.slow
 @few("interpolation", WAYS, 1)
 def test_gain_delay_damping_friction_and_armature_are_found(interpolation: str) -> None:
     """All five within their intervals, from an angle with noise; these are narrow."""

@@ -187,6 +187,7 @@ def test_the_table_robot_starts_with_bent_legs(robot: Robot) -> None:
         assert foot == pytest.approx([*shoulder[:2], 0.05], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_none_falls_through_the_ground_or_apart(robot: Robot, simulated: Simulated, name: str) -> None:
     """At commands of 0, which stretch bent legs at once; joints stay together to a millimetre."""

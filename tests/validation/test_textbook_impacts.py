@@ -147,6 +147,7 @@ def clattering(angle: float, height: float, e: float, time: float) -> tuple[Arra
         y = y + np.array([0, 0, blow, 12 * lever * blow])
 
 
+@pytest.mark.slow
 @few("angle", [0.05, 0.2, 0.5], 1)
 @few("e", [0.5, 0.9], 1)
 def test_rod_clatters(e: float, angle: float) -> None:

@@ -149,6 +149,7 @@ def test_a_function_of_somebody_has_no_identity() -> None:
     assert identity_of(object()) is None
 
 
+@pytest.mark.slow
 def test_another_process_has_the_same_identity() -> None:
     code = (
         "from symphys.problem import load_problem; from symphys.problems import find;"

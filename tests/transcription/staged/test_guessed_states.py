@@ -35,6 +35,7 @@ def named(made: RolloutStages, z: np.ndarray, states: np.ndarray) -> np.ndarray:
     return np.asarray(off[:, :4].T)
 
 
+@pytest.mark.slow
 def test_a_line_between_states() -> None:
     """Angles on the line, rates its slope, and the elbow between what is said of it."""
     made, z, found = stages(
