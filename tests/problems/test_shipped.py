@@ -102,7 +102,8 @@ class Must:
     def cases(self) -> Iterable[Any]:
         """One a seed."""
         stages = (f"stages {self.smoothing}",) if self.smoothing else ()
-        what = "-".join((self.problem, self.solver, *("polished",) * self.polish, *stages))
+        many = (f"{self.wanted} of {self.of}",) if self.of else ()
+        what = "-".join((self.problem, self.solver, *("polished",) * self.polish, *stages, *many))
         for seed in range(self.seeds):
             marks = (pytest.mark.thorough,) if seed else self.marks
             yield pytest.param(self, seed, id=f"{what}-{seed}", marks=marks)
@@ -544,6 +545,7 @@ TABLE = [
           solved=None, law=is_the_torque_of_inverse_dynamics),
     *rows("free_kick", "least_squares", quick="least_squares", law=curls_into_the_corner, polish=True),
     *rows("hopper_gait", "ipopt", law=closes_the_gait, finer=1, seeds=2),
+    *rows("hopper_jump", "gradient", "gradient", of=3, law=jumps_half_a_metre),
     *rows("hopper_jump", "gradient", "gradient", of=3, wanted=2, law=jumps_half_a_metre),
     *rows("ice_and_asphalt", "least_squares ilqr", "ilqr", law=stops_on_asphalt),
     *rows("juggle", {"gradient": 60, "least_squares": 6, "ipopt": 30, "cma": 1500}, law=brings_bat_and_ball_back,
@@ -564,6 +566,7 @@ TABLE = [
     *rows("push_box", "ilqr", "ilqr", finer=1),
     *rows("putt", {"least_squares": 9}, answer=PUTT, within=4e-3, polish=True),
     *rows("putt", {"gradient": 16, "ipopt": 16, "cma": 250}, answer=PUTT, within=[0.012, 0.04], seeds=2),
+    *rows("quadruped_shift", "gradient", "gradient", of=3, law=shifts_its_torso),
     *rows("quadruped_shift", "gradient", "gradient", of=3, wanted=2, law=shifts_its_torso),
     *rows("row_of_balls", {"gradient": 45, "least_squares": 25, "ipopt": 35, "cma": 1000}, solved=None,
           law=has_geometric_masses, seeds=2),
