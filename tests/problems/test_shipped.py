@@ -264,13 +264,6 @@ def dribbled(found: Found) -> list[int]:
     return turned.tolist()
 
 
-def dribbles_three_times(found: Found) -> None:
-    speed = found.motion["ball.velocity"][:, 2]
-    for k in dribbled(found):
-        assert speed[k] > DRIBBLE_BACK - 0.4
-        assert speed[k] < -0.8 * speed[k - 1] + 2 * GRAVITY * 0.01
-
-
 def pushes_give_what_bounces_take(found: Found) -> None:
     """A push down to 1 / e of the speed that a flight back takes; a fall from rest has that speed itself."""
     speed = found.motion["ball.velocity"][:, 2]
@@ -533,7 +526,6 @@ TABLE = [
     *rows("catch", "ilqr", "ilqr", below=0.07, of=5, wanted=5, finer=3),
     *rows("cost_of_transport", "ilqr multiple_shooting ipopt", "multiple_shooting ipopt",
           law=costs_least_transport),
-    *rows("dribble", "gradient", "gradient", of=6, law=dribbles_three_times),
     *rows("dribble", "cma", "cma", of=2, law=pushes_give_what_bounces_take),
     *rows("eddy_brake", "ilqr multiple_shooting least_squares", "multiple_shooting least_squares",
           quick="ilqr", law=brakes_between_two_speeds, backend="casadi"),
