@@ -37,6 +37,7 @@ def test_every_command_has_its_name_here() -> None:
     assert "ball_throw" in symphys.problems.catalogue() and "gradient" in symphys.solvers.SOLVERS
 
 
+@pytest.mark.slow
 def test_check_is_that_of_the_command(problem: symphys.Problem, solution: symphys.Solution) -> None:
     """The same numbers and words, at the guess and at what a solve found."""
     from symphys.transcription import transcribe
@@ -150,6 +151,7 @@ def test_a_batch_is_done_by_an_engine(
             symphys.solve_all([problem], **given)
 
 
+@pytest.mark.slow
 def test_show_draws_what_it_is_given(problem: symphys.Problem, tmp_path: Path) -> None:
     """The motion of these values, and a page of it; a robot by itself."""
     figure = symphys.show(problem, throw=[2, 0, 1], page=tmp_path / "page.html")
@@ -182,6 +184,7 @@ def test_new_overwrites_nothing(tmp_path: Path) -> None:
         symphys.new(tmp_path / "other.toml", "two_bals")
 
 
+@pytest.mark.slow
 def test_figures_of_a_solution_are_files(solution: symphys.Solution, tmp_path: Path) -> None:
     """Those of its report; the numbers are those of its trajectory."""
     page = symphys.report(solution.folder)

@@ -14,6 +14,7 @@ def rollout(problem: symphys.Problem) -> symphys.CompiledRollout:
     return symphys.compile(problem)
 
 
+@pytest.mark.slow
 def test_rows_are_those_alone(rollout: symphys.CompiledRollout) -> None:
     Z = rollout.z() + 0.1 * np.random.default_rng(0).standard_normal((5, rollout.n))
     assert rollout.value(Z).shape == (5,) and rollout.gradient(Z).shape == (5, rollout.n)
@@ -66,6 +67,7 @@ def test_smoothing_is_of_the_whole_rollout(problem: symphys.Problem, rollout: sy
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["auto", "casadi"])
 def test_without_squares_there_are_no_residuals(backend: str) -> None:
     """It is said with the problem's name, whatever evaluates."""

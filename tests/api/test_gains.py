@@ -25,6 +25,7 @@ UPRIGHT = {
 """A pole on a motor, to be held upright."""
 
 
+@pytest.mark.slow
 def test_a_pole_is_held_from_a_disturbed_start_with_gains_and_falls_without(tmp_path: Path) -> None:
     symphys.solve(problem_of_tables(UPRIGHT), "ilqr", folder=tmp_path, backend="casadi", iterations=10)
     (folder,) = [each.parent for each in tmp_path.rglob("gains.npz")]
@@ -39,6 +40,7 @@ def test_a_pole_is_held_from_a_disturbed_start_with_gains_and_falls_without(tmp_
         solution.rollout({"pivot.angl": 0.1})
 
 
+@pytest.mark.slow
 def test_solvers_without_feedback_say_so(tmp_path: Path) -> None:
     solution = symphys.solve("ball_throw", "least_squares", folder=tmp_path, backend="casadi", iterations=1)
     assert solution.gains == {}

@@ -121,6 +121,7 @@ def test_read_names_what_is_no_run(tmp_path: Path) -> None:
         symphys.read(tmp_path)
 
 
+@pytest.mark.slow
 def test_a_batch_has_limits_and_does_again_what_is_asked_for(tmp_path: Path) -> None:
     for given in ({"rerun": "faild"}, {"retries": -1}, {"timeout": 0.0}, {"budget": -1.0}):
         with pytest.raises(SymphysError, match=r"failed|retries"):

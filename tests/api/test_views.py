@@ -30,6 +30,7 @@ def test_importing_is_cheap() -> None:
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_a_start_loads_no_scipy() -> None:
     """Loading and compiling a problem need none of it, and it takes a third of a second."""
     code = "import sys, symphys; symphys.compile(symphys.load('ball_throw')); print('scipy' in sys.modules)"

@@ -134,6 +134,7 @@ def test_workers_do_what_one_process_does(problem_file: Path, tmp_path: Path, re
     assert {name for event, name in recorder.events if event == "started"} == names
 
 
+@pytest.mark.slow
 def test_a_job_survives_the_way_to_a_new_process_and_back(problem: Problem, tmp_path: Path) -> None:
     (job,) = make_jobs([problem], ["gradient"], [3], {"simulation.dt": 0.02}, tmp_path)
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
@@ -162,6 +163,7 @@ def test_a_process_that_dies_fails_its_own_run_only(
     assert all("died" in result.advice for result in batch.results[2:] if result)
 
 
+@pytest.mark.slow
 @few("name", ["gradient", "least_squares", "ipopt", "cma"], 1)
 def test_every_solver_goes_on_from_its_file_as_if_nothing_had_been(
     problem_file: Path, tmp_path: Path, recorder: Any, name: str

@@ -24,6 +24,7 @@ def jobs_of(problem_file: Path, out: Path, seeds: int = 4) -> list[Job]:
     return make_jobs([load_problem(problem_file, settings)], SOLVERS, range(seeds), settings, out)
 
 
+@pytest.mark.slow
 def test_results_are_those_of_one_after_another(problem_file: Path, tmp_path: Path, recorder: Any) -> None:
     alone = run_batch(jobs_of(problem_file, tmp_path / "a"), 1, recorder, transcribe)
     beside = run_batch(jobs_of(problem_file, tmp_path / "b"), 1, recorder, transcribe, multi_start=True)
@@ -43,6 +44,7 @@ def test_only_fresh_seeds_of_one_threaded_solver_form_a_group(problem_file: Path
     assert groups(jobs, halfway={1}) == [[0], [1], [2, 3], [4, 5, 6, 7], [8], [9], [10], [11]]
 
 
+@pytest.mark.slow
 def test_ctrl_c_loses_nothing(problem_file: Path, tmp_path: Path, recorder: Any) -> None:
     whole = run_batch(jobs_of(problem_file, tmp_path / "whole"), 1, recorder, transcribe)
     told = recorder.advanced
@@ -62,6 +64,7 @@ def test_ctrl_c_loses_nothing(problem_file: Path, tmp_path: Path, recorder: Any)
         assert (one.z, one.counts) == (other.z, other.counts)
 
 
+@pytest.mark.slow
 def test_one_that_fails_spoils_no_other(
     problem_file: Path, tmp_path: Path, recorder: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -168,6 +168,7 @@ run_batch([pickle.loads(sys.stdin.buffer.read())], 1, Killer(), transcribe)
 """
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_from_its_checkpoint(make: Any, recorder: Any) -> None:
     """To the same end, to the bit, as if nothing had been."""
     (whole,), (job,) = make("whole"), make("broken")

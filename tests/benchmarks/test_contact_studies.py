@@ -32,6 +32,7 @@ def cases() -> list[gradients.Case]:
     return gradients.cases(batch=2)
 
 
+@pytest.mark.slow
 @first("which", [0, 1, 2])
 def test_gradients_are_exact_with_the_time_of_impact_only(cases: list[gradients.Case], which: int) -> None:
     case = cases[which]
@@ -67,6 +68,7 @@ def test_mujoco_on_the_same_scene() -> None:
     assert np.median(errors[1]) < np.median(errors[0])
 
 
+@pytest.mark.slow
 def test_ablation_tells_the_tricks_apart() -> None:
     whole, without = (ablation.dropped_ball(Scheme(time_of_impact=t)) for t in (True, False))
     assert max(whole) < 1e-9 < 1e-2 < min(without)

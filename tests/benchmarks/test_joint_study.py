@@ -23,6 +23,7 @@ def _compiled() -> None:
         pytest.skip(str(error))
 
 
+@pytest.mark.slow
 def test_trees_need_no_sweeps_and_rows_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     measures = {"energy drift [J]": drift, "separation [mm]": parted}
     study = Study("Two rods", swinging([1.0, 1.0]), 0.6, measures, {"whole": {}}, {"whole": {}})
@@ -37,6 +38,7 @@ def test_trees_need_no_sweeps_and_rows_do(tmp_path: Path, capsys: pytest.Capture
     assert "Two rods" in (tmp_path / "joints.svg").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_position_pass_holds_a_loop_together() -> None:
     study = Study("One loop", parallelograms(1.2), 0.5, {}, {}, {})
     apart = [parted(Run(study, study.scene, Scheme(position_sweeps=n))) for n in (0, 2)]

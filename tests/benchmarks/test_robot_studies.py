@@ -41,6 +41,7 @@ def test_a_quadruped_stands_on_its_feet() -> None:
     assert len(scene.robot.pairs) == 4
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("compiled")
 def test_engines_agree_without_contact() -> None:
     from robot_agreement import differences, flung
@@ -50,6 +51,7 @@ def test_engines_agree_without_contact() -> None:
     assert errors[1] < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("compiled")
 def test_errors_against_oneself_fall_with_the_step() -> None:
     from consistency import errors_of
@@ -61,6 +63,7 @@ def test_errors_against_oneself_fall_with_the_step() -> None:
         assert (errors[1] > 0).all() and (errors[1] < errors[0]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("compiled")
 def test_steps_and_derivatives_are_timed(capsys: pytest.CaptureFixture[str]) -> None:
     from robot_against_mujoco import here, measure, report, there

@@ -29,6 +29,7 @@ def test_check_says_that_a_list_gets_the_same_values(run: Run, throw: Path) -> N
     assert out.count("to the same values") == 1
 
 
+@pytest.mark.slow
 def test_check_and_solve_say_which_solvers_are_taken_and_why(run: Run, throw: Path) -> None:
     """Where none is named; a list in the file is only repeated, and events and silence stay clean."""
     since = "least_squares, since a few numbers set what is squared"

@@ -11,6 +11,7 @@ from fakes.thread_engine import Threads
 from symphys.batches import following
 
 
+@pytest.mark.slow
 def test_a_batch_on_an_engine_ends_like_any_other(run: Any, throw: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The engine is given the number of drivers and the absolute folder; the second command has nothing to start."""
     opened: list[Any] = []

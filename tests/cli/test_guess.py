@@ -12,6 +12,7 @@ from symphys.runs import read_result
 Run = Callable[..., tuple[int, str, str]]
 
 
+@pytest.mark.slow
 def test_a_run_is_the_guess_of_the_next(run: Run, throw: Path, tmp_path: Path) -> None:
     """Its own folder beside, the same command does nothing again, and what is clipped is named once."""
     out = tmp_path / "out"

@@ -53,6 +53,7 @@ def test_the_same_command_again_does_nothing_and_says_so(run: Run, throw: Path) 
     assert Path("reports/throw/gradient-seed0/result.json").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_one_unsolved_run_exits_1_and_the_others_are_done(run: Run, throw: Path, unreachable: Path) -> None:
     code, out, _ = run("solve", unreachable, throw, "--solver", "least_squares", "--out", "o", *QUICK)
     assert code == 1
@@ -102,6 +103,7 @@ def test_the_best_of_a_budget_is_not_called_solved_and_exits_0(run: Run, throw: 
     assert code == 0 and "1/1" in table and "converged" in table
 
 
+@pytest.mark.slow
 def test_seeds_and_settings_reach_the_runs(run: Run, throw: Path) -> None:
     options = ("--seeds", "2", "--set", "simulation.dt=0.01", "--set", "solver.least_squares.iterations=30")
     code, out, _ = run("solve", throw, "--solver", "least_squares", *options, *QUICK)
@@ -267,6 +269,7 @@ def test_version_and_help(run: Run) -> None:
     assert code == 0 and "--seeds" in out
 
 
+@pytest.mark.slow
 def test_check_draws_nothing(throw: Path) -> None:
     code = f"import sys; from symphys.cli import main; main(['check', {str(throw)!r}]); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -13,7 +13,7 @@ from symphys import problems
 Run = Callable[..., tuple[int, str, str]]
 
 
-@pytest.mark.parametrize("name", ["ball_throw", "cart_pole"])
+@few("name", ["ball_throw", "cart_pole"], 1)
 def test_a_copy_is_the_problem(run: Run, name: str) -> None:
     """Comments and all; what it includes is found from elsewhere."""
     code, out, _ = run("new", "mine.toml", "--from", name)
@@ -50,12 +50,14 @@ def test_the_text_of_what_is_shipped(run: Run) -> None:
         assert (code, out) == (0, path.read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 @few("robot", ["robots/arm.toml", "hopper", "cart_pendulum"], 1)
 def test_a_robot_alone(run: Run, robot: str) -> None:
     code, out, _ = run("show", robot, "--set", "simulation.duration=0.1")
     assert code == 0 and Path(out.strip()).is_file()
 
 
+@pytest.mark.slow
 def test_a_robot_of_mujoco_is_shown_with_what_was_lost(run: Run) -> None:
     pytest.importorskip("mujoco")
     joint = '<joint name="hip" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02"/>'
@@ -68,6 +70,7 @@ def test_a_robot_of_mujoco_is_shown_with_what_was_lost(run: Run) -> None:
     assert code == 2 and "home" in err and "arm.xml" in err
 
 
+@pytest.mark.slow
 def test_a_robot_of_an_installed_package_is_shown(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mujoco")
     package = tmp_path / "site" / "toy_robots"

@@ -18,6 +18,7 @@ FOLDER = Path("reports", case_name("throw", {"simulation.smoothing": [0.1, 0.01,
 Run = Callable[..., tuple[int, str, str]]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("whole_report")
 def test_a_setting_makes_stages(run: Run, throw: Path) -> None:
     code, _, _ = run("solve", throw, "--solver", "least_squares", "--set", "simulation.smoothing=[0.1, 0.01, 0]")

@@ -47,6 +47,7 @@ def test_each_point_has_the_folder_of_its_settings_and_is_done_once(run: Run, th
     assert symphys.read(Path("o") / cases()[0] / "least_squares-seed0").problem.parameters["ball.mass"] == 1
 
 
+@pytest.mark.slow
 def test_a_file_may_sweep_and_what_is_swept_is_no_part_of_a_problem(run: Run, throw: Path) -> None:
     run("solve", throw, "--set", "ball.mass=2", *QUICK)
     throw.write_text(throw.read_text() + TABLE)

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from fakes.compilers import fake
+from tools.repeats import few
 
 from symphys import doctor
 from symphys.codegen import KernelUnavailable
@@ -139,7 +140,7 @@ def test_export_writes_both(run: Run, throw: Path) -> None:
     assert Path("c/README.txt").is_file()
 
 
-@pytest.mark.parametrize(
+@few(
     ("arguments", "words"),
     [
         (["ball_throw"], "--c DIR, --casadi DIR or --mjcf DIR"),
@@ -149,6 +150,7 @@ def test_export_writes_both(run: Run, throw: Path) -> None:
         (["ball_throw", "--c", "here"], "here/ball_throw.c was not written by symphys"),
         (["ball_throw", "--casadi", "there", "--c", "here"], "here/ball_throw.c was not written by symphys"),
     ],
+    3,
 )
 def test_what_cannot_be_exported(run: Run, arguments: list[str], words: str) -> None:
     Path("here").mkdir()

@@ -59,6 +59,7 @@ def example(folder: Path, name: str, *z: float) -> dict[str, float]:
     return {line.rpartition(" ")[0].rstrip(":"): float(line.rpartition(" ")[2]) for line in done.stdout.splitlines()}
 
 
+@pytest.mark.slow
 @few("problem", ["kick", "ball_throw"], 1)
 def test_the_example_prints_the_numbers_of_python(problem: str, kick: Transcription, tmp_path: Path) -> None:
     one = kick if problem == "kick" else transcribe(load_problem(find(problem)), backend="casadi")
@@ -79,6 +80,7 @@ def test_the_example_prints_the_numbers_of_python(problem: str, kick: Transcript
         np.testing.assert_allclose(gradient, slope, rtol=0, atol=1e-12 * np.abs(slope).max())
 
 
+@pytest.mark.slow
 def test_the_example_refuses_what_is_no_z(folder: Path) -> None:
     compile_c("-std=c99", folder / f"{NAME}.c", folder / f"{NAME}_main.c", "-o", folder / "example")
     for words in (["1"], ["1", "2", "3", "4", "5", "6", "x"], [""] * 7):
@@ -105,6 +107,7 @@ def test_steps_from_the_start_are_the_rollout(kick: Transcription, folder: Path,
     assert p[0] == z[-1]
 
 
+@pytest.mark.slow
 def test_slopes_of_a_step_are_those_of_casadi(kick: Transcription, folder: Path, library: Any) -> None:
     define = defined(folder)
     nt, nu, np_ = (define[key] for key in ("T", "U", "P"))

@@ -9,6 +9,7 @@ from xml.etree.ElementTree import fromstring
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.export import ExportError, mjcf_model, problem_model
 from symphys.export.mjcf_terrain import deviation, window
@@ -157,7 +158,7 @@ def test_sensors_without_counterpart_are_left_out_and_named() -> None:
     assert fromstring(made.text).find("sensor") is None
 
 
-@pytest.mark.parametrize(
+@few(
     ("formula", "kind", "place", "turn"),
     [
         ("leg.position + rotate(leg.orientation, [0.1, 0.2, 0.3])", "framepos", [0.1, 0.2, 0.3], [1, 0, 0, 0]),
@@ -171,6 +172,7 @@ def test_sensors_without_counterpart_are_left_out_and_named() -> None:
         ("leg.accelerometer", "accelerometer", [0, 0, 0], [1, 0, 0, 0]),
         ("x.torque / 20.0", "actuatorfrc", None, None),
     ],
+    2,
 )
 def test_formulas_that_are_sensors_of_mujoco(formula: str, kind: str, place: Any, turn: Any) -> None:
     """A site is made where they read."""
@@ -247,6 +249,7 @@ def test_a_joint_that_gives_way_sags_as_here() -> None:
 HILLS = Heightfield(((0, 0.1, 0.3), (0.2, 0.5, 0.1), (0.1, 0, -0.2), (0.3, 0.2, 0)), (0.5, 0.4), (-0.5, 2.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("height", "approximate"), [(HILLS, False), (lambda x, y: 0.2 * ca.sin(x) * y, True)])
 def test_terrain_is_a_height_field_as_near_as_told(height: Any, approximate: bool) -> None:
     """Heights by rays from above: on the grid exactly, between within what was told, which is attained to a tenth."""

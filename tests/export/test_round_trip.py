@@ -202,6 +202,7 @@ def test_a_model_that_begins_at_a_keyframe_comes_back_at_its_own(tmp_path: Path)
     assert differences((problem.world(), problem.initial), (again.world(), again.initial)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("gymnasium") is None, reason="gymnasium is not installed")
 @first("name", ["ant", "hopper", "half_cheetah"])
 def test_models_of_gymnasium(name: str, tmp_path: Path) -> None:

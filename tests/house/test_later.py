@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from tools.repeats import few
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = {
@@ -34,7 +35,7 @@ def test_there_are_some() -> None:
     assert {"symphys.codegen", "symphys.problem", "symphys.transcription"} <= PACKAGES.keys()
 
 
-@pytest.mark.parametrize("name", PACKAGES)
+@few("name", PACKAGES, 2)
 def test_names_are_those_of_their_modules(name: str) -> None:
     """In a process that has imported nothing else, where every name is still to come."""
     names = told(PACKAGES[name])

@@ -44,6 +44,7 @@ def test_the_problem_of_your_own_is_solved(tmp_path: Path) -> None:
     assert main(["solve", str(path), *solvers, "--out", str(tmp_path / "reports")]) == 0
 
 
+@pytest.mark.slow
 def test_the_front_door_opens(tmp_path: Path) -> None:
     """Solved; another mass and friction need another throw; values and gradients of 128 throws."""
     first, second, third = printed(blocks("python")[0], tmp_path)

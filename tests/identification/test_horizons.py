@@ -36,6 +36,7 @@ def tumbles(count: int = 12) -> AnalyticRecordings:
     return problem
 
 
+@pytest.mark.slow
 def test_growing_horizons_follow_chaos() -> None:
     """To residuals of the size of the noise, where all at once ends at more than ten times it."""
     at_once = fit(tumbles(), FitOptions(iterations=40)).outcome

@@ -44,6 +44,7 @@ def test_at_a_kink_no_step_is_left_although_one_side_promises_one(samples: int, 
     assert errors < 0.05**2
 
 
+@pytest.mark.slow
 def test_kinks_of_some_recordings_of_many() -> None:
     outcome = RecordingFit(bounces(12, 5, copies=40), FitOptions()).run()
     assert outcome.status is FitStatus.CONVERGED and "has a kink here" in outcome.reason

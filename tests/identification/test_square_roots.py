@@ -147,6 +147,7 @@ def double_pendulum(shared: Array, own: Array, time: Array) -> Array:
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_five_seconds_of_a_double_pendulum_have_the_errors_of_differences() -> None:
     """Within a factor of 2: the motion makes of changes of its start a thousand times as much."""
     truth, own, time = np.array([0.7, 9.81]), np.array([[2.0, 2.6]]), np.linspace(0, 5, 251)

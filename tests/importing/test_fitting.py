@@ -97,6 +97,7 @@ def test_inner_walls_do_not_count() -> None:
     assert found.deviation_mm < 4
 
 
+@pytest.mark.slow
 def test_the_answer_is_the_same_each_time() -> None:
     points, faces = mesh(Placed("capsule", PLACE, TURN, np.array(SIZES["capsule"])).surface())
     assert fit(points, faces, kinds=["capsule"]) == fit(points.copy(), faces.copy(), kinds=["capsule"])

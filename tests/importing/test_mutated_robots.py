@@ -9,6 +9,7 @@ import pytest
 from mutated_robots import CHANGES
 from mutated_texts import MODELS
 from mutations import mutated
+from tools.repeats import few
 
 from symphys.errors import SymphysError
 from symphys.importing.findings import Finding
@@ -19,7 +20,7 @@ pytest.importorskip("mujoco")
 CASES = 6
 
 
-@pytest.mark.parametrize("name", MODELS)
+@few("name", MODELS, 1)
 def test_a_broken_model_is_a_robot_or_a_message(tmp_path: Path, name: str) -> None:
     dice, seen = random.Random(7), set[bool]()
     for text in (MODELS[name], *(mutated(MODELS[name], dice, CHANGES) for _ in range(CASES))):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.importing.findings import Finding
 from symphys.importing.options import ImportOptions
@@ -58,6 +59,7 @@ def table(robot: Imported, kind: str, name: str) -> Mapping[str, object]:
     return found  # type: ignore[no-any-return]
 
 
+@pytest.mark.slow
 def test_an_arm_stands_and_a_walker_floats_unless_told_otherwise(tmp_path: Path) -> None:
     """MuJoCo fuses the roots of all of them to the world."""
     cases = [(ARM, "auto", 2), (WALKER, "auto", 8), (ARM, "free", 8), (WALKER, "fixed", 2)]
@@ -81,6 +83,7 @@ def test_prefixes_need_not_be_bound(tmp_path: Path) -> None:
     assert source.motors.keys() == {"shoulder", "elbow"}
 
 
+@pytest.mark.slow
 def test_efforts_become_motors(tmp_path: Path) -> None:
     """Without transmissions of all joints, else of those that have one; speeds are named."""
     robot = robot_of(tmp_path, ARM)
@@ -131,8 +134,10 @@ def test_a_negative_mass_is_refused(tmp_path: Path) -> None:
         source_of(tmp_path, ARM.replace('value="2"', 'value="-2"', 1))
 
 
-@pytest.mark.parametrize(
-    ("old", "new"), [('value="2"', 'value="1e308"'), ('ixz="0"', 'ixz="1e308"'), ('xyz="0 0 0.1"', 'xyz="0 0 1e308"')]
+@few(
+    ("old", "new"),
+    [('value="2"', 'value="1e308"'), ('ixz="0"', 'ixz="1e308"'), ('xyz="0 0 0.1"', 'xyz="0 0 1e308"')],
+    1,
 )
 def test_masses_inertias_and_centres_beyond_what_can_be_computed_are_refused(
     tmp_path: Path, old: str, new: str

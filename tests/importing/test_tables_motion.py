@@ -36,6 +36,7 @@ def errors(xml: str, tables: Tables, duration: float, bodies: dict[str, str]) ->
     return [apart(model, data, symphys.simulate(problem_of(tables, duration, dt)), bodies) for dt in steps]
 
 
+@pytest.mark.slow
 def test_a_chain_of_welded_bodies_and_several_joints() -> None:
     tables, findings = read(CHAIN)
     assert [body["mass"] for body in tables["body"]] == [0, 3.7, 0, 0, pytest.approx(1.2, abs=1e-15)]
@@ -118,6 +119,7 @@ limited="true" stiffness="2" springref="15"/>
 <actuator><position name="p" joint="drum" kp="2"/></actuator><keyframe><key name="wound" qpos="9"/></keyframe>"""
 
 
+@pytest.mark.slow
 def test_angles_of_many_turns_are_as_mujoco_has_them() -> None:
     """A range, a spring's reference, a start and a command turns away from 0."""
     tables, findings = read(WINCH, keyframe="wound")

@@ -53,6 +53,7 @@ def test_it_swings_up_and_holds() -> None:
     assert 8.0 < 1.1 * 9.81, "the motor alone could lift it"
 
 
+@pytest.mark.slow
 def test_left_alone_it_does_not() -> None:
     """The targets are of the closed loop: a plant on which nothing acts hangs."""
     plant = heavy()
@@ -78,6 +79,7 @@ def test_other_values_of_the_plant_are_set() -> None:
     assert plant_problem(problem, 0.01).parameters["bob.mass"][0] == 3.0
 
 
+@pytest.mark.slow
 def test_a_state_by_name_is_the_state() -> None:
     """What is put in by name is what joints read, and equal states get equal commands."""
     made = controller()
@@ -132,6 +134,7 @@ def test_feedback_answers_by_the_gains() -> None:
     assert answer[0] != 0
 
 
+@pytest.mark.slow
 def test_a_solver_that_is_late_misses_ticks() -> None:
     """Latency of two and a half ticks: every third tick is asked for, none is in time, and the plan before acts."""
     loop = close_loop(changed(1.5, latency=0.05), heavy())
@@ -169,6 +172,7 @@ def test_an_interrupt_keeps_what_happened(tmp_path: Path) -> None:
     assert not record.done
 
 
+@pytest.mark.slow
 def test_the_record_is_read_as_it_was_written(tmp_path: Path) -> None:
     record, motion = write_closed_loop(swing(), tmp_path)
     again = read_closed_loop(tmp_path)

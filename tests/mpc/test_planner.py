@@ -62,6 +62,7 @@ def test_a_plan_is_a_motion_of_the_model() -> None:
     assert plan().x == pytest.approx(motion(plan().v.ravel()).x, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_slopes_and_curvature_of_costs_are_those_of_the_staged_problem() -> None:
     found = motion(plan().v.ravel())
     wanted = stages().expand(found, np.zeros(len(stages().lower)), 2 * stages().penalties)
@@ -93,6 +94,7 @@ def test_the_feedback_of_a_plan_is_that_of_the_backward_pass() -> None:
     assert held.any() and not held.all()
 
 
+@pytest.mark.slow
 def test_the_compiled_rollout_is_the_forward_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     """States, decisions and costs of all step lengths."""
     made, found = planner(), motion(plan().v.ravel())

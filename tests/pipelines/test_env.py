@@ -15,6 +15,7 @@ gymnasium: Any = pytest.importorskip("gymnasium")
 K = np.array([[-4], [-1], [2], [0.5]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["problem", "ending", "sampled"])
 def test_gymnasium_finds_no_fault(name: str, request: pytest.FixtureRequest) -> None:
     from gymnasium.utils.env_checker import check_env
@@ -56,6 +57,7 @@ def test_many_are_as_one_alone(sampled: symphys.Problem) -> None:
     assert not np.array_equal(seen[0][0], seen[0][21])  # another sample
 
 
+@pytest.mark.slow
 def test_spaces(problem: symphys.Problem) -> None:
     env = symphys.env.VectorEnv(problem, num_envs=4)
     assert env.observation_space.shape == (4, 4) and env.action_space.shape == (4, 1)

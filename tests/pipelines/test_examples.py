@@ -8,6 +8,7 @@ from importlib import import_module
 import pytest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("library", "names"),
     [("torch", ("rollout", "step")), ("jax", ("rollout", "step")), ("gymnasium", ("VectorEnv", "Env"))],

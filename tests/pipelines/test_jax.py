@@ -36,6 +36,7 @@ def test_the_rollout_has_the_gradient_of_the_kernel(problem: symphys.Problem) ->
     assert np.allclose(jax.vmap(jax.grad(rollout))(Z), rollout.compiled.gradient(Z), rtol=1e-14)
 
 
+@pytest.mark.slow
 def test_a_policy_has_the_gradient_of_the_rollout(problem: symphys.Problem) -> None:
     """Through lax.scan and jit, against the adjoint of the whole rollout."""
     step, rollout = symphys.jax.step(problem), symphys.compile(problem)
@@ -66,6 +67,7 @@ def test_the_adjoint_by_differences(problem: symphys.Problem) -> None:
     check_grads(lambda a, u: step(state, a, u), called, 1, modes=["rev"], atol=1e-5, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_quantities_over_time(problem: symphys.Problem) -> None:
     from jax.test_util import check_grads
 

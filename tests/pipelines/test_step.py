@@ -23,6 +23,7 @@ def played(step: symphys.CompiledStep, begun: Any) -> tuple[np.ndarray[Any, Any]
     return state, total
 
 
+@pytest.mark.slow
 def test_costs_add_up_to_the_objective(problem: symphys.Problem, step: symphys.CompiledStep) -> None:
     """With contact, running costs, one at an instant, one of variables, a target; a second controller acts besides."""
     assert step.actions == ("rail.command",) and step.observations == tuple(f"place[{k}]" for k in range(4))
@@ -35,6 +36,7 @@ def test_costs_add_up_to_the_objective(problem: symphys.Problem, step: symphys.C
         assert state[0, step.columns[name]] == pytest.approx(motion[name][-1], abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["auto", "casadi"])
 def test_adjoints_are_slopes(problem: symphys.Problem, backend: str) -> None:
     step, rng, h = symphys.compile_step(problem, backend=backend), np.random.default_rng(0), 1e-6
@@ -62,6 +64,7 @@ def test_both_backends_give_the_same(problem: symphys.Problem, step: symphys.Com
         assert one == pytest.approx(other, rel=1e-11, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_what_is_left_of_a_motion_that_is_over(ending: symphys.Problem) -> None:
     """The motion stands still; its costs until then, and those of the time that is left, are the objective."""
     step, rollout = symphys.compile_step(ending), symphys.compile(ending)
@@ -76,6 +79,7 @@ def test_what_is_left_of_a_motion_that_is_over(ending: symphys.Problem) -> None:
     assert np.array_equal(after[:, step.columns["cart.position"]], state[:, step.columns["cart.position"]])
 
 
+@pytest.mark.slow
 def test_samples_of_scenarios(sampled: symphys.Problem, problem: symphys.Problem) -> None:
     """The first is the problem's own; the others have masses and pushes that a seed draws, each of its own."""
     step = symphys.compile_step(sampled)
@@ -90,6 +94,7 @@ def test_samples_of_scenarios(sampled: symphys.Problem, problem: symphys.Problem
     assert np.ptp(begun.inputs[1:], axis=0).max() > 1
 
 
+@pytest.mark.slow
 def test_what_is_opened() -> None:
     bare = {key: TABLES[key] for key in ("simulation", "body", "ground", "joint")}
     motors = symphys.compile_step({**bare, "cost": TABLES["cost"][:1]}, backend="casadi")

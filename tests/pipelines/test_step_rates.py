@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 
+@pytest.mark.slow
 def test_every_way_is_measured() -> None:
     pytest.importorskip("torch")
     pytest.importorskip("gymnasium")

@@ -70,6 +70,7 @@ def test_precision_is_that_of_the_policy(step: Any) -> None:
         slope.sum().backward()
 
 
+@pytest.mark.slow
 def test_quantities_over_time(problem: symphys.Problem) -> None:
     """Those of the motion; a loss of one's own has the slope that differences have."""
     rollout = symphys.torch.rollout(problem, "ball.position", "rail.position - 0.3")

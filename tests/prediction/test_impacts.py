@@ -61,6 +61,7 @@ def problem(ringing: float = 0.0, held_back: bool = False, clock: float = 0.0) -
     return symphys.load(dropped(0.4) | {"variable": variables, "recording": recordings})
 
 
+@pytest.mark.slow
 def test_rows_have_the_time_since_the_impacts_of_the_simulation() -> None:
     found = symphys.identify(problem(), threads=1)
     assert found["bounce"].lower < 0.7 < found["bounce"].upper
@@ -96,6 +97,7 @@ def held(starts: str) -> Identification:
     return symphys.identify(problem(held_back=True), threads=1, held_back_starts=starts)
 
 
+@pytest.mark.slow
 def test_starts_of_what_is_held_back_come_from_where_the_setting_says() -> None:
     heights = {starts: held(starts).own[-1, 0] for starts in ("guess", "before impact", "whole")}
     assert heights["guess"] == pytest.approx(HEIGHTS[-1] - 0.02)

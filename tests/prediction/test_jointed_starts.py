@@ -115,6 +115,7 @@ def test_derivatives_are_those_of_differences(residuals: RecordingResiduals) -> 
         assert by_own[:, j] == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-5, abs=0.01), j
 
 
+@pytest.mark.slow
 def test_start_and_friction_are_found(problem: symphys.Problem, residuals: RecordingResiduals) -> None:
     found = symphys.identify(problem, threads=1)
     assert found.status == "converged"

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 import symphys
 
@@ -38,7 +39,7 @@ def from_height(guess: float) -> symphys.Problem:
     return symphys.load(dropped(guess) | {"variable": [height], "recording": [recording]})
 
 
-@pytest.mark.parametrize(("guess", "wrong"), [(0.2, 0.265), (1.0, 0.885)])
+@few(("guess", "wrong"), [(0.2, 0.265), (1.0, 0.885)], 1)
 def test_the_check_finds_the_drop_that_bounces_as_measured(guess: float, wrong: float) -> None:
     plain = symphys.identify(from_height(guess), threads=1)
     assert plain.status == "converged" and plain["height"].value == pytest.approx(wrong, abs=0.01)

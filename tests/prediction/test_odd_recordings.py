@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from data.recorded import BALL, HEIGHT, TABLE
+from tools.repeats import few
 
 import symphys
 from symphys.results.identification import Identification, summary
@@ -23,7 +24,7 @@ def found(table: dict[str, Any], **others: Any) -> Identification:
     return made
 
 
-@pytest.mark.parametrize(
+@few(
     "table",
     [
         {"time": [0.0, 0.1], "z": [1.0, 0.95]},
@@ -32,6 +33,7 @@ def found(table: dict[str, Any], **others: Any) -> Identification:
         {"time": [0.0, 1e-9, 2e-9], "z": [1.0, 1.0, 1.0]},
         {"time": [0.0, 1e-300], "z": [1.0, 1.0]},
     ],
+    1,
 )
 def test_two_rows_one_number_zeros_and_an_instant(table: dict[str, Any]) -> None:
     found(table)

@@ -123,6 +123,7 @@ HOLD = {"name": "hold", "drives": ["knee.command"], "senses": ["state"], "linear
 GAINS = {"name": "gains", "sets": "hold.gains", "guess": [-0.2, -0.05]}
 
 
+@pytest.mark.slow
 @few(
     "others",
     [
@@ -147,6 +148,7 @@ def test_commands_are_added_to_other_inputs(others: dict[str, Any]) -> None:
     assert not others or np.abs(next(predictor.values(shared, own, [0])).values - plain.values).max() > 0.01
 
 
+@pytest.mark.slow
 def test_units_of_a_motors_numbers() -> None:
     """The gain of an affine motor is force by command, whose unit is anything."""
     assert residuals_of(recorded_arm("constant"), 1).shared.units == ("", "s", "N m s/rad", "N m", "kg m^2")

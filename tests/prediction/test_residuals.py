@@ -81,6 +81,7 @@ def moved(residuals: RecordingResiduals) -> tuple[np.ndarray, np.ndarray]:
     return found, own.guess + 0.02 * own.scale * rng.normal(size=own.guess.shape)
 
 
+@pytest.mark.slow
 def test_missing_samples_are_left_out_and_orientations_have_three_residuals(residuals: RecordingResiduals) -> None:
     rows = residuals.rows(0)
     assert len(rows.time) == 15 * 6 - 1 - 3
@@ -95,6 +96,7 @@ def test_missing_samples_are_left_out_and_orientations_have_three_residuals(resi
     assert np.abs(again[flight]).max() < 0.02, "the simulation that was recorded"
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_differences(residuals: RecordingResiduals) -> None:
     shared, own = moved(residuals)
     which, h = np.array([0, 1]), 1e-5
@@ -115,6 +117,7 @@ def test_derivatives_are_those_of_differences(residuals: RecordingResiduals) -> 
             assert by_own[:, j] == pytest.approx(expected, rel=1e-5, abs=0.01), j
 
 
+@pytest.mark.slow
 def test_noise_that_is_not_given_begins_as_a_share_of_the_spread() -> None:
     problem = problem_of_tables(recorded(noise=None))
     found = residuals_of(problem, threads=1)

@@ -62,6 +62,7 @@ def tosses(tmp_path_factory: pytest.TempPathFactory) -> Tosses:
     return Tosses(empty.start, dict(empty.columns) | columns)
 
 
+@pytest.mark.slow
 def test_the_numbers_of_the_truth_leave_no_error(tosses: Tosses, tmp_path: Path) -> None:
     made = Simulator(CUBE, tosses, CUBE_NUMBERS, tmp_path / "tosses.npz", tosses.first())
     assert made.errors(TRUE).max() < 1e-4

@@ -68,6 +68,7 @@ def test_name_with_a_null_byte(tmp_path: Path) -> None:
     assert "no such file" in message(tmp_path / "a\x00b") or "no valid path" in message(tmp_path / "a\x00b")
 
 
+@pytest.mark.slow
 def test_many_tables_are_refused(tmp_path: Path, valid: str) -> None:
     body = '[[body]]\nname = "b{}"\nmass = 1\nshape = {{ sphere = {{ radius = 1 }} }}\n'
     path = tmp_path / "crowd.toml"

@@ -83,6 +83,7 @@ def test_steps_and_knots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     assert load(tmp_path, BALL + PUSH.replace("100", "50"), simulation__dt=0.02).simulation.steps == 50
 
 
+@pytest.mark.slow
 def test_the_estimate_of_what_a_variable_takes_is_of_the_right_order(tmp_path: Path) -> None:
     """Against what numpy and Python take while a file is read; casadi's share is not seen by it."""
     text = BALL + NET.replace("WIDTH", "400") + WEIGHTS

@@ -76,6 +76,7 @@ def test_what_may_not_meet_does_not_count(load: Load) -> None:
     assert len(load(text=BASE + crowd(40, 'collides_with = ["ground"]')).world().pairs) == 40 * DOWN
 
 
+@pytest.mark.slow
 def test_the_most_that_is_allowed(load: Load, refused: Refused) -> None:
     assert MOST_POINTS == 2000
     text = BASE + crowd(2000 // DOWN, 'collides_with = ["ground"]')

@@ -152,6 +152,7 @@ def test_a_valid_file_with_any_value_anywhere(path: Path, valid: str, data: st.D
     load(path, "\n".join(f"{key} = {write(value)}" for key, value in document.items()))
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
 def test_a_valid_robot_with_any_value_anywhere(path: Path, data: st.DataObject) -> None:
@@ -170,6 +171,7 @@ def test_a_valid_robot_with_any_value_anywhere(path: Path, data: st.DataObject) 
         load_problem(path.parent / "main.toml", changed).world()
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(data=st.data())
 def test_a_valid_file_with_text_spliced_in(path: Path, valid: str, data: st.DataObject) -> None:

@@ -40,6 +40,7 @@ def alone(tmp_path: Path, text: str, **settings: object) -> Problem:
     return robot_alone(path, settings)
 
 
+@pytest.mark.slow
 def test_it_begins_just_above_a_ground_and_holds_its_pose(tmp_path: Path) -> None:
     """The leg, lifted to the side, is the lowest: 0.05 m below its centre."""
     problem = alone(tmp_path, ROBOT)
@@ -87,6 +88,7 @@ def test_faults_name_the_robot_file(tmp_path: Path) -> None:
         alone(tmp_path, ROBOT.replace("mass = 2.0", "mass = -2.0"))
 
 
+@pytest.mark.slow
 def test_show_draws_a_path(tmp_path: Path) -> None:
     path = tmp_path / "leg.toml"
     path.write_text(ROBOT, encoding="utf-8")

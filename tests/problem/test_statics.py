@@ -146,6 +146,7 @@ def test_surfaces_that_touch_in_several_points(load: Load) -> None:
     assert len(set(names)) == len(names)
 
 
+@pytest.mark.slow
 def test_all_points_of_a_pair_have_one_law(load: Load) -> None:
     box = BASE.replace("sphere = { radius = 0.1 }", "box = { size = [1, 1, 1] }") + GRID
     table = '[[pair]]\nbetween = ["ball", "dunes"]\nfriction = 0.25\n'

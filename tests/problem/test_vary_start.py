@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tools.repeats import few
 from worlds import joint_texts
 from worlds.joint_texts import SLIDER, UNIVERSAL, joint
 
@@ -67,7 +68,7 @@ def test_as_a_file_that_states_them(load: Load, held: bool) -> None:
         assert np.array(found[name]).ravel() == pytest.approx(value, abs=1e-13)
 
 
-@pytest.mark.parametrize("held", [False, True])
+@few("held", [False, True], 1)
 def test_joints_read_what_was_set(load: Load, held: bool) -> None:
     """Coordinates are those that were set; rates come on top of what bodies' velocities give; nothing comes apart."""
     made = transcribe(load(text=robot("", "start = 0.9", "start = [0.1, 0.2]", held) + VARIED), backend="casadi")

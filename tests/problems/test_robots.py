@@ -214,6 +214,7 @@ STANDING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STANDING)
 def test_they_stand_still_where_they_start(robot: Robot, simulated: Simulated, name: str) -> None:
     """Told to keep the angles of the start; they creep by some mm/s, as sweeps have not converged."""
@@ -225,6 +226,7 @@ def test_they_stand_still_where_they_start(robot: Robot, simulated: Simulated, n
     assert np.abs(last[layout[f"{body}.velocity"]]).max() < 0.02
 
 
+@pytest.mark.slow
 def test_the_hopper_stands_on_its_spring_in_its_plane(robot: Robot, simulated: Simulated) -> None:
     """It swings by little about where the spring bears 5.6 kg, and stays in the plane y = 0."""
     layout = Layout(robot("hopper").world())

@@ -35,6 +35,7 @@ def test_the_formula_of_the_hook() -> None:
     np.testing.assert_allclose(velocity, (5 * z[:2] + 2 * surface) / 7)
 
 
+@pytest.mark.slow
 def test_a_crate_is_knocked_and_slides_as_the_formulas_say() -> None:
     """The crate stands on the floor all the time, and the floor has one step of 10 ms at most to brake the impact."""
     kick = np.array(slides.KICK)
@@ -51,6 +52,7 @@ def test_a_crate_is_knocked_and_slides_as_the_formulas_say() -> None:
     assert 2 * np.arctan2(q[3], q[0]) == pytest.approx(angle, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_plate_goes_as_far_and_turns_as_far_as_the_formulas() -> None:
     """v^2 = 2 mu g s, and four corners at the same distance d brake with mu g d / I, however they share the weight."""
     made, speed = shipped("parcel", "casadi"), np.sqrt(2 * FLOOR * GRAVITY * 2)
@@ -62,6 +64,7 @@ def test_a_plate_goes_as_far_and_turns_as_far_as_the_formulas() -> None:
     assert angle == pytest.approx(25 / (2 * brake), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_the_ground_stops_the_pushed_box_as_coulomb_says() -> None:
     """From 1 m/s it slides by v^2 / (2 mu g) without a turn."""
     sliding = load_problem(find("push_box")).set({"body.box.velocity": [1, 0, 0], "body.feet.velocity": [1, 0, 0]})
@@ -71,6 +74,7 @@ def test_the_ground_stops_the_pushed_box_as_coulomb_says() -> None:
     assert np.abs(motion["box.position"][:, 1]).max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "slips"), [(0.9, False), (1.2, True)])
 def test_friction_limits_the_acceleration_of_a_glass_on_a_tray(share: float, slips: bool) -> None:
     motion = shipped("fast_tray", "casadi").simulate(np.array([1.0, *np.full(16, share * 0.3 * GRAVITY * 1.3)]))
@@ -84,6 +88,7 @@ LIMIT, CART, BOX = 0.2 * GRAVITY, 2.0, 1.0
 """[m/s^2] The largest acceleration that friction gives to the transported box; masses [kg]."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.95, 1.3])
 def test_friction_carries_the_box_with_mu_g_at_most(share: float) -> None:
     """Below the limit both move as one; above it the box has the limit, and the cart what is left of the push."""
@@ -111,6 +116,7 @@ def test_the_fastest_move_without_a_slip(share: float) -> None:
         assert np.abs(slid).max() > 0.01
 
 
+@pytest.mark.slow
 def test_the_guess_meets_the_puck_in_its_middle() -> None:
     made = shipped("air_hockey", "casadi")
     motion = made.simulate(made.shooting.start(0))

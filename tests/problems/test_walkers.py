@@ -47,6 +47,7 @@ def test_the_mini_cheetah_is_as_published() -> None:
     assert len(problem.world().pairs) == 4
 
 
+@pytest.mark.slow
 def test_the_guess_of_the_mini_cheetah_stands_by_statics() -> None:
     """Feet bear the weight; and as the hips rise by dh over feet that stay, motors do the work that the weight takes.
 
@@ -67,6 +68,7 @@ def test_the_guess_of_the_mini_cheetah_stands_by_statics() -> None:
     assert motion["body.orientation"][-1] == pytest.approx([1, 0, 0, 0], abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_short_descent_lowers_the_cost_of_the_mini_cheetah() -> None:
     before, after = short_descent("mini_cheetah_ahead", 4)
     assert after < before - 0.02
@@ -87,6 +89,7 @@ def trot(dt: float) -> Transcription:
     return transcribe(load_problem(find("gait_robot_trot"), {"simulation.dt": dt}), backend="casadi")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [0.01, thorough(0.005)])
 def test_the_gait_robot_trots_as_published(dt: float) -> None:
     """0.7 m/s; 80 N m is what the published engine's 4 N m come to in 20 iterations."""

@@ -71,6 +71,7 @@ def test_page_needs_nothing_else_and_is_the_same_again(page: tuple[Path, str]) -
     assert stems == {f"{p}-{f}" for p in ("ball_throw", "two_balls") for f in ("convergence", "checks", "motion")}
 
 
+@pytest.mark.slow
 def test_links_go_to_pages_that_exist(batch: Path) -> None:
     assert 'href="./' not in read(batch)
     for folder in run_folders(batch):
@@ -80,6 +81,7 @@ def test_links_go_to_pages_that_exist(batch: Path) -> None:
     assert all((batch / link).is_file() for link in links)
 
 
+@pytest.mark.slow
 def test_batch_of_one_run_folder(run_dir: Path) -> None:
     write_run_report(run_dir)
     text = read(run_dir)
@@ -87,6 +89,7 @@ def test_batch_of_one_run_folder(run_dir: Path) -> None:
     assert 'href="./report.html"' in text
 
 
+@pytest.mark.slow
 def test_same_problem_in_two_places_is_not_mixed(batch: Path, tmp_path: Path) -> None:
     for name in ("a", "b"):
         shutil.copytree(batch / "two_balls", tmp_path / "both" / name / "two_balls")
@@ -98,6 +101,7 @@ def test_same_problem_in_two_places_is_not_mixed(batch: Path, tmp_path: Path) ->
     }
 
 
+@pytest.mark.slow
 def test_names_cannot_lead_out_of_the_folder(batch: Path, edit: Callable[..., None]) -> None:
     for folder in run_folders(batch / "two_balls"):
         if "cma" not in folder.name:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
+from tools.repeats import few
 
 from symphys.report.figures import style
 from symphys.report.pages.motion import draw
@@ -74,7 +74,7 @@ MOTIONS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
-@pytest.mark.parametrize("name", MOTIONS)
+@few("name", MOTIONS, 4)
 def test_whatever_its_extent_a_motion_is_drawn(tmp_path: Path, name: str) -> None:
     moved, seen = MOTIONS[name]
     trajectory, world = motion(**moved), scene(tmp_path, **seen)

@@ -76,6 +76,7 @@ def test_every_figure_has_both_files_and_links(pages: Path) -> None:
     assert linked == found
 
 
+@pytest.mark.slow
 def test_states_are_those_of_the_trajectory(pages: Path) -> None:
     """To the last digit."""
     run = pages / "ball_throw" / "gradient-seed0"

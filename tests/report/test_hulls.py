@@ -135,6 +135,7 @@ def test_outline_of_a_cylinder_touches_its_supporting_lines(radius: float) -> No
         assert (edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]).min() > -1e-12, "it is convex"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", [lambda points: outline(points, 0.0), pytest.param(of_script, marks=NODE)])
 def test_rounding_does_not_change_an_outline(by: Callable[[Array], Array]) -> None:
     """Seen along an axis, many corners lie behind each other and on the sides of the outline, nearly."""

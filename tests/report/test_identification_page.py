@@ -60,6 +60,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_it_says_what_was_found(folder: Path) -> None:
     found, page = read_identification(folder), text_of(folder / "report.html")
     each = found["bounce"]
@@ -104,6 +105,7 @@ def test_the_measured_body_is_seen_through(folder: Path) -> None:
     assert [body["ghost"] for body in data["bodies"]] == [False, True]
 
 
+@pytest.mark.slow
 def test_what_is_not_determined_is_named(tmp_path: Path) -> None:
     time = np.arange(0, 0.42, 0.02)
     rows = [[0.5 * t, 0.0, 1 - 4.905 * t * t] for t in time]

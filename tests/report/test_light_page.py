@@ -50,6 +50,7 @@ def shown(made: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, s
     return folder, read(folder)
 
 
+@pytest.mark.slow
 def test_words_and_tables_are_those_of_the_full_page(shown: tuple[Path, str], run_dir: Path) -> None:
     full = write_run_report(run_dir).read_text(encoding="utf-8")
     assert len(tables(full)) > 5

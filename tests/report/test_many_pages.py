@@ -52,6 +52,7 @@ def two_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "WORTH", {False: 1, True: 1})
 
 
+@pytest.mark.slow
 def test_a_page_that_cannot_be_made_is_named_and_the_others_are_made(runs: list[Path]) -> None:
     blocked = block(runs[2])
     made = make_pages(wanted_below(runs[0].parents[1]), "light")
@@ -69,6 +70,7 @@ def test_a_page_that_cannot_be_made_is_named_and_the_others_are_made(runs: list[
     assert mended.runs == (blocked,) and "could not be made" not in mended.page.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_motion_that_cannot_be_drawn_ends_no_page_of_others(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,6 +117,7 @@ def test_any_error_is_a_fault_with_its_kind(runs: list[Path], monkeypatch: pytes
     assert len(made.runs) == 5
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("two_workers")
 def test_workers_change_no_byte_and_name_what_fails(runs: list[Path]) -> None:
     for folder in runs:
@@ -131,6 +134,7 @@ def test_workers_change_no_byte_and_name_what_fails(runs: list[Path]) -> None:
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_fails_its_page_only(runs: list[Path]) -> None:
     """Killed after its first page, it cannot make the second; who takes its place makes the rest."""
     found: dict[Path, PageFault | None] = {}
@@ -149,6 +153,7 @@ def test_a_worker_that_dies_fails_its_page_only(runs: list[Path]) -> None:
     assert all(is_whole(folder / PAGE) for folder in runs if folder not in faults)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [0, 1])
 def test_an_interruption_leaves_whole_pages_only(runs: list[Path], workers: int) -> None:
     def interrupt(folder: Path, fault: PageFault | None) -> None:
@@ -191,6 +196,7 @@ def test_only_what_is_new(runs: list[Path], tmp_path: Path) -> None:
         wanted_below(tmp_path / "nothing")
 
 
+@pytest.mark.slow
 def test_a_page_that_is_kept_is_the_page_that_would_be_made(runs: list[Path]) -> None:
     """Of a batch that was made a second time no byte has changed, and nothing was written."""
     root = runs[0].parents[1]
@@ -250,6 +256,7 @@ def test_other_code_makes_pages_again(runs: list[Path], monkeypatch: pytest.Monk
     assert outdated(runs[0])
 
 
+@pytest.mark.slow
 def test_what_draws_is_known_to_stamps() -> None:
     """All modules of the package that reporting loads are among those whose change makes pages again."""
     code = "import sys, symphys.report; print(*(name for name in sys.modules if name.startswith('symphys.')))"

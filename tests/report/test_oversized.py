@@ -100,6 +100,7 @@ def test_the_batch_and_the_other_pages_are_those_without_it_but_for_a_note(
     assert write_run_report(other).read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_batch_of_nothing_else(batch: Path) -> None:
     for folder in (batch / "ball_throw").iterdir():
         if (folder / "trajectory.npz").exists():
@@ -108,6 +109,7 @@ def test_a_batch_of_nothing_else(batch: Path) -> None:
     assert OVERSIZED in text and "There is no motion to draw: trajectory.npz: position has numbers up to" in text
 
 
+@pytest.mark.slow
 def test_what_is_large_but_not_beyond_is_drawn(run_dir: Path) -> None:
     """No warning of an overflow either, which would be an error here."""
     enlarge(run_dir, 1e-3 * LARGEST)

@@ -209,6 +209,7 @@ def test_script_plays_a_robot_to_the_end(load: Load, speed: float) -> None:
     plays_to_the_end(data_of(load, motion(speed)))
 
 
+@pytest.mark.slow
 @NODE
 def test_script_and_figures_have_the_same_pivots(load: Load) -> None:
     trajectory, scene = load(turned_leg())

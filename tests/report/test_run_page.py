@@ -73,6 +73,7 @@ def shown(made: Path, tmp_path_factory: pytest.TempPathFactory) -> Shown:
     return Shown(folder, read(folder))
 
 
+@pytest.mark.slow
 def test_page_tells_names_status_and_numbers(shown: Shown) -> None:
     page, run_dir = Page(shown.text), shown.folder
     found = json.loads((run_dir / "result.json").read_text())
@@ -137,6 +138,7 @@ def test_what_is_told_is_shown_and_drawn(run_dir: Path, edit: Callable[..., None
     assert "Speed [m/s]" in after and "Speed [m/s]" not in before
 
 
+@pytest.mark.slow
 def test_remade_page_is_the_same(shown: Shown) -> None:
     first, run_dir = shown.text, shown.folder
     figures = {path.name: path.read_bytes() for path in (run_dir / "figures").iterdir()}
@@ -149,6 +151,7 @@ def test_page_is_light(shown: Shown) -> None:
     assert len(shown.text) < LARGEST
 
 
+@pytest.mark.slow
 def test_text_from_files_is_escaped(run_dir: Path, edit: Callable[..., None]) -> None:
     evil = "<script>alert(1)</script><img src=x onerror=alert(2)> & \"'"
     found = json.loads((run_dir / "result.json").read_text())
@@ -273,6 +276,7 @@ def test_components_are_named_as_in_the_problem_file(run_dir: Path, edit: Callab
     assert "throw y a.velocity[1:] and b.velocity[1:], to the same values" in text
 
 
+@pytest.mark.slow
 def test_energy_is_drawn_where_it_was_recorded(run_dir: Path, edit: Callable[..., None]) -> None:
     times = [0.0, 1.0, 2.0]
     energy = dict.fromkeys(("time", "kinetic", "potential", "applied", "contact"), times)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from data.yard import area, prism
 from tools.page_scripts import NODE, run_script
+from tools.repeats import few
 
 from symphys.report.scene.animation import solid_data
 from symphys.report.scene.outlines import outline
@@ -21,7 +22,7 @@ EYE = "camera(-2, 0.4)"
 SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
-@pytest.mark.parametrize("radius", [0.0, 0.3])
+@few("radius", [0.0, 0.3], 1)
 def test_script_and_figures_have_the_same_outline(radius: float) -> None:
     axes = np.random.default_rng(1).standard_normal((3, 2))
     for points in (SIGNS @ axes, prism(24) @ axes, prism(24)[:, :2], prism(24)[:, 1:], SIGNS[:1, :2], SIGNS[:2, 1:]):
@@ -57,6 +58,7 @@ def test_what_is_beside_each_other_does_not_overlap() -> None:
     assert run_script(f"overlap({ramp}, {near}, {EYE})") is True
 
 
+@pytest.mark.slow
 def test_terrain_between_its_heights() -> None:
     hills = "{ x: [0, 1, 2], y: [0, 2], z: [0, 1, 1, 0, 1, null] }"
     assert run_script(f"heightAt({hills}, 0.25, 1)") == pytest.approx(0.25)

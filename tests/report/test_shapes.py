@@ -113,6 +113,7 @@ def test_window_takes_in_what_stands_close_by(motion: Trajectory, scene: Scene) 
     assert beside.high[0] == alone.high[0]
 
 
+@pytest.mark.slow
 def test_everything_is_drawn(motion: Trajectory, scene: Scene) -> None:
     with style.paper():
         side, top = draw_motion(motion, scene).axes
@@ -131,6 +132,7 @@ def test_level_terrain_has_no_lines_of_height(motion: Trajectory, scene: Scene) 
         assert draw_motion(motion, flat).axes[1].get_title(loc="left") == "Top view"
 
 
+@pytest.mark.slow
 def test_page_of_shapes_is_written(yard: Path, tmp_path: Path) -> None:
     text = write_motion(yard / "trajectory.npz", yard / "scene.json", tmp_path / "motion.html").read_text()
     assert "spokes and edges turn with it" in text
@@ -160,6 +162,7 @@ def test_normals_that_shapes_tell(motion: Trajectory, scene: Scene) -> None:
     }
 
 
+@pytest.mark.slow
 def test_pairs_are_counted_by_surfaces(run_dir: Path, edit: Callable[..., None]) -> None:
     with np.load(run_dir / "trajectory.npz") as archive:
         arrays = dict(archive)

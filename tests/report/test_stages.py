@@ -80,6 +80,7 @@ def test_one_stage_with_smoothing_is_told_too(staged: Path, edit: Edit) -> None:
     assert "Stages of smoothing" in text_of(write_run_report(staged))
 
 
+@pytest.mark.slow
 def test_an_earlier_stage_that_did_better_is_named(staged: Path, edit: Edit) -> None:
     assert "does better" not in text_of(write_run_report(staged))
     better = [STAGES[0], stage(0.01, 1e-5, 1e-5, True), STAGES[2]]

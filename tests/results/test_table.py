@@ -175,6 +175,7 @@ def mutated(value: Any, random: Random) -> Any:
     return found
 
 
+@pytest.mark.slow
 def test_what_is_odd_in_a_journal_is_read_from_the_folders(tmp_path: Path) -> None:
     """Lines with a right checksum and other content: a column is right by its type, or all is as the folder says."""
     folder = record(tmp_path, ground__friction=0.6, text__kind="inf")

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys import files, solvers
 from symphys.problem import load_problem
@@ -41,6 +42,7 @@ def interrupt_at(iteration: int) -> Callable[[TraceRow], None]:
     return monitor
 
 
+@pytest.mark.slow
 def test_a_run_leaves_every_file(make_job: MakeJob) -> None:
     job = make_job(examine=True)
     result = run(job)
@@ -59,6 +61,7 @@ def test_a_run_leaves_every_file(make_job: MakeJob) -> None:
     assert (job.folder.path / "problem.toml").read_text(encoding="utf-8") == job.problem.text
 
 
+@pytest.mark.slow
 def test_what_a_problem_tells_is_in_the_result_and_along_the_trace(problem_file: Path, tmp_path: Path) -> None:
     """Of the guess, of the best point so far, and of what was found."""
     output = '[[output]]\nname = "ahead"\nvalue = "ball.position[0]"\nunit = "m"\n'
@@ -82,6 +85,7 @@ def test_a_run_need_not_be_examined(make_job: MakeJob) -> None:
     assert not {"gradient", "refined", "growth"} & result.trust.keys()
 
 
+@pytest.mark.slow
 def test_what_is_met_by_a_motion_that_cannot_be_is_not_solved(problem_file: Path, tmp_path: Path) -> None:
     """What is varied is where the ball begins, and that is with its centre in the ground; examined or not."""
     text = problem_file.read_text(encoding="utf-8").replace('sets = "ball.velocity"', 'sets = "ball.position"')
@@ -96,9 +100,7 @@ def test_what_is_met_by_a_motion_that_cannot_be_is_not_solved(problem_file: Path
         assert standing(job).result == result
 
 
-@pytest.mark.parametrize(
-    ("status", "verdict"), [("budget", "best_found"), ("stalled", "best_found"), ("met", "solved")]
-)
+@few(("status", "verdict"), [("budget", "best_found"), ("stalled", "best_found"), ("met", "solved")], 1)
 def test_with_nothing_to_meet_only_a_stationary_point_is_solved(
     problem_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: str, verdict: str
 ) -> None:
@@ -224,6 +226,7 @@ def throw(problem_file: Path, out: Path, **options: object) -> Job:
     return make_jobs([load_problem(problem_file, settings)], ["gradient"], [0], settings, out)[0]
 
 
+@pytest.mark.slow
 def test_a_run_whose_time_is_up_is_over(problem_file: Path, tmp_path: Path) -> None:
     """As one whose iterations are used up: it is not done again, and one with more time begins afresh."""
     job = throw(problem_file, tmp_path / "out", max_seconds=1e-9)
@@ -236,6 +239,7 @@ def test_a_run_whose_time_is_up_is_over(problem_file: Path, tmp_path: Path) -> N
     assert run(throw(problem_file, tmp_path / "out", max_seconds=1e6)).solved
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_with_a_time_goes_on(problem_file: Path, tmp_path: Path) -> None:
     job = throw(problem_file, tmp_path / "out", max_seconds=1e6)
     stopped = run(job, interrupt_at(1))
@@ -283,7 +287,7 @@ def test_a_folder_in_use_is_left_alone(make_job: MakeJob) -> None:
     assert run(job).solved
 
 
-@pytest.mark.parametrize("name", ["result.json", "config.json", "checkpoint.json"])
+@few("name", ["result.json", "config.json", "checkpoint.json"], 1)
 def test_damaged_files_mean_a_fresh_start(make_job: MakeJob, name: str) -> None:
     job = make_job(iterations=4)
     run(job, interrupt_at(1))

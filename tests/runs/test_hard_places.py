@@ -105,6 +105,7 @@ def test_without_room_for_a_kernel_casadi_evaluates_and_the_note_says_where(
     assert found.note.endswith("make room there, or set TMPDIR to another folder")
 
 
+@pytest.mark.slow
 def test_without_room_for_its_copy_ipopt_does_without_the_kernel(
     problem_file: Path, compiler: None, monkeypatch: Patch
 ) -> None:
@@ -209,6 +210,7 @@ def test_a_kernel_that_a_real_full_disk_does_not_keep_is_used(disk: SmallDisk, c
     assert compile_program(programs.pendulum(), cache=own, threads=1).report.note == ""
 
 
+@pytest.mark.slow
 def test_a_cache_on_a_disk_that_can_only_be_read_is_used(
     disk: SmallDisk, compiler: None, monkeypatch: Patch, capsys: Capture
 ) -> None:

@@ -85,6 +85,7 @@ def test_without_a_compiler_samples_are_refused_before_anything_is_built(varied:
     assert read_result(job.folder.path / "result.json") == result
 
 
+@pytest.mark.slow
 def test_the_same_command_does_it_where_there_is_one(
     varied: Path, tmp_path: Path, compiler: None, recorder: Any
 ) -> None:
@@ -172,6 +173,7 @@ def test_a_device_that_fails_in_the_middle_is_tried_again(
     assert run(job).solved
 
 
+@pytest.mark.slow
 def test_the_others_are_solved(
     varied: Path, problem_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: Patch
 ) -> None:

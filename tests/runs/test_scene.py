@@ -114,6 +114,7 @@ def problem_of(folder: Path, text: str) -> Problem:
     return load_problem(path)
 
 
+@pytest.mark.slow
 def test_shapes_have_the_sizes_that_variables_set(tmp_path: Path) -> None:
     found = make_scene(problem_of(tmp_path, SHAPES), Z).to_json()
     tower, bar = found["bodies"]
@@ -169,6 +170,7 @@ def test_round_edges_centres_of_mass_and_tilt_are_drawn(tmp_path: Path) -> None:
     assert (again.radius, again.corners.tolist()) == (solid.radius, solid.corners.tolist())
 
 
+@pytest.mark.slow
 def test_terrain_is_sampled_around_the_start(tmp_path: Path) -> None:
     (hills,) = make_scene(problem_of(tmp_path, SHAPES), Z).to_json()["terrain"]
     x, y, z = (np.array(hills[key]) for key in "xyz")

@@ -74,6 +74,7 @@ def test_each_stage_is_judged_exactly(whole: tuple[Job, Result], tmp_path: Path)
     assert last.objective == pytest.approx(last.exact_objective, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_work_of_the_stages_is_that_of_the_run(whole: tuple[Job, Result]) -> None:
     result = whole[1]
     for kind, count in result.counts.items():
@@ -97,6 +98,7 @@ def test_files_tell_of_the_stages(whole: tuple[Job, Result]) -> None:
     assert "stage 2 of 3: smoothing 0.01" in log
 
 
+@pytest.mark.slow
 @few("smoothing", SMOOTHINGS, 1)
 def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(
     whole: tuple[Job, Result], tmp_path: Path, smoothing: float
@@ -115,6 +117,7 @@ def test_interrupted_in_any_stage_it_goes_on_to_the_same_end(
     assert without_times(rest) == without_times(end)
 
 
+@pytest.mark.slow
 @first("seeds", [2, 3])
 def test_side_by_side(tmp_path: Path, recorder: Any, seeds: int) -> None:
     alone = run_batch(job(tmp_path / "a", seeds=seeds), 1, recorder, once)

@@ -51,6 +51,7 @@ def test_descent(backend: str, distance: float) -> None:
     assert found.counts.gradients <= FEWEST_GRADIENTS
 
 
+@pytest.mark.slow
 @every_throw
 def test_least_squares(backend: str, distance: float) -> None:
     found = solve("least_squares", throw(distance, backend))
@@ -65,7 +66,7 @@ def test_ipopt(backend: str, distance: float, hessian: str) -> None:
     assert solve("ipopt", throw(distance, backend), options={"hessian": hessian}).status is Status.MET
 
 
-@pytest.mark.parametrize("backend", ["casadi", "c", "simd"])
+@few("backend", ["casadi", "c", "simd"], 1)
 @seeds(3)
 def test_cma(backend: str, seed: int) -> None:
     assert solve("cma", throw(10.0, backend), seed=seed).status is Status.MET

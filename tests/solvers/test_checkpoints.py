@@ -47,8 +47,8 @@ def test_the_same_to_the_last_bit(name: str, options: dict[str, Any], problem: A
         same(rest, whole)
 
 
-@pytest.mark.parametrize("name", ["gradient", "least_squares", "cma"])
-@pytest.mark.parametrize("evaluation", [1, 2, 5, 8])
+@few("name", ["gradient", "least_squares", "cma"], 7)
+@few("evaluation", [1, 2, 5, 8], 7)
 def test_interrupted_in_the_middle_of_an_evaluation(name: str, evaluation: int) -> None:
     problem = rosenbrock()
     kind = {"gradient": "value", "least_squares": "residuals", "cma": "value"}[name]

@@ -26,6 +26,7 @@ def solve(problem: ShootingProblem, start: Any = None, **more: Any) -> Outcome:
     return method.solve(problem, point, method.Options(**more), **calls)
 
 
+@pytest.mark.slow
 def test_the_acrobot_swings_up_from_rest() -> None:
     """From hanging, without a guess, and from every seed to the same swing."""
     problem = boxed(acrobot())
@@ -44,6 +45,7 @@ def test_a_body_turns_by_180_degrees() -> None:
     assert found.trace[-1].best == pytest.approx(22.467749, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_static_entries_are_found_with_the_controls() -> None:
     scaled = solve(boxed(attitude(parameter=True), statics=[1.2]))
     assert scaled.trace[-1].best == pytest.approx(14.742314, abs=1e-4)
@@ -64,6 +66,7 @@ def test_limits_of_controls_and_of_the_path() -> None:
     assert found.trace[-1].max_violation < 1
 
 
+@pytest.mark.slow
 @few("stop", [0, 4], 1)
 def test_what_was_interrupted_comes_to_the_same_answer(stop: int) -> None:
     problem = boxed(pendulum(), 9.0)

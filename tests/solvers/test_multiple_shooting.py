@@ -33,6 +33,7 @@ def test_acrobot_swings_up_from_a_straight_line(backend: str, hessian: str, ever
     assert last == pytest.approx([np.pi, 0, 0, 0], abs=0.5)
 
 
+@pytest.mark.slow
 @every_backend
 def test_angles_that_are_known_but_for_whole_turns(backend: str) -> None:
     """Nodes turn by more than half a turn from their references, and the defects do not jump there."""
@@ -72,6 +73,7 @@ def test_a_free_parameter_of_all_steps(backend: str) -> None:
     assert found.z[-1] < 1.2
 
 
+@pytest.mark.slow
 @every_way
 def test_a_free_initial_speed(backend: str, hessian: str) -> None:
     """A torque too weak to lift the pendulum: it is thrown."""
@@ -110,6 +112,7 @@ def test_what_was_interrupted_comes_to_the_same_answer(backend: str, stop: int) 
     assert repr(rest.trace[: stop + 1]) == repr(part.trace)
 
 
+@pytest.mark.slow
 def test_multipliers_of_a_checkpoint_shorten_the_rest() -> None:
     """Interrupted near the end it goes on near the end."""
     problem = boxed(pendulum(fast=4.0), 8.0)
@@ -121,6 +124,7 @@ def test_multipliers_of_a_checkpoint_shorten_the_rest() -> None:
     assert len(rest.trace) < len(whole.trace) + 8
 
 
+@pytest.mark.slow
 @every_backend
 @few("first", ["ipopt", "fatrop"], 1)
 def test_multipliers_of_a_solution_shorten_a_solve_from_there(first: str, backend: str) -> None:
@@ -155,6 +159,7 @@ def test_multipliers_are_those_of_the_program() -> None:
     assert np.abs(known.bounds).max() > 0.05 and np.abs(known.bounds[np.abs(w) < 7]).max(initial=0.0) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_motion_on_another_grid_is_a_guess() -> None:
     """Twice as many steps, from the nodes and controls of few: fewer iterations than from the line."""
     coarse, fine = acrobot(20, 0.1), boxed(acrobot())
@@ -187,6 +192,7 @@ def test_it_is_silent_and_counts(backend: str, capfd: pytest.CaptureFixture[str]
     assert all(DEFECT in row.outputs for row in found.trace)
 
 
+@pytest.mark.slow
 @every_backend
 def test_it_stops_where_all_is_met(backend: str) -> None:
     """At the first iterate whose rollout meets the end, if the problem asks for no more."""

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from data.shipped import seeds
+from tools.repeats import few
 from worlds.toys import PLAIN, Counted, constrained, rosenbrock, solve, target, toy
 from worlds.windy import BEST, Winds, windy
 
@@ -136,8 +137,8 @@ def lost(found: Outcome, problem: ShootingProblem, name: str, seen: list[Seen]) 
     return [each for each in seen if each.rank(problem, name) < min(ranks)]
 
 
-@pytest.mark.parametrize("name", PLAIN)
-@pytest.mark.parametrize("kind", PROBLEMS)
+@few("name", PLAIN, 12)
+@few("kind", PROBLEMS, 12)
 @seeds(4)
 def test_the_result_is_the_best_of_what_was_evaluated(name: str, kind: str, seed: int) -> None:
     problem, evaluator = recorded(PROBLEMS[kind]())
@@ -147,6 +148,7 @@ def test_the_result_is_the_best_of_what_was_evaluated(name: str, kind: str, seed
         assert not lost(found, problem, name, evaluator.seen)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLAIN)
 @seeds(4)
 def test_so_it_is_where_evaluations_are_noisy(name: str, seed: int) -> None:
@@ -231,8 +233,8 @@ def sampled(name: str, winds: Watched, smoothings: tuple[float, ...] = (0.0,), s
     return SOLVERS[name].solve(problem, BEST + 2.5, SOLVERS[name].Options(**options), seed)
 
 
-@pytest.mark.parametrize("name", SAMPLED)
-@pytest.mark.parametrize("kind", HILLS)
+@few("name", SAMPLED, 5)
+@few("kind", HILLS, 5)
 def test_where_samples_differ_the_guess_is_validated_too(name: str, kind: str) -> None:
     for seed in range(3):
         winds = Watched(*HILLS[kind])

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.toys import (
     PENALTY,
     PLAIN,
@@ -211,7 +212,7 @@ def test_cma_leaves_the_global_random_stream_alone() -> None:
 
 
 @every_way
-@pytest.mark.parametrize("backend", ["c", "simd"])
+@few("backend", ["c", "simd"], 2)
 def test_compiled_toys(backend: str, name: str, options: dict[str, Any]) -> None:
     require(backend)
     assert solve(name, quadratic(backend=backend), options=options).z == pytest.approx([1, 2, 3], abs=1e-3)
@@ -240,13 +241,14 @@ DEVIATIONS: list[dict[str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize(
+@few(
     ("bounds", "options"),
     [
         pytest.param(bounds, options, marks=() if bounds == (-1, 0.9) or not options else pytest.mark.thorough)
         for options in DEVIATIONS
         for bounds in BOUNDS
     ],
+    5,
 )
 def test_cma_with_one_variable(bounds: tuple[float, float], options: dict[str, Any]) -> None:
     """Bounded on both sides, on one, on none; standard deviations beyond their limits."""

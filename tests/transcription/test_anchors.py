@@ -92,6 +92,7 @@ def added(line: str) -> str:
     return f"{head}[0, 0, {sum(map(float, tail.rstrip(']').split('+')))!r}]"
 
 
+@pytest.mark.slow
 @first("longer", [0.05, -0.06])
 def test_it_is_the_robot_that_is_built_so(tmp_path: Path, longer: float) -> None:
     """Motion, cost and velocities, and the foot on the ground."""
@@ -105,6 +106,7 @@ def test_it_is_the_robot_that_is_built_so(tmp_path: Path, longer: float) -> None
     assert varied.judge(z).objective != pytest.approx(varied.judge(np.array([-0.15])).objective, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_derivative_knows_what_is_carried(tmp_path: Path) -> None:
     made = leg(tmp_path, -0.15, -0.17)
     z, step = np.array([-0.17]), 1e-6

@@ -87,6 +87,7 @@ def free(name: str, **settings: Any) -> Problem:
     return load_problem(path, settings)
 
 
+@pytest.mark.slow
 @first("name", ["parcel", "quadruped_shift"])
 def test_a_free_duration_at_the_value_of_the_file_changes_nothing(name: str, tmp_path: Any) -> None:
     settings = {"simulation.duration": 0.2}

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tools.parameter_slopes import slopes, slopes_of
+from tools.repeats import few
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem
@@ -82,8 +83,8 @@ def test_an_affine_motor(tmp_path: Path, sets: str, slope: float) -> None:
     assert differences[1] == pytest.approx(exact[1], rel=1e-6)
 
 
-@pytest.mark.parametrize("stated", [(0, 0), (0.02, 0), (0, 0.01), (0.02, 0.01)])
-@pytest.mark.parametrize("sets", ["kp", "kv"])
+@few("stated", [(0, 0), (0.02, 0), (0, 0.01), (0.02, 0.01)], 3)
+@few("sets", ["kp", "kv"], 3)
 def test_an_affine_motor_with_feedback(tmp_path: Path, stated: tuple[float, float], sets: str) -> None:
     """I q'' = gear (gain u + offset) - kp gear^2 q - kv gear^2 q', where the file has no feedback too."""
     guess = {"kp": 0.02, "kv": 0.01}[sets]

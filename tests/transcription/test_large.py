@@ -249,6 +249,7 @@ def test_gradient_by_differences(both: tuple[Transcription, LargeTranscription])
     assert max(row["error"] for row in found) < 1e-6
 
 
+@pytest.mark.slow
 @problems(HOPS[0])
 def test_robots_share_weights(both: tuple[Transcription, LargeTranscription], monkeypatch: pytest.MonkeyPatch) -> None:
     """Many robots at once, over threads: each one's own gradient, and the sum of those of the weights."""

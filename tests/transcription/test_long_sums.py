@@ -34,6 +34,7 @@ def problem(steps: int, costs: int = 4) -> Problem:
     return problem_of_tables({"simulation": {"duration": 0.005 * steps, "dt": 0.005}, **tables})
 
 
+@pytest.mark.slow
 def test_a_program_adds_up_what_the_expression_does() -> None:
     made = transcribe(problem(301), backend="casadi")
     program = rollout_program(made.rollout)

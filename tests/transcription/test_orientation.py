@@ -44,6 +44,7 @@ def held(folder: Path, part: str = "", guess: str = "[1, 0, 0, 0]") -> Transcrip
     return transcribe(load_problem(path), backend="casadi")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [0.5, 1.0, 3.0])
 def test_the_length_plays_no_part(tmp_path: Path, length: float) -> None:
     dumbbell = held(tmp_path)
@@ -65,6 +66,7 @@ def differences(dumbbell: Transcription, z: np.ndarray) -> list[float]:
     return [(a - b) / 2e-6 for a, b in zip(high, low, strict=True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [1.0, 2.0])
 def test_the_gradient_is_right(tmp_path: Path, length: float) -> None:
     dumbbell, z = held(tmp_path), length * Q
@@ -73,6 +75,7 @@ def test_the_gradient_is_right(tmp_path: Path, length: float) -> None:
     assert slope == pytest.approx(differences(dumbbell, z), rel=1e-5, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_one_component_that_varies_leaves_a_unit_quaternion(tmp_path: Path) -> None:
     dumbbell, z = held(tmp_path, "[1]", "0.0"), np.array([0.7])
     first = dumbbell.simulate(z).arrays()["orientation"][0, 0]

@@ -39,6 +39,7 @@ def decision(rollout: Rollout, rows: int) -> np.ndarray:
     return BASE + spread
 
 
+@pytest.mark.slow
 def test_rollouts_have_their_own_lengths(rollout: Rollout) -> None:
     made, z, lasts = QuantitySlopes(rollout, FORMULAS, threads=1), decision(rollout, 3), [30, 7, 18]
     whole = list(made.values(z, [STEPS - 1] * 3))

@@ -174,6 +174,7 @@ def test_poses_hold_together_and_touch_nothing(problem: Problem, count: int) -> 
     assert count / 12 < lifted < count - count / 12
 
 
+@pytest.mark.slow
 def test_evaluations_are_those_of_the_numbers_in_a_file(walker: Transcription, path: Path) -> None:
     """Values and gradients of rows against files with the same numbers."""
     scenario = walker.shooting.scenario

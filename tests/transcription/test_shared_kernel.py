@@ -44,6 +44,7 @@ def Z() -> np.ndarray:
     return np.random.default_rng(0).normal([1, 0.3, -3, 0, 0, 0], 0.2, (5, 6))
 
 
+@pytest.mark.slow
 @few("smoothing", [0.0, 0.05], 2)
 @few("what", ["value", "gradient", "residuals", "jacobian"], 2)
 def test_each_point_is_evaluated_with_its_own_numbers(what: str, smoothing: float, Z: np.ndarray) -> None:

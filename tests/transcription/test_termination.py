@@ -54,6 +54,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Transcription:
     return transcribe(load_problem(path))
 
 
+@pytest.mark.slow
 def test_nothing_moves_after_the_termination(ball: Transcription) -> None:
     height = ball.simulate(np.array([1.0, 0, 0])).position[:, 0, 2]
     assert height[HALF] > 0.5 > height[HALF + 1]

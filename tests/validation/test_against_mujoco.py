@@ -47,6 +47,7 @@ def falls_as_a_square(world: World, start: dict[str, Any], torque: float, time: 
     assert errors[0] == pytest.approx(4 * errors[1], rel=0.15)
 
 
+@pytest.mark.slow
 def test_chain_with_springs_dampers_and_motors() -> None:
     rng, world = np.random.default_rng(2), chain(4, spring=Spring(2.0, 0.05, 0.3), motor=TorqueMotor(0.5))
     angles, rates = ({joint.name: rng.normal(0, 0.5) for joint in world.joints} for _ in range(2))

@@ -21,6 +21,7 @@ def ball_world(law, radius=0.5, gravity=(0, 0, -G)):
     return make_world([Body.ball("ball", radius, 1.0)], [Plane.ground()], law, gravity)
 
 
+@pytest.mark.slow
 def test_v8_49_bouncing_balls_keep_their_energy():
     """SimBenchmark bouncing: 7 x 7 balls, r = .1, m = 10, e = 1, mu = 0, from 5 m, 20 s: E = 24034.5 J."""
     grid = [(i, j) for i in range(7) for j in range(7)]
@@ -65,6 +66,7 @@ def incline(mu):
     return Lab(tripod(Law(mu, 0.0), tuple(g)), Scheme(), parameters=g)
 
 
+@pytest.mark.slow
 def test_v10_sliding_stops():
     """A block stops after v^2 / (2 mu g)."""
     block = Lab(tripod(Law(0.4, 0.0)), Scheme(sweeps=30))
@@ -73,8 +75,8 @@ def test_v10_sliding_stops():
     assert np.abs(states["block.velocity"][-1]).max() < 1e-9
 
 
-@pytest.mark.parametrize("heading", [0.0, 0.7, 2.0, 4.0])
-@pytest.mark.parametrize("share", [0.967, 0.998, 1.002, 1.547])
+@few("heading", [0.0, 0.7, 2.0, 4.0], 5)
+@few("share", [0.967, 0.998, 1.002, 1.547], 5)
 def test_v10_incline_sticks_inside_the_cone(heading, share):
     """Sticks if and only if tan(slope) <= mu, in every direction: friction acts on the disc."""
     mu = 0.6

@@ -44,6 +44,7 @@ def far(world: World, rng: np.random.Generator, most: float) -> Array:
     return x
 
 
+@pytest.mark.slow
 @few("name", WORLDS, 1)
 def test_steps_from_far_states_are_finite(name: str) -> None:
     """Value, forward and reverse derivatives, exact and smoothed."""
@@ -61,6 +62,7 @@ def test_steps_from_far_states_are_finite(name: str) -> None:
             assert np.isfinite(np.array(part)).all(), k
 
 
+@pytest.mark.slow
 @few("length", [1e-150, 1e-3, 0.5, 2.0, 1e6, 1e150], 1)
 def test_an_orientation_counts_by_its_direction(length: float) -> None:
     """A step from a quaternion of any length is that from the one of length 1."""

@@ -8,7 +8,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
-from tools.repeats import thorough
+from tools.repeats import few, thorough
 
 from symphys.dynamics.functions import step_function
 from symphys.dynamics.line_search import clusters
@@ -55,8 +55,8 @@ def heights(kind: Callable[[str, float], Body], masses: tuple[float, ...], drop:
     return places[:, 2] - SIZE / 2 - SIZE * np.arange(count), max(speeds)
 
 
-@pytest.mark.parametrize(("kind", "ratio", "depth"), [(ball, 1e3, 1e-9), (ball, 1e4, 1e-7), thorough(cube, 1e2, 1e-4)])
-@pytest.mark.parametrize("drop", [0.0, 0.02])
+@few(("kind", "ratio", "depth"), [(ball, 1e3, 1e-9), (ball, 1e4, 1e-7), thorough(cube, 1e2, 1e-4)], 1)
+@few("drop", [0.0, 0.02], 1)
 def test_a_light_body_carries_a_heavy_one(kind: Callable[[str, float], Body], ratio: float, depth: float, drop: float):
     """Statics, at the default sweeps: nobody sinks."""
     off, speed = heights(kind, (1.0, ratio), drop)
@@ -64,6 +64,7 @@ def test_a_light_body_carries_a_heavy_one(kind: Callable[[str, float], Body], ra
     assert speed < 1e-3
 
 
+@pytest.mark.slow
 def test_a_tower_that_grows_heavier() -> None:
     """1, 10, 100 and 1,000 kg."""
     off, speed = heights(ball, (1.0, 10.0, 100.0, 1000.0), 0.0)

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from tools.laboratory import Lab
-from tools.repeats import thorough
+from tools.repeats import few, thorough
 
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Plane, Sphere
@@ -58,6 +58,7 @@ def test_newtons_law_with_friction_adds_energy_and_the_cap_does_not():
     assert largest_gain(True) < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("restitution", "friction"), [(0.5, 0.2), thorough(0.5, 0.0)])
 def test_the_cap_changes_nothing_where_newtons_law_takes_energy_out(restitution, friction):
     at = start(1, 0.5, 0.5, 2)
@@ -123,8 +124,8 @@ def test_a_ball_that_another_knocks_down_bounces_before_it_is_hit_again():
         assert coarse[name][-1] == pytest.approx(fine[name][-1], abs=1e-6), name
 
 
-@pytest.mark.parametrize("seeds", [(10,), thorough(range(20))])
-@pytest.mark.parametrize(("count", "restitution", "friction"), [(8, 0.9, 0.3), (8, 1.0, 0.0)])
+@few("seeds", [(10,), thorough(range(20))], 1)
+@few(("count", "restitution", "friction"), [(8, 0.9, 0.3), (8, 1.0, 0.0)], 1)
 def test_a_cloud_of_balls_that_falls_gains_nothing(count, restitution, friction, seeds):
     lab = balls(count, restitution, friction)
     for seed in seeds:

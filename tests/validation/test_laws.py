@@ -82,6 +82,7 @@ def test_collisions_keep_linear_and_angular_momentum():
     assert angular == pytest.approx(np.tile(angular[0], (len(angular), 1)), abs=2e-4)
 
 
+@pytest.mark.slow
 def test_ball_hits_floating_body_with_the_right_total():
     """SimBenchmark: a 10 kg ball at 5 m/s, total momentum 50 N s before, during and after."""
     bodies = [Body.ball("ball", 0.2, 10.0), Body("float", 4.0, (0.3, 0.2, 0.1), DUMBBELL)]
@@ -92,6 +93,7 @@ def test_ball_hits_floating_body_with_the_right_total():
     assert np.abs(states["float.velocity"][-1]).max() > 1
 
 
+@pytest.mark.slow
 def test_frictionless_elastic_impact_of_a_turning_body_keeps_energy():
     """One corner of a dumbbell at a time, e = 1, mu = 0."""
     moments = np.array([0.03, 0.2, 0.2])

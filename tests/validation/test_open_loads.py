@@ -127,6 +127,7 @@ def test_a_car_on_cylinders_drives_straight(sweeps: int, reverse: bool) -> None:
         assert torque or forces == pytest.approx([14.715] * 4, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("restitution", [pytest.param(0.0, marks=pytest.mark.thorough), 1.0])
 @pytest.mark.parametrize("width", [0.1, pytest.param(0.75, marks=pytest.mark.thorough)])
 def test_a_flat_landing_on_a_narrow_pedestal_does_not_turn(width: float, restitution: float) -> None:
@@ -146,6 +147,7 @@ def test_landings_off_the_middle_are_those_of_many_sweeps() -> None:
     assert rates[0] == pytest.approx(rates[1], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_crate_slides_straight_on_two_rails() -> None:
     """As far as on one: v^2 / (2 mu g)."""
     rails = [Fixture(f"rail{k}", Box((1, 0.025, 0.05), (0, y, -0.05))) for k, y in enumerate((-0.15, 0.15))]
@@ -155,6 +157,7 @@ def test_a_crate_slides_straight_on_two_rails() -> None:
     assert np.abs(found["b.angular_velocity"]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_the_start_of_the_sweeps_does_not_jump() -> None:
     """Along a line on which iterates of Newton's method change places, values lie on a parabola but for rounding."""
     rollout = symphys.compile(symphys.load(TABLES), backend="casadi")

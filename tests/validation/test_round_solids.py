@@ -70,6 +70,7 @@ def carried(motion: Trajectory, steps: int = 50) -> Array:
     return np.asarray(motion.contact_force[-steps:].sum(axis=1).mean(axis=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ground", [Plane("ramp", RAMP), thorough(Terrain("ramp", lambda x, y: -np.tan(SLOPE) * x))])
 def test_a_cylinder_rolls_down_a_ramp(ground: Static) -> None:
     """A = 2/3 g sin(angle), and it neither sinks nor leaves."""
@@ -122,6 +123,7 @@ def test_what_is_dropped_comes_to_rest_on_the_ground(name: str) -> None:
         assert low[-1] == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_cylinder_stands_without_wobble() -> None:
     """Put down on its face, turning: friction stops the turn, nothing tilts, and then nothing moves at all."""
     motion = moved(
@@ -169,6 +171,7 @@ def test_a_spinning_egg_of_revolution_rolls_like_a_ball() -> None:
     assert one.angular_velocity == pytest.approx(other.angular_velocity, abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [thorough("drum"), "egg", thorough("stone")])
 def test_terrain_that_is_flat_is_a_plane(kind: str) -> None:
     """And the motion on it the same until after the first touches."""
@@ -195,6 +198,7 @@ def test_a_ball_rests_on_top(under: Any) -> None:
     assert carried(motion) == pytest.approx([0, 0, MASS * G], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["drum on its face", thorough("facets on their face"), thorough("stone")])
 def test_mujoco_has_them_at_the_same_height(name: str) -> None:
     """At rest after a drop, to a millimetre by which its springs give way.

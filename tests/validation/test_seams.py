@@ -95,6 +95,7 @@ LEVEL = (0.0, 1e-12, -1e-12, 1e-9, -1e-9, 1e-6, -1e-6)
 UNEVEN = (1e-4, -1e-4, 1e-3, -1e-3)
 
 
+@pytest.mark.slow
 @few(("sweeps", "newton"), [(20, False), (20, True), *(thorough(n, True) for n in (4, 10, 14, 50, 200))], 1)
 @pytest.mark.parametrize("higher", [*LEVEL[:1], *LEVEL[4:6], *map(thorough, (*LEVEL[1:4], *LEVEL[6:]))])
 @pytest.mark.parametrize(

@@ -80,6 +80,7 @@ def pushed(force: Sequence[float], sweeps: int = 30, smoothing: float = 0.0, new
     return lab.states(start, H, u=list(force), smoothing=smoothing)["b.position"][-1] - [0, 0, 0.5]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.99, 1.0, 1.01, 1.1, 1.5])
 def test_v6_push_at_rest(share: float) -> None:
     """Dojo, contact_gradients: nothing below the weight and inside the cone, (F - 1) h^2 / 2 beyond; thirty sweeps."""
@@ -88,6 +89,7 @@ def test_v6_push_at_rest(share: float) -> None:
     assert pushed([share, 0, 0])[0] == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_v6_ten_sweeps_are_not_enough_for_that() -> None:
     """By themselves they leave 0.05 mm at 0.99 of the cone, which is why the case above takes thirty."""
     assert 1e-5 < pushed([0.99, 0, 0], sweeps=10, newton_start=False)[0] < 1e-4

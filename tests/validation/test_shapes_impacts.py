@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from tools.laboratory import Lab, value_and_gradient
-from tools.repeats import first
+from tools.repeats import few, first
 from worlds.blocks import Array, block, rod, turned_by
 from worlds.meetings import matrix
 
@@ -96,7 +96,7 @@ SAME: dict[str, tuple[Static, Static]] = {
 }
 
 
-@pytest.mark.parametrize("name", SAME)
+@few("name", SAME, 1)
 def test_a_ball_bounces_alike_on_a_plane_and_on_what_is_one(name: str) -> None:
     """A static box's face, terrain with a constant slope, a grid of a plane's heights: value and gradient."""
     (plane, plane_slope), (other, other_slope) = (bounced(static) for static in SAME[name])
@@ -105,6 +105,7 @@ def test_a_ball_bounces_alike_on_a_plane_and_on_what_is_one(name: str) -> None:
     assert np.abs(plane_slope).max() > 1
 
 
+@pytest.mark.slow
 @first("body", [rod("b", 0.1, 0.2), block("b", (0.2, 0.15, 0.1))])
 def test_boxes_and_rods_tumble_alike_on_terrain(body: Body) -> None:
     places = []

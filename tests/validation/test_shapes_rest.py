@@ -56,6 +56,7 @@ def test_what_is_put_down_stays(body: str, ground: str) -> None:
     assert drift(states, "b", since=200)[0] < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_v11_box_dropped_from_1_rests_at_half(restitution: float) -> None:
     """Brax: of side 1."""

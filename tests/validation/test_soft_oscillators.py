@@ -30,8 +30,8 @@ def oscillator(ratio: float, dt: float, steps: int) -> Array:
     return np.array([expm(rates * dt * k) @ [0, 1] for k in range(steps + 1)])
 
 
-@pytest.mark.parametrize("ratio", [0, 0.05, 0.3, 1, 2])
-@pytest.mark.parametrize("angle", [0.05, 0.3, 1.0])
+@few("ratio", [0, 0.05, 0.3, 1, 2], 4)
+@few("angle", [0.05, 0.3, 1.0], 4)
 def test_a_mass_on_a_soft_joint_is_the_exact_oscillator(angle: float, ratio: float) -> None:
     dt, steps = angle / OMEGA, 20
     joint = Joint("j", BALL, 0, None, FRAMES, frequency=HZ, damping=ratio)
@@ -98,8 +98,8 @@ def rebound(ratio: float, height: float, time: float) -> Array:
     return y
 
 
-@pytest.mark.parametrize("ratio", [0, 0.05, 0.3, 1, 2])
-@pytest.mark.parametrize("dt", [0.0025, 0.01, 0.03])
+@few("ratio", [0, 0.05, 0.3, 1, 2], 9)
+@few("dt", [0.0025, 0.01, 0.03], 9)
 def test_a_ball_rebounds_from_soft_ground_as_integrated(dt: float, ratio: float) -> None:
     """At 0.08, 0.3 and 0.94 rad a step; touch and parting lie within steps."""
     law = Law(0.5, 0.0, frequency=HZ, damping=ratio)
@@ -120,6 +120,7 @@ def test_balls_of_unequal_mass_bounce_off_each_other_softly() -> None:
     assert states["a.position"][-1, 0] == pytest.approx(0.0637 - 0.5 * (0.4 - 0.0637 - 0.1) + 0.25 * 0.1, abs=1e-9)
 
 
+@pytest.mark.slow
 @few("hz", [10.0, 50.0, 200.0], 1)
 def test_a_box_on_soft_ground_gains_no_energy(hz: float) -> None:
     """Up to 12 rad a step, four corners at once; undamped, its energy in flight is at most what it was, within 1 %."""
@@ -132,7 +133,7 @@ def test_a_box_on_soft_ground_gains_no_energy(hz: float) -> None:
     assert energy.max() < 1.01 * energy[0]
 
 
-@pytest.mark.parametrize("ratio", [0, 0.3])
+@few("ratio", [0, 0.3], 1)
 def test_a_foot_on_a_rail_rebounds_as_a_free_ball(ratio: float) -> None:
     """Of a tree of joints, whose motion is predicted under the forces of the last step."""
     half = 0.5**0.5

@@ -49,6 +49,7 @@ def after_cushion(friction: float, e: float = 0.8) -> float:
     return -5 / 7 * e + 2 / 7 * spin
 
 
+@pytest.mark.slow
 @few("friction", [0.0, 0.1], 1)
 @first("dt", [0.01, 0.0025])
 def test_a_rolling_ball_comes_back_from_a_cushion(friction, dt):

@@ -50,6 +50,7 @@ def point(problem: Problem) -> Array:
     return np.concatenate([weights + 0.05 * rng.standard_normal(weights.size), [0.03, -0.02, 0.01]])
 
 
+@pytest.mark.slow
 def test_sensors(problem: Problem, rollout: Rollout, record: Record) -> None:
     """There are 81, and none is constant while the robot moves."""
     assert sum(sensor.size for sensor in problem.sensors) == 81

@@ -100,7 +100,7 @@ def gyroscope(dt: float) -> Lab:
     return Lab(World(bodies, joints=joints), Scheme(dt=dt))
 
 
-@pytest.mark.parametrize("spin", [50.0, 100.0, 150.0, 300.0])
+@few("spin", [50.0, 100.0, 150.0, 300.0], 1)
 def test_wheel_on_an_arm(spin: float) -> None:
     """A gyroscope held by the end of its arm, level at first: a top whose arm does not turn with the wheel.
 

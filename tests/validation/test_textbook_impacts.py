@@ -46,8 +46,8 @@ def two_falling(z: Array, masses: tuple[float, float], e: float, time: float) ->
 
 
 @first("dt", [0.01, 0.001])
-@few("gap", [0.1, 0.01, 0.001, 1e-5], 4)
-@few(("masses", "e"), [((5.0, 1.0), 1.0), ((1000.0, 1.0), 1.0), ((8.0, 1.0), 0.8)], 4)
+@few("gap", [0.1, 0.01, 0.001, 1e-5], 1)
+@few(("masses", "e"), [((5.0, 1.0), 1.0), ((1000.0, 1.0), 1.0), ((8.0, 1.0), 0.8)], 2)
 def test_ball_on_ball(masses: tuple[float, float], e: float, gap: float, dt: float) -> None:
     """Harter 1971: dropped together they hit one after the other; a light one leaves almost three times as fast."""
     height, time = 1.0, 0.6
@@ -88,6 +88,7 @@ def stick(e: float, mu: float, dt: float, sweeps: int = 10) -> Lab:
     return Lab(make_world([rod], [Plane.ground()], Law(mu, e)), Scheme(dt=dt, sweeps=sweeps))
 
 
+@pytest.mark.slow
 @first("dt", [0.01, 0.0025])
 @few(("mu", "e", "sweeps"), [(0.0, 1.0, 10), (0.0, 0.5, 10), (1.0, 0.5, 60), (1.0, 0.5, 10)], 1)
 def test_rod_drops_on_its_end(mu: float, e: float, sweeps: int, dt: float) -> None:

@@ -29,6 +29,7 @@ def turntable(dt: float, mu: float = 0.5) -> Lab:
     return Lab(World(world.bodies, pairs=world.pairs, joints=(axle,)), Scheme(dt=dt))
 
 
+@pytest.mark.slow
 @first("dt", [0.01, 0.005])
 def test_ball_circles_on_a_turntable(dt: float) -> None:
     """Weltner 1979: rolling on a plate that turns at W a ball moves on circles at 2/7 W, whatever its velocity.
@@ -105,6 +106,7 @@ def sled(alpha: float, mu: float, mass: float) -> World:
     return replace(world, joints=(Joint("rail", SLIDER, 0, None, (JointFrame(), JointFrame())),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [-1, 1])
 @pytest.mark.parametrize("share", [0.97, 1.03])
 def test_block_on_an_accelerated_slope(share: float, side: int) -> None:
@@ -136,6 +138,7 @@ def test_block_on_an_accelerated_slope(share: float, side: int) -> None:
         assert relative[-1] - relative[10] == pytest.approx(along * c * (time - 0.1), rel=0.01)
 
 
+@pytest.mark.slow
 @first("dt", [0.01, 0.005])
 def test_block_slides_down_a_wedge_that_gives_way(dt: float) -> None:
     """Frictionless: the wedge goes back at m g sin cos / (M + m sin^2), momentum along x is kept; by M too."""

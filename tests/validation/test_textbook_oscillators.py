@@ -10,7 +10,7 @@ import pytest
 from data.textbook import Array, G, differences, final
 from scipy.integrate import solve_ivp
 from tools.laboratory import Lab
-from tools.repeats import first
+from tools.repeats import few, first
 from worlds.linkage import ABOUT_Y, ABOUT_Z
 
 from symphys.model.joints import BALL, FIXED, HINGE, SLIDER, Joint, JointFrame, Spring, VelocityMotor
@@ -19,6 +19,7 @@ from symphys.model.shapes import Capsule, Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
 
 
+@pytest.mark.slow
 @first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize("at", [0.3, 0.47])
 def test_spring_and_dry_friction(at: float, dt: float) -> None:
@@ -64,8 +65,8 @@ def governor(moment: float, dt: float) -> Lab:
     return Lab(World(bodies, joints=joints), Scheme(dt=dt), ["motor.command"])
 
 
-@pytest.mark.parametrize("spin", [4.0, 7.0])
-@pytest.mark.parametrize("moment", [1e-3, 1e-7])
+@few("spin", [4.0, 7.0], 1)
+@few("moment", [1e-3, 1e-7], 1)
 def test_bob_on_a_turning_shaft(moment: float, spin: float) -> None:
     """(m l^2 + I) theta'' = m l^2 (W^2 cos(theta) - g / l) sin(theta): up iff W^2 > g / l (Watt's governor)."""
     length, tilt, time = 0.4, 0.02, 2.0
@@ -110,6 +111,7 @@ def test_pendulum_made_of_two(pivot: Kind) -> None:
     assert np.abs(x - exact).max() < 0.01 * abs(x[0])
 
 
+@pytest.mark.slow
 @first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize("e", [0.6, 1.0])
 def test_ball_strikes_a_rod_on_a_pivot(e: float, dt: float) -> None:

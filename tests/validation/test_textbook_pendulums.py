@@ -10,7 +10,7 @@ from data.textbook import Array, G
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from tools.laboratory import Lab
-from tools.repeats import first
+from tools.repeats import few, first
 from worlds.linkage import ABOUT_Y, ABOUT_Z, chain, hanging, rod
 
 from symphys.model.joints import BALL, HINGE, SLIDER, Joint, JointFrame, Limits, Spring, VelocityMotor
@@ -35,7 +35,7 @@ def kapitza(dt: float) -> Lab:
     return Lab(World(bodies, joints=(rail, pin)), Scheme(dt=dt), ["rail.command"])
 
 
-@pytest.mark.parametrize("share", [0.8, 1.3])
+@few("share", [0.8, 1.3], 1)
 def test_kapitzas_pendulum(share: float) -> None:
     """Upright it is stable iff a w > sqrt(2 g l), a the amplitude, w the frequency of the pivot (Landau, Lifshitz 30).
 
@@ -87,7 +87,7 @@ def slow_mode(masses: tuple[float, float], dt: float) -> tuple[float, float]:
 
 
 @first("dt", [0.01, 0.0025])
-@pytest.mark.parametrize("masses", [(1.0, 1.0), (1.0, 300.0), (1000.0, 1.0), (1e6, 1.0)])
+@few("masses", [(1.0, 1.0), (1.0, 300.0), (1000.0, 1.0), (1e6, 1.0)], 2)
 def test_double_pendulum_of_unequal_bobs(masses: tuple[float, float], dt: float) -> None:
     error, allowed = slow_mode(masses, dt)
     assert error < allowed
@@ -131,6 +131,7 @@ def test_carts_on_springs(dt: float) -> None:
         assert np.abs(x - exact).max() / 0.02 < fastest**2 * dt**2 * (1 / 6 + w * time / 12)
 
 
+@pytest.mark.slow
 def test_hanging_chain_carries_its_weight() -> None:
     """Four equal rods between two hooks: tan of the outer slopes is three times that of the inner, H = m g / (2 tan).
 

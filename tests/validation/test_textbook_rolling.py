@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from data.textbook import Array, G, differences, final
 from tools.laboratory import Lab
-from tools.repeats import first
+from tools.repeats import few, first
 
 from symphys.model.shapes import Box, Fixture, Plane, Terrain
 from symphys.model.world import Body, Law, Scheme, make_world
@@ -127,8 +127,8 @@ FIRST = pytest.mark.xfail(
 )
 
 
-@pytest.mark.parametrize("gap", [0.05, pytest.param(0.001, marks=FIRST)])
-@pytest.mark.parametrize("spin", [0.3, 0.0, -1.0])
+@few("gap", [0.05, pytest.param(0.001, marks=FIRST)], 2)
+@few("spin", [0.3, 0.0, -1.0], 2)
 def test_follow_and_draw(spin: float, gap: float) -> None:
     """A head-on elastic hit leaves the cue ball its spin only: v = 2/7 r w in the end, the other's 5/7 v0.
 

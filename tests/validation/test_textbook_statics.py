@@ -61,6 +61,7 @@ def ladder(mu_floor: float, mu_wall: float) -> Lab:
     return Lab(replace(world, pairs=pairs), Scheme(sweeps=30))
 
 
+@pytest.mark.slow
 @few(("mu_floor", "mu_wall"), [(0.4, 0.0), (0.4, 0.3), (0.25, 0.8)], 1)
 @few("over", [0.98, 1.02], 1)
 def test_ladder_against_a_wall(mu_floor: float, mu_wall: float, over: float) -> None:

@@ -72,6 +72,7 @@ def rimless(slope: float, dt: float, moment: float) -> Lab:
     return Lab(make_world([body], [Plane.ground()], Law(2.0, 0.0), gravity), Scheme(dt=dt, sweeps=20))
 
 
+@pytest.mark.slow
 @first("dt", [0.01, 0.0025])
 @pytest.mark.parametrize("moment", [0.02, 0.08])
 def test_rimless_wheel(moment: float, dt: float) -> None:
@@ -147,6 +148,7 @@ def exact_tippe(tilt: float, spin: float, mu: float, time: float) -> Array:
     return np.asarray(y[:, :4])
 
 
+@pytest.mark.slow
 @first("dt", [0.002, 0.001])
 def test_tippe_top(dt: float) -> None:
     """Jellett 1872: L . r, r from the centre of mass to the contact, is kept whatever friction does; the top rises.
@@ -175,6 +177,7 @@ def coin(dt: float, mu: float = 0.3) -> Lab:
     return Lab(make_world([body], [Plane.ground(), Plane("wall", (-1.0, 0, 0), -0.12)], Law(mu, 0.3)), Scheme(dt=dt))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("dt", "spin"), [(0.01, 10.0), (0.01, 30.0), thorough(0.005, 30.0)])
 def test_spinning_coin_loses_energy(dt: float, spin: float) -> None:
     """Euler's disc: whatever rolls, slides and strikes, also against a wall, the energy does not rise."""

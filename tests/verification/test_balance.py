@@ -94,7 +94,7 @@ tolerance = 0.1
 """
 
 
-@pytest.mark.parametrize("name", ["ball_throw", "two_balls", "bank_shot"])
+@few("name", ["ball_throw", "two_balls", "bank_shot"], 1)
 def test_momentum_closes_for_shipped_problems(name):
     shipped = transcribe(load_problem(find(name)), backend="casadi")
     for seed in (0, 1):
@@ -211,6 +211,7 @@ tolerance = 1.0
 """
 
 
+@pytest.mark.slow
 @few(("edge", "trips"), [(0.0, False), (0.01, True)], 1)
 def test_a_trip_over_an_edge_is_told_with_what_it_takes(make, edge, trips):
     """A cube slides off one board onto the next: flush, nothing but friction takes energy; an edge of 1 cm stops it.

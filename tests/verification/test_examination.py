@@ -100,6 +100,7 @@ def test_refined_answers_are_those_of_the_refined_problem(coarse, halved):
     assert half.objective != pytest.approx(made.judge(z).objective, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_changes_of_the_gradient_are_those_of_the_refined_problem(coarse, halved):
     """Against the probe of a file with half the step, in the variables' scales."""
     made, z, refined = coarse
@@ -118,6 +119,7 @@ def test_order_of_convergence():
     assert order([np.nan, 1.0, 1.0]) is None
 
 
+@pytest.mark.slow
 def test_smoothed_answers_are_those_of_the_smoothed_rollout(throw):
     rows = examine(throw, THROW)["smoothed"]
     assert [row["smoothing"] for row in rows] == [1e-3, 1e-2, 1e-1]

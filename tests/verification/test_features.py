@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.features import FEATURES
 
 from symphys.problem import problem_of_tables
@@ -93,7 +94,7 @@ MORE: dict[str, Tables] = {
 }
 
 
-@pytest.mark.parametrize("name", [*PHASES, *(pytest.param(name, marks=pytest.mark.slow) for name in MORE | FEATURES)])
+@few("name", [*PHASES, *(pytest.param(name, marks=pytest.mark.slow) for name in MORE | FEATURES)], 1)
 def test_every_examination_ends_with_numbers(name: str) -> None:
     tables = (PHASES | MORE | FEATURES)[name]
     made = transcribe(problem_of_tables(tables), backend="casadi")

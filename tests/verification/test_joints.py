@@ -204,6 +204,7 @@ def test_springs_and_motors_of_a_foot_on_the_ground_account_for_energy(make: Mak
     assert told["gained"] < 0.05
 
 
+@pytest.mark.slow
 def test_position_motors_account_for_energy_in_cut_steps(make: Make) -> None:
     """A tray with a ball on it is let down: its contact adds nothing."""
     told = found(make(LIFT))[1]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 import symphys
 from symphys.findings.energy import jump_findings
@@ -105,9 +106,7 @@ def screw(start: float, limits: tuple[float, float]) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize(
-    ("start", "limits", "size"), [(0.0, (-100, 100), 0.0), (0.0, (-1, 20), 0.0), (7.0, (-100, 100), 0.0557)]
-)
+@few(("start", "limits", "size"), [(0.0, (-100, 100), 0.0), (0.0, (-1, 20), 0.0), (7.0, (-100, 100), 0.0557)], 1)
 def test_a_carriage_that_begins_off_its_thread_jumps(start: float, limits: Any, size: float) -> None:
     made = transcribe(symphys.load(screw(start, limits)), backend="casadi")
     record = made.record(np.zeros(1))

@@ -68,6 +68,7 @@ def touches(of: Transcription, z: np.ndarray) -> bool:
     return bool(np.abs(motion.contact_force[:, columns]).sum() > 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vz", [6.88, 6.8705, 6.866, 6.86])
 def test_the_change_that_makes_or_loses_a_touch(throw, vz):
     """A little more than what is told makes the touch, or loses it; a little less does not."""
@@ -129,6 +130,7 @@ value = "-box.position[0]"
 """
 
 
+@pytest.mark.slow
 def test_a_variable_that_changes_nothing_is_not_felt(make):
     """Friction holds the box; with ten times the push it slides."""
     held = make(HELD)
@@ -147,6 +149,7 @@ def test_more_sweeps_are_looked_at_where_contacts_have_not_settled(make):
     assert told == {"residual_finer": more}
 
 
+@pytest.mark.slow
 def test_where_impulses_have_not_settled_other_numbers_of_sweeps_are_tried(make):
     """A ball on one a hundredth as heavy: the rows are what the problem gives with 3 and 4 sweeps in place of 2."""
     pile = make(HEAVIER, simulation__sweeps=2)

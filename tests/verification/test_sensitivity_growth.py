@@ -101,6 +101,7 @@ def test_a_few_directions_estimate_it_from_below(make, monkeypatch):
     assert every / 3 < few <= every * (1 + 1e-9)
 
 
+@pytest.mark.slow
 def test_billiards_grow_exponentially_and_the_advice_says_so(make):
     """Each flight of length l between discs that curve like R magnifies by L + sqrt(L^2 - 1), L = 1 + l / R."""
     billiard = make(BILLIARD)

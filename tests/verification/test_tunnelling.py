@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.transcription import Transcription
 from symphys.verification.tunnelling import tunnelling
@@ -57,7 +58,7 @@ def found(shot: Transcription, moved: float = 0.0) -> dict:
     return tunnelling(shot.rollout, record)
 
 
-@pytest.mark.parametrize("surface", [WALL.format(thickness=0.02), WALL.format(thickness=0.3), RIDGE, BODY])
+@few("surface", [WALL.format(thickness=0.02), WALL.format(thickness=0.3), RIDGE, BODY], 2)
 def test_a_ball_that_is_before_a_wall_and_then_behind_it_went_through(make, surface):
     """The engine's walls are sent away; the ball then flies as if there was none, 0.4 m a step."""
     shot = make(

@@ -39,6 +39,7 @@ def evaluated(transcription: Transcription, kind: str, Z: np.ndarray, smoothing:
     return values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @few("backend", ["simd", "c"], 1)
 def test_all_agree(backend: str, kind: str) -> None:
@@ -53,6 +54,7 @@ def test_all_agree(backend: str, kind: str) -> None:
                 assert b == pytest.approx(a, rel=1e-9, abs=1e-11 * (1 + np.abs(a).max()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_single_precision_is_off_by_no_more_than_it_says(kind: str) -> None:
     expected, found = (evaluated(throw(backend), kind, points(8)) for backend in ("casadi", "simd32"))
@@ -92,6 +94,7 @@ def test_a_row_that_is_not_finite_leaves_the_others_alone(backend: str, kind: st
             assert np.array_equal(getattr(found, name)[others], getattr(good, name)[others])
 
 
+@pytest.mark.slow
 def test_the_first_bad_step_is_named_and_so_is_the_body() -> None:
     """By the kernel, and by the exact rollout that users hear of, where a number of the motion overflows."""
     require("simd")
@@ -181,6 +184,7 @@ def test_names() -> None:
     assert set(NAMES) == {"auto", "casadi", "c", "simd", "simd32", "cuda", "cuda32"}
 
 
+@pytest.mark.slow
 def test_an_exact_kernel_refuses_smoothing() -> None:
     """It has no parameters: an answer to another question would be worse than none."""
     require("simd")

@@ -56,6 +56,7 @@ def points(kernel: ProcessorKernel, count: int) -> np.ndarray:
     return np.random.default_rng(3).normal(0, 1, (count, kernel.program.z.size))
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("faster", [True, False])
 def test_a_large_batch_goes_where_the_first_of_its_size_was_faster(

@@ -44,6 +44,7 @@ def test_the_largest_error_is_by_the_length_of_its_row() -> None:
     assert largest_error(np.zeros((3, 2)), np.zeros((3, 2))) == 0
 
 
+@pytest.mark.slow
 def test_gradients_that_are_right_are_not_doubted() -> None:
     """A thrown ball: single precision knows five digits."""
     require("simd32")
@@ -105,6 +106,7 @@ def test_values_alone_are_not_compared(monkeypatch: pytest.MonkeyPatch) -> None:
     assert made.backend.said() == ""
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_device_in_single_precision_is_compared_with_the_processor(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

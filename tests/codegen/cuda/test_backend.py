@@ -43,6 +43,7 @@ def test_a_broken_driver_is_told_in_its_own_words(monkeypatch: pytest.MonkeyPatc
     assert throw("cuda").backend.note.endswith("cudaErrorInsufficientDriver")
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("kind", ["value", "gradient", "residuals", "jacobian"])
 def test_every_evaluation_is_the_processors(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

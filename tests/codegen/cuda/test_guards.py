@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from fakes.emulated import Emulated, needs_compiler
-from tools.repeats import thorough
+from tools.repeats import few, thorough
 from worlds.guarded import guarded_sections, halving, program_of, whole
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Place, Program, compile_program
@@ -52,7 +52,7 @@ def test_a_heap_is_the_processors_and_that_of_all_calls(name: str, warps: int, t
     np.testing.assert_allclose(gradient, slopes, rtol=0, atol=(1e-7 if soft else 1e-9) * np.abs(slopes).max())
 
 
-@pytest.mark.parametrize("make", [halving, guarded_sections])
+@few("make", [halving, guarded_sections], 1)
 def test_small_programs(make: Callable[[bool], Program], tmp_path: Path) -> None:
     programs = [make(guard) for guard in (True, False)]
     kernels = [compile_on(Emulated(tmp_path / str(i)), each, warps=2) for i, each in enumerate(programs)]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fakes.emulated import Emulated, needs_compiler
+from tools.repeats import few
 from worlds import programs
 
 from symphys.codegen import AdjointDiscount, Cache, Kernel, KernelUnavailable, Place, Program, compile_program
@@ -42,7 +43,7 @@ def pair(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return compile_on(device, pendulum(), warps=warps), compile_program(pendulum(), cache=cache, threads=1)
 
 
-@pytest.mark.parametrize("count", [1, 4, 11])
+@few("count", [1, 4, 11], 2)
 def test_outputs_and_gradients_are_the_processors(pair: tuple[DeviceKernel, Kernel], count: int) -> None:
     there, here = pair
     z, seed, parameters = rows(here, count), seeds(here, count), [9.81]
@@ -73,6 +74,7 @@ def test_discounted_adjoints_and_skipped_steps(
     np.testing.assert_allclose(found[0][1], found[1][1], rtol=1e-12, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_what_does_not_fit_at_once_is_computed_in_waves(tmp_path: Path, cache: Cache) -> None:
     device = Emulated(tmp_path)
     there, here = compile_on(device, programs.chain()), compile_program(programs.chain(), cache=cache, threads=1)

@@ -238,6 +238,7 @@ def kernels(folder: Path) -> list[str]:
     return [path.suffix for path in (folder / "cache").iterdir() if path.suffix != ".lock"]
 
 
+@pytest.mark.slow
 @LINUX
 def test_one_process_builds_a_kernel_while_others_wait_and_one_of_these_where_it_is_killed(
     pendulum: Kernel, tmp_path: Path

@@ -52,6 +52,7 @@ def throw(cache: Cache) -> Kernel:
         pytest.skip(str(error))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("smoothing", [0.0, 0.1])
 def test_values_to_the_bit_and_derivatives(throw: Kernel, smoothing: float) -> None:
     z = np.array([4.0, 0.3, 1.0, 0.5, 9.0, 0.1])

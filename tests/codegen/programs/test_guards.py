@@ -84,6 +84,7 @@ def test_plain_c_leaves_out_the_same(tmp_path: Path, cache: Cache) -> None:
     assert gradient == pytest.approx(expected.ravel(), rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("older", [False, True])
 def test_a_guard_of_which_an_older_result_is_read_is_given_up(older: bool, cache: Cache) -> None:
     try:

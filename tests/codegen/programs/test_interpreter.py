@@ -89,7 +89,7 @@ def same(found: Any, wanted: Any) -> None:
         pytest.param("spheres", False, marks=pytest.mark.slow),
         thorough("spheres", True),
     ],
-    3,
+    1,
 )
 def test_the_interpreter_gives_the_same_bits(
     name: str, single: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -109,6 +109,7 @@ def test_the_interpreter_gives_the_same_bits(
         same(interpreted.gradient(*arguments(program, rows)), whole.gradient(*arguments(program, rows)))
 
 
+@pytest.mark.slow
 def test_a_kernel_changes_over_when_it_is_compiled(tmp_path: Path) -> None:
     cache = Cache(tmp_path / "kernels")
     kernel = made(programs.chain(), cache)
@@ -126,6 +127,7 @@ def test_a_kernel_changes_over_when_it_is_compiled(tmp_path: Path) -> None:
     same(again.gradient(*given), first)
 
 
+@pytest.mark.slow
 def test_who_waits_is_given_what_was_compiled(tmp_path: Path) -> None:
     cache = Cache(tmp_path / "kernels")
     kernel = compile_source(ProgramSource(programs.chain), ("merit",), 1, cache=cache)
@@ -162,7 +164,7 @@ def test_without_a_cache_the_compiler_is_waited_for(tmp_path: Path) -> None:
     assert "was not kept" in kernel.report.note
 
 
-@pytest.mark.parametrize("how", ["SIGINT", "SIGKILL"])
+@few("how", ["SIGINT", "SIGKILL"], 1)
 def test_a_process_that_ends_leaves_the_kernel_to_the_next(how: str, tmp_path: Path) -> None:
     cache = Cache(tmp_path / "kernels")
     environment = os.environ | {

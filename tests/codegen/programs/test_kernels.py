@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds import programs
 
 from symphys.codegen import Cache, Kernel, ProgramError, compile_program, interpret
@@ -124,7 +125,7 @@ def test_trajectories_lie_in_the_memory(pendulum: Kernel) -> None:
         pendulum.trajectory(z, programs.PENDULUM_STATE, programs.STEPS + 2, gravity(pendulum))
 
 
-@pytest.mark.parametrize("lanes", [1, 2, 4, 16])
+@few("lanes", [1, 2, 4, 16], 1)
 def test_the_number_of_lanes_changes_nothing(chain: Kernel, cache: Cache, lanes: int) -> None:
     other = compile_program(chain.program, lanes=lanes, cache=cache)
     z = draw(chain, 17)

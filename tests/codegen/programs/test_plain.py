@@ -14,6 +14,7 @@ from worlds.operations import alone, every_operation, long_function
 from symphys.codegen import Cache, Kernel, KernelUnavailable, compile_program
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pendulum", "chain", "operations", thorough("long")])
 def test_it_gives_what_the_kernel_gives(name: str, cache: Cache, tmp_path: Path) -> None:
     program = {

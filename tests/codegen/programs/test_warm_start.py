@@ -103,6 +103,7 @@ def test_what_has_changed_is_built_again(cache: Cache, other: str, monkeypatch: 
     assert again.count == 1
 
 
+@pytest.mark.slow
 def test_a_folder_that_others_may_write_to_is_not_used(cache: Cache) -> None:
     compile_source(Made().source, ("merit",), 1, cache=cache)
     cache.folder.chmod(0o777)
@@ -192,6 +193,7 @@ def test_a_problem_with_a_python_function_is_built(monkeypatch: pytest.MonkeyPat
     assert program_identity(replace(problem, parameters={"own": lambda: 1}), True) is None  # type: ignore[dict-item]
 
 
+@pytest.mark.slow
 @few("name", ["ball_throw", "cart_pole_walls"], 1)
 def test_a_second_start_of_a_problem_is_the_first(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     require("simd")

@@ -66,6 +66,7 @@ def test_the_rows_choose_the_lanes() -> None:
     assert [suited(rows, 2) for rows in (1, 2, 3)] == [1, 2, 2]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("never")
 @few(
     ("name", "precision"),
@@ -102,6 +103,7 @@ def test_a_library_that_is_not_needed_for_long_is_not_compiled(own: Cache) -> No
     assert own.info().kernels == 1
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("at_once")
 def test_a_library_that_is_needed_for_long_is_compiled_and_used(own: Cache) -> None:
     kernel = compile_program(programs.pendulum(), cache=own, threads=1)
@@ -117,6 +119,7 @@ def test_a_library_that_is_needed_for_long_is_compiled_and_used(own: Cache) -> N
     assert [kernel.widths.ready(rows).lanes for rows in (1, 2, 3, 20)] == [1, 2, full, full]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("at_once")
 def test_who_expects_one_rollout_gets_the_others_later(own: Cache) -> None:
     kernel = compile_program(programs.pendulum(), cache=own, threads=1, rows=1)
@@ -127,6 +130,7 @@ def test_who_expects_one_rollout_gets_the_others_later(own: Cache) -> None:
     np.testing.assert_array_equal(kernel.forward(Z, [1.0])["merit"], first)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("never")
 def test_what_is_in_the_cache_is_used_at_once(own: Cache) -> None:
     compile_program(programs.pendulum(), cache=own, threads=1, rows=1)
@@ -143,6 +147,7 @@ def test_what_is_in_the_cache_is_used_at_once(own: Cache) -> None:
     np.testing.assert_array_equal(fixed[0].outputs[0], np.concatenate([part[0] for part in expected.values()]))
 
 
+@pytest.mark.slow
 def test_a_plan_that_was_kept_has_all_widths(own: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
     made = []
 

@@ -50,11 +50,13 @@ def test_random_functions(cache: Cache, steps: list[list[tuple[int, int, int]]],
     compare([build(s) for s in steps], cache, np.array(z))
 
 
+@pytest.mark.slow
 def test_every_operation_alone(cache: Cache) -> None:
     z = np.array([[-1.5, 0.3, 0.0, 1.0, 0.7], [0.7, -0.3, 2.0, 1.0, 0.7], [0.2, 0.0, -2.0, 0.5, -3.0]])
     compare(every_operation(), cache, z)
 
 
+@pytest.mark.slow
 def test_every_operation_alone_in_single_precision(cache: Cache) -> None:
     ops = range(len(SMOOTH) + len(PAIRS))
     compare([build([(op, 0, 4)]) for op in ops], cache, np.array([[-1.3, 0.3, 0.1, 1.0, 0.7]]), "single")

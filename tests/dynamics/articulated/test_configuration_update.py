@@ -10,6 +10,7 @@ from worlds.linkage import chain, hanging, momenta, separations
 from symphys.model.world import Scheme, World
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("warm_start", [True, False])
 def test_joints_stay_closed_and_momentum_stays(warm_start: bool) -> None:
     made = chain(3, free=True)

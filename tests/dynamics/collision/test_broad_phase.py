@@ -94,6 +94,7 @@ def test_where_there_are_few_pairs_nothing_is_looked_at() -> None:
     assert near_pairs(context, {}) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kinds", [["sphere"] * 6, thorough(["capsule", "box", "sphere", "sphere", "capsule"])])
 def test_motions_are_those_without_a_broad_phase(
     kinds: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tools.distances import Solid, distance
+from tools.repeats import few
 from worlds.meetings import Array, Thing, flying, later, met, moved_to, random_thing, rule
 from worlds.slopes import compared, some_way
 
@@ -52,7 +53,7 @@ def test_frames_at_the_touch(pair: tuple[str, str]) -> None:
     assert hits >= 6
 
 
-@pytest.mark.parametrize("pair", PAIRS)
+@few("pair", PAIRS, 5)
 def test_gap_after_displacements(pair: tuple[str, str]) -> None:
     """The gap at the end is that of the shapes where small displacements have put them, to second order."""
     rng, errors = np.random.default_rng(6), []
@@ -72,7 +73,7 @@ def put(x: Thing, shift: Array) -> Solid:
     return flying(x, shift[:3] / DT, shift[3:] / DT).at(DT)
 
 
-@pytest.mark.parametrize("pair", [*PAIRS, ("sphere", ""), ("capsule", ""), ("box", "")])
+@few("pair", [*PAIRS, ("sphere", ""), ("capsule", ""), ("box", "")], 4)
 def test_derivatives_of_gap_rate_time_and_frame(pair: tuple[str, str]) -> None:
     """Along random directions of sizes, places on the bodies, poses and motions, at random meetings."""
     rng, worst = np.random.default_rng(8), []

@@ -112,8 +112,8 @@ def down(kind: str, name: str) -> Any:
 GROUNDS = {name: ground(name) for name in ("plane", *PLAIN)}
 
 
-@few("name", GROUNDS, 3)
-@few("kind", KINDS, 3)
+@few("name", GROUNDS, 2)
+@few("kind", KINDS, 2)
 def test_the_smallest_gap_is_that_of_the_lowest_point(kind: str, name: str) -> None:
     """Of all points of the surface: those of a fine grid, and of a hull all corners.
 
@@ -197,7 +197,7 @@ def between(a: Thing, b: Thing, t: float = 0.0) -> float:
     return float(min(away) - a.size[0])
 
 
-@pytest.mark.parametrize("pair", [*ROUND, *RODS])
+@few("pair", [*ROUND, *RODS], 2)
 def test_balls_and_rods_beside_solids(pair: tuple[str, str]) -> None:
     """The smallest gap is the distance; where it is, both arms end in one place half the gap from either surface."""
     rng, function = np.random.default_rng(7), rule(*pair)

@@ -35,6 +35,7 @@ def swung(lab: Lab, start: float, pivot: float = PIVOT, rate: float = RATE) -> d
     return lab.states(values, 0.04)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cuts", [0, 1, 2])
 def test_a_rod_passes_the_upright_high_above_the_ground(cuts: int) -> None:
     """As if there were no ground, wherever in a step it is upright."""
@@ -44,6 +45,7 @@ def test_a_rod_passes_the_upright_high_above_the_ground(cuts: int) -> None:
         assert positions[0] == pytest.approx(positions[1], abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_rod_that_turns_far_within_a_step_is_not_pulled_into_the_ground() -> None:
     """Half a step later a push at its tip would speed up the approach; it used to gain any speed by that."""
     low = 0.476

@@ -45,7 +45,7 @@ def relative(states: dict[str, Array]) -> Rotation:
     return b.inv() * a
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@few("kind", KINDS, 2)
 def test_what_is_locked_stays_locked(kind: str) -> None:
     world, states = tumbling(kind)
     if kind != "slider":

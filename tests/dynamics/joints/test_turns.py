@@ -7,6 +7,7 @@ from math import pi
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 
 import symphys
 from symphys import (
@@ -50,7 +51,7 @@ def turned(
     return symphys.simulate(Problem.from_world(world, duration=duration, dt=dt, variables=variables))
 
 
-@pytest.mark.parametrize("amplitude", [1.0, 3.25, 5.0, 31.0, 1000.0])
+@few("amplitude", [1.0, 3.25, 5.0, 31.0, 1000.0], 2)
 def test_a_spring_swings_alike_at_all_amplitudes(amplitude: float) -> None:
     """Angle A sin 2t, to second order in dt; a spring is linear, also where a step makes 30 turns."""
     off = []
@@ -177,6 +178,7 @@ def crank(closing: str) -> Trajectory:
     return symphys.simulate({"simulation": {"duration": 3.0, "dt": 0.005}, **tables, "variable": [push]})
 
 
+@pytest.mark.slow
 def test_a_joint_that_closes_a_loop_winds_like_one_of_a_tree() -> None:
     by_tree, closing = crank("pivot"), crank("axle")
     assert by_tree["axle.angle"][-1] > 2 * 2 * pi

@@ -55,6 +55,7 @@ def test_steps_that_are_built_together_are_those_built_alone(name: str) -> None:
         same(steps.step(scheme), step_function(world, scheme, INPUTS), world)
 
 
+@pytest.mark.slow
 def test_what_steps_have_in_common_is_built_once(monkeypatch: pytest.MonkeyPatch) -> None:
     built, build = 0, Tracer._build
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
+from tools.repeats import few
 
 from symphys.model.shapes import SHAPES, Box, Capsule, Convex, Cylinder, Ellipsoid, Shape, Sphere
 from symphys.model.shapes.inertia import centre_of_mass, specific
@@ -47,7 +48,7 @@ def inside(shape: Shape, points: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray((outside**2).sum(axis=1) <= hull.radius**2 + 1e-12)
 
 
-@pytest.mark.parametrize("shape", SOLIDS, ids=[each.kind for each in SOLIDS])
+@few("shape", SOLIDS, ids=[each.kind for each in SOLIDS], count=2)
 def test_volume_moments_and_extent_are_those_of_its_points(shape: Shape) -> None:
     points, each = grid(shape)
     assert shape.volume == pytest.approx(len(points) * each, rel=1e-2)

@@ -110,6 +110,7 @@ def test_any_content_is_numbers_or_a_fault(content: bytes) -> None:
     assert found.shape[1] == 2 and not np.isinf(found).any()
 
 
+@pytest.mark.slow
 def test_long_files_are_read_by_chunks_into_the_memory_of_their_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     """No chunk goes cell by cell, and rows are filled in where they stay; what is held beside them is a few chunks."""
     monkeypatch.setattr(csv_file, "CHUNK", 1 << 14)

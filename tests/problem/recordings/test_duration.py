@@ -65,6 +65,7 @@ def test_times_that_no_simulation_takes_are_refused_with_what_may_be_wrong() -> 
         loaded({"table": {"t": [0.0, 0.1], "z": [1.0, 1.0]}})
 
 
+@pytest.mark.slow
 def test_it_can_be_identified() -> None:
     time = np.arange(0, 0.3, 0.01)
     table = {"time": time.tolist(), "z": (1 - 9.81 / 2 * time**2 + 0.2 * time).tolist()}

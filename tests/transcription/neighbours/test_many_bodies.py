@@ -159,6 +159,7 @@ def test_boxes_are_those_of_all_pairs() -> None:
         np.testing.assert_allclose(slopes[k, :-1], right, atol=1e-6 * np.abs(right).max())
 
 
+@pytest.mark.slow
 def test_room_for_pairs_grows() -> None:
     """More pairs than there is room for at first are computed none the less, with slopes, and in all lanes."""
     places = [(0.12 * (i % 3), 0.12 * (i // 3), 0.1) for i in range(9)]
@@ -177,6 +178,7 @@ def test_room_for_pairs_grows() -> None:
         assert (alone[1][0] == slope).all()
 
 
+@pytest.mark.slow
 def test_no_number_is_read_before_it_is_computed() -> None:
     """Memories of work that hold no numbers give the same."""
     world = World(bodies(["sphere"] * 6), PLANES)
@@ -195,6 +197,7 @@ def test_no_number_is_read_before_it_is_computed() -> None:
         kernel.rollouts(rows[:, :3], given(kernel, 2), 1)
 
 
+@pytest.mark.slow
 def test_momentum_and_energy_stay() -> None:
     """A cloud of elastic spheres without friction and gravity: laws that hold however many bodies meet."""
     random, count = np.random.default_rng(5), 40

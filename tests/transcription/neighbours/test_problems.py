@@ -109,6 +109,7 @@ def test_pairs_are_found_or_listed(pair: tuple[Transcription, Transcription]) ->
     assert "finds the pairs" in str(near.backend)
 
 
+@pytest.mark.slow
 def test_values_and_gradients_are_those_of_the_list(pair: tuple[Transcription, Transcription]) -> None:
     Z = np.array([pair[1].shooting.start(seed) for seed in range(5)])
     here, there = (made.shooting.evaluator.gradient(Z, 0.0) for made in pair)

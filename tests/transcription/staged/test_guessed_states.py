@@ -55,6 +55,7 @@ def test_a_formula_and_rates_of_its_own() -> None:
     assert rate == pytest.approx(2.0)
 
 
+@pytest.mark.slow
 def test_what_is_not_named_is_as_in_the_rollout() -> None:
     """And steps from a guess that is the rollout lead along it: all that a state holds is as after a step."""
     made, z, found = stages(states=[{"at": 0.0, "elbow.rate": 1.0}])
@@ -219,6 +220,7 @@ def test_a_ball_joint_turns_on_the_geodesic(tmp_path: Path) -> None:
     assert rotated(inverse(x["top.orientation"]), spin) == pytest.approx([1, 2, 3], abs=1e-8)
 
 
+@pytest.mark.slow
 def test_a_recorded_motion_is_met(tmp_path: Path) -> None:
     """Of a body on its own and of one that hangs on its ball joint, from another start: all places and velocities."""
     (tmp_path / "top.toml").write_text(TOP + ARM, encoding="utf-8")

@@ -73,6 +73,7 @@ def apart(made: Linearization, smoothing: float = 0.0) -> float:
     return float(np.abs(chained(made, z, weights, smoothing) - aim).max() / np.abs(aim).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KERNELS)
 def test_chained_slopes_are_the_adjoint(name: str) -> None:
     """In ``leg`` a parameter moves a joint, and with it the first state."""
@@ -132,6 +133,7 @@ def test_small_batches_are_prepared_once_and_differences_compiled() -> None:
         np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_states_and_threads_do_not_change_each_others_numbers() -> None:
     made = [compiled("ball_throw", threads) for threads in (1, 2)]
     motion = made[0].motion(guess_of(made[0].rollout.problem), 0.0)

@@ -12,6 +12,7 @@ from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
 from symphys.transcription import transcribe
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fastest_move", "pendulum"])
 def test_motions_under_a_policy_are_those_of_single_steps(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """With knots that act in several steps, a duration that varies, and bounds that hold some knots."""

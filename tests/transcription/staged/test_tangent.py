@@ -44,6 +44,7 @@ def test_states_of_a_rollout_lie_in_each_others_tangents(name: str, tmp_path: Pa
     assert np.abs(found - after).max() < 1e-13 * max(1.0, np.abs(after).max())
 
 
+@pytest.mark.slow
 @few("name", WORLDS, 1)
 def test_difference_undoes_retract(name: str, tmp_path: Path) -> None:
     tangent, states, p = states_of(name, tmp_path)

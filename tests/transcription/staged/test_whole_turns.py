@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 
 import symphys
 from symphys.dynamics.observation import reading_function
@@ -41,7 +42,7 @@ def wheel(**joint: Any) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("joint", [{}, {"frequency": 30.0}], ids=["tree", "soft"])
+@few("joint", [{}, {"frequency": 30.0}], ids=["tree", "soft"], count=1)
 def test_tangents_go_through_whole_turns(joint: dict[str, Any]) -> None:
     """A state that is d away has an angle that is d more, and the difference of states of a rollout leads there."""
     problem = symphys.load(wheel(**joint))
@@ -77,7 +78,7 @@ def test_measured_angles_count_turns() -> None:
         assert reader.values(measured)["axle.angle"] == pytest.approx(angle, abs=1e-12)
 
 
-@pytest.mark.parametrize("solver", ["ilqr", "multiple_shooting"])
+@few("solver", ["ilqr", "multiple_shooting"], 1)
 def test_solvers_over_states_swing_through_turns(solver: str) -> None:
     """The optimum of a linear system: that of least squares, which knows nothing of states."""
     solution = symphys.solve(wheel(), solver=solver, backend="casadi")
