@@ -24,6 +24,7 @@ def test_rows_are_those_alone(rollout: symphys.CompiledRollout) -> None:
     assert np.array_equal(value, rollout.value(Z)) and np.array_equal(slope, rollout.gradient(Z))
 
 
+@pytest.mark.slow
 def test_gradient_by_differences(rollout: symphys.CompiledRollout) -> None:
     z, h = rollout.z(throw=[1.2, 0.1, 0.4]), 1e-6
     sides = [rollout.value(z + sign * h * np.eye(rollout.n)) for sign in (1, -1)]

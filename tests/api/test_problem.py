@@ -73,6 +73,7 @@ def test_what_is_written_is_the_problem(problem: symphys.Problem, tmp_path: Path
     assert (float(last.parameters["ball.mass"][0]), float(last.parameters["ground.friction"][0])) == (2.0, 0.25)
 
 
+@pytest.mark.slow
 def test_a_robot_is_changed_by_its_own_names() -> None:
     """What an included file says is set like the problem's own, and written with it."""
     changed = symphys.load("quadruped_walk").set("torso.mass", 3.0)

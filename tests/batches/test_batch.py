@@ -95,6 +95,7 @@ def test_a_second_ctrl_c_stops_at_once(make_job: MakeJob, recorder: Any) -> None
         run_batch([make_job()], 1, recorder, transcribe)
 
 
+@pytest.mark.slow
 def test_a_transcription_is_made_once_per_problem(make_job: MakeJob, recorder: Any) -> None:
     made = []
 

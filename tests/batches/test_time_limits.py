@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 from tools.waiting import assert_gone, wait_for
 
 from symphys.batches import BatchLimits, limits, pool, run_batch
@@ -102,7 +103,7 @@ def limited(job: Job, recorder: Any, transcription: Callable[..., Any], bounds: 
     return result
 
 
-@pytest.mark.parametrize("at", ["building", "solving", "judging"])
+@few("at", ["building", "solving", "judging"], 1)
 def test_a_run_that_hangs_for_ever_ends_with_its_best_point_and_goes_on(
     hanging: ModuleType, job: Job, recorder: Any, monkeypatch: pytest.MonkeyPatch, at: str
 ) -> None:
@@ -133,6 +134,7 @@ def test_a_run_that_hangs_for_ever_ends_with_its_best_point_and_goes_on(
         assert kept.z == whole.z
 
 
+@pytest.mark.slow
 def test_the_iterations_of_a_run_that_was_killed_are_kept(
     hanging: ModuleType, job: Job, recorder: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -51,6 +51,7 @@ def test_check_calls_no_gradient_right_that_nothing_depends_on(run: Run, throw: 
     assert "gradient is right" not in words and "reaches" not in words
 
 
+@pytest.mark.slow
 def test_check_tells_of_falls_and_scenarios(run: Run, throw: Path) -> None:
     text = throw.read_text(encoding="utf-8")
     more = '[fall]\nmargin = "ball.position[2] + 9"\n[[scenario]]\nname = "masses"\nsets = "ball.mass"\nfactor = 0.1\n'

@@ -11,6 +11,7 @@ from worlds.toys import require
 from symphys.cli.app import main
 
 
+@pytest.mark.slow
 def test_a_fit_whose_spins_are_not_determined_has_converged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Exit code 0: nothing is doubted, and what is vague is named."""
     require("simd")
@@ -23,6 +24,7 @@ def test_a_fit_whose_spins_are_not_determined_has_converged(tmp_path: Path, caps
     assert "doubt" not in text
 
 
+@pytest.mark.slow
 def test_a_fit_of_a_wrong_model_is_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Exit code 1: gravity is another one."""
     require("simd")

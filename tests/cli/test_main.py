@@ -208,6 +208,7 @@ def test_a_read_only_out_exits_2(run: Run, throw: Path) -> None:
     assert code == 2 and "permission denied" in err
 
 
+@pytest.mark.slow
 def test_a_failing_run_stops_no_other(run: Run, throw: Path, tmp_path: Path) -> None:
     """A root of a negative number is no fault of the file, but of its motion."""
     wild = tmp_path / "wild.toml"

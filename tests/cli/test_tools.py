@@ -108,7 +108,7 @@ def test_a_cache_that_cannot_be_written_is_named(run: Run, tmp_path: Path, monke
     assert "set SYMPHYS_CACHE to another folder" in text
 
 
-@pytest.mark.parametrize(("what", "line"), [("interpret", "kernel, values"), ("ca.has_nlpsol", "ipopt")])
+@few(("what", "line"), [("interpret", "kernel, values"), ("ca.has_nlpsol", "ipopt")], 1)
 def test_what_is_needed_and_does_not_work_exits_1(
     run: Run, cache: Path, monkeypatch: Patch, what: str, line: str
 ) -> None:

@@ -123,6 +123,7 @@ def test_slopes_of_a_step_are_those_of_casadi(kick: Transcription, folder: Path,
     assert np.abs(c).max() > 1e-3
 
 
+@pytest.mark.slow
 def test_two_threads_do_not_disturb_each_other(kick: Transcription, folder: Path, library: Any) -> None:
     define = defined(folder)
 

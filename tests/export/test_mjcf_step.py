@@ -73,6 +73,7 @@ def test_inertias_are_those_of_the_mass_matrix() -> None:
         assert inertia * give[model.joint(name).dofadr[0]] == pytest.approx(1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia", [1e-4, 1e-2])
 def test_a_velocity_motor_settles_at_its_command(inertia: float) -> None:
     """However light the wheel: at 10 ms its torque alone would throw the lighter one to 100 rad/s."""

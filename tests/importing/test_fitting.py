@@ -55,6 +55,7 @@ def test_a_mesh_of_a_shape_is_that_shape(kind: str) -> None:
     assert shape.volume == pytest.approx(solid.shape().volume, rel=0.06)
 
 
+@pytest.mark.slow
 def test_a_shape_is_told_from_others() -> None:
     solid = Placed("box", PLACE, TURN, np.array(SIZES["box"]))
     found = fits(*mesh(solid.surface()), kinds=("sphere", "capsule", "box"))

@@ -27,6 +27,7 @@ def robot(name: str) -> tuple[Imported, Match]:
     return found, matched(found.problem.world(), found.placed, gymnasium_model(name).reference())
 
 
+@pytest.mark.slow
 @first("name", MODELS)
 def test_masses_and_mass_matrix_at_random_poses(name: str) -> None:
     match, rng = robot(name)[1], np.random.default_rng(0)

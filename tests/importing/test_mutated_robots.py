@@ -20,6 +20,7 @@ pytest.importorskip("mujoco")
 CASES = 6
 
 
+@pytest.mark.slow
 @few("name", MODELS, 1)
 def test_a_broken_model_is_a_robot_or_a_message(tmp_path: Path, name: str) -> None:
     dice, seen = random.Random(7), set[bool]()

@@ -55,6 +55,7 @@ def test_a_chain_of_welded_bodies_and_several_joints() -> None:
     assert off[:3] == pytest.approx([4 * each for each in off[3:]], rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_floating_body_with_a_ball_joint() -> None:
     tables, _ = read(FLYER)
     coarse, fine = errors(FLYER, tables, 0.3, {name: name for name in ("trunk", "arm", "wheel")})
@@ -74,6 +75,7 @@ MOTORS = """<worldbody><body name="a"><joint name="one" axis="0 1 0" ref="0.2"/>
 <motor name="pull" tendon="string" gear="0.8" ctrlrange="-9 9"/></actuator>"""
 
 
+@pytest.mark.slow
 def test_motors_act_as_mujoco_has_them() -> None:
     """Command 0.6: beyond the range of the servo and the force of the push."""
     tables, _ = read(MOTORS)

@@ -64,6 +64,7 @@ def test_left_alone_it_does_not() -> None:
     assert [float(part) for part in read(x, [])[:2]] == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_plant_has_the_masses_and_the_step_that_are_asked_for() -> None:
     plant = heavy()
     assert (plant.substeps, plant.dt) == (2, pytest.approx(0.01))
@@ -119,6 +120,7 @@ def test_time_does_not_go_back() -> None:
         made(made.start, 0.5)
 
 
+@pytest.mark.slow
 def test_feedback_answers_by_the_gains() -> None:
     """A disturbed state changes the command by gain times how far it is, within the bounds."""
     made, upright = controller(), swing().x[-1]

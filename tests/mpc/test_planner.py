@@ -74,6 +74,7 @@ def test_slopes_and_curvature_of_costs_are_those_of_the_staged_problem() -> None
     assert costs.curve[:-1, n:, n:] == pytest.approx(wanted.uu, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_feedback_of_a_plan_is_that_of_the_backward_pass() -> None:
     """With decisions that are held by their bounds among them."""
     found = motion(plan().v.ravel())

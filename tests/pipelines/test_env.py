@@ -11,6 +11,8 @@ from worlds.driven import TABLES
 
 import symphys
 
+pytestmark = pytest.mark.slow
+
 gymnasium: Any = pytest.importorskip("gymnasium")
 K = np.array([[-4], [-1], [2], [0.5]])
 

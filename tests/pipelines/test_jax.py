@@ -10,6 +10,8 @@ import pytest
 
 import symphys
 
+pytestmark = pytest.mark.slow
+
 jax: Any = pytest.importorskip("jax")
 
 

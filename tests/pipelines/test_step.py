@@ -10,6 +10,8 @@ from worlds.driven import TABLES
 
 import symphys
 
+pytestmark = pytest.mark.slow
+
 K, B = np.array([-4, -1, 2, 0.5]), 0.0
 
 

@@ -9,6 +9,8 @@ import pytest
 
 import symphys
 
+pytestmark = pytest.mark.slow
+
 torch: Any = pytest.importorskip("torch")
 
 

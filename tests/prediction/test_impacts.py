@@ -77,6 +77,7 @@ def test_rows_have_the_time_since_the_impacts_of_the_simulation() -> None:
     assert found.quantities[0].verdict == "noise"
 
 
+@pytest.mark.slow
 def test_impacts_are_on_the_clock_of_the_recording() -> None:
     """That began 0.05 s after the simulation: its first sample is then."""
     residuals = residuals_of(problem(clock=0.05), threads=1)
@@ -85,6 +86,7 @@ def test_impacts_are_on_the_clock_of_the_recording() -> None:
     assert late[0] == pytest.approx(np.floor(first * 100) / 100 - 0.05, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_what_rings_after_impacts_is_missing_after_impacts() -> None:
     """By the time since the impact, which differs from drop to drop."""
     found = symphys.identify(problem(ringing=0.01), threads=1)

@@ -11,6 +11,8 @@ from scipy.spatial.transform import Rotation
 import symphys
 from symphys.prediction.residuals import RecordingResiduals, residuals_of
 
+pytestmark = pytest.mark.slow
+
 FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 TURN = np.array([0.9, 0.1, -0.3, 0.3]) / np.linalg.norm([0.9, 0.1, -0.3, 0.3])
 TRUE = {

@@ -39,6 +39,7 @@ def from_height(guess: float) -> symphys.Problem:
     return symphys.load(dropped(guess) | {"variable": [height], "recording": [recording]})
 
 
+@pytest.mark.slow
 @few(("guess", "wrong"), [(0.2, 0.265), (1.0, 0.885)], 1)
 def test_the_check_finds_the_drop_that_bounces_as_measured(guess: float, wrong: float) -> None:
     plain = symphys.identify(from_height(guess), threads=1)

@@ -24,6 +24,7 @@ def found(table: dict[str, Any], **others: Any) -> Identification:
     return made
 
 
+@pytest.mark.slow
 @few(
     "table",
     [

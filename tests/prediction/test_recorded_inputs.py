@@ -78,6 +78,7 @@ def test_gain_delay_damping_friction_and_armature_are_found(interpolation: str) 
         assert abs(problem.variables[list(SETS).index(name)].guess[0] - truth) > 0.2 * truth, "begins elsewhere"
 
 
+@pytest.mark.slow
 @few("interpolation", WAYS, 1)
 def test_residuals_have_the_derivatives_of_differences(interpolation: str) -> None:
     """By the numbers of the motor, the delay, and the clock of each recording, which moves its commands too."""

@@ -45,6 +45,7 @@ def found(start_values: bool, *more: dict[str, Any]) -> Identification:
     return identify(residuals_of(recorded(*more), threads=1), options)
 
 
+@pytest.mark.slow
 def test_a_ball_that_sticks_at_the_guess_is_fitted_where_it_slides() -> None:
     stuck = found(False)
     assert stuck["friction"].value == 1.0 and np.isinf(stuck["friction"].error) and not stuck.starts
@@ -56,6 +57,7 @@ def test_a_ball_that_sticks_at_the_guess_is_fitted_where_it_slides() -> None:
     assert note in summary(free)
 
 
+@pytest.mark.slow
 def test_a_number_without_an_effect_anywhere_stays_at_its_guess() -> None:
     mass = {"name": "mass", "sets": "ball.mass", "guess": 0.3, "lower": 0.05, "upper": 3.0}
     both = found(True, mass)

@@ -69,6 +69,7 @@ def test_the_numbers_of_the_truth_leave_no_error(tosses: Tosses, tmp_path: Path)
     assert made.errors({**TRUE, "friction": 0.3}).mean(axis=0).min() > 1
 
 
+@pytest.mark.slow
 def test_flights_end_before_impacts(tosses: Tosses) -> None:
     frames, height = flights(CUBE, tosses), clearance(CUBE, tosses)
     for k, count in enumerate(frames):
@@ -77,6 +78,7 @@ def test_flights_end_before_impacts(tosses: Tosses) -> None:
         assert height[tosses.rows(k)][count:].min() < 0.02
 
 
+@pytest.mark.slow
 def test_flights_tell_gravity_centre_of_mass_and_starts(tosses: Tosses, tmp_path: Path) -> None:
     found = fly(CUBE, [tosses], tmp_path / "flights.npz")
     assert found["g"].value == pytest.approx(-GRAVITY, rel=1e-4)

@@ -12,6 +12,7 @@ from symphys.problems import find
 from symphys.transcription import transcribe
 
 
+@pytest.mark.slow
 def test_the_guess_of_arm_ball_touches_nothing_and_the_arm_does_not_fall() -> None:
     """Where the fingertip is follows from the lengths of the links; without torques it stays there for a second."""
     made = shipped("arm_ball", "casadi")
@@ -24,6 +25,7 @@ def test_the_guess_of_arm_ball_touches_nothing_and_the_arm_does_not_fall() -> No
     assert np.ptp(motion["ball.position"][:, 0]) == 0.0
 
 
+@pytest.mark.slow
 def test_without_the_laws_that_hold_the_arm_it_falls() -> None:
     held = load_problem(find("arm_ball")).set({"force.upper_held.value": "0", "force.fore_held.value": "0"})
     fallen = transcribe(held, backend="casadi")
@@ -34,6 +36,7 @@ def test_the_net_of_arm_reach_has_as_many_weights_as_that_of_the_paper() -> None
     assert sum(variable.guess.size for variable in load_problem(find("arm_reach")).variables) == 17284
 
 
+@pytest.mark.slow
 def test_the_guess_of_the_spinner_touches_nothing_and_influences_nothing() -> None:
     made = shipped("spinner", "casadi")
     motion = made.simulate(made.shooting.start(0))
@@ -44,6 +47,7 @@ def test_the_guess_of_the_spinner_touches_nothing_and_influences_nothing() -> No
     assert np.abs(motion["axle.angle"]).max() == 0.0
 
 
+@pytest.mark.slow
 def test_a_short_descent_lowers_the_cost_of_the_spinner() -> None:
     before, after = short_descent("spinner", 6)
     assert after < before - 0.05

@@ -35,6 +35,7 @@ def test_the_formula_of_the_stairs() -> None:
     np.testing.assert_allclose([flights.RESTITUTION, flights.APEX], [0.7565, 0.2275], rtol=0, atol=5e-5)
 
 
+@pytest.mark.slow
 def test_without_a_hand_the_dribbled_ball_comes_less_high() -> None:
     """A hand that carries itself only: the ball falls, and comes back to 0.64 of its height."""
     motion = shipped("dribble", "casadi").simulate(np.full(40, GRAVITY))

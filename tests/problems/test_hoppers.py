@@ -14,6 +14,7 @@ from symphys.transcription import transcribe
 GRAVITY, KNOTS, STEPS, STARTS = 9.81, 21, 200, 7
 
 
+@pytest.mark.slow
 def test_in_flight_the_centre_of_mass_falls_freely() -> None:
     """Thrust and hip are inner forces: they change neither its fall nor its speed ahead; the trolley does not fall."""
     made = shipped("hopper_gait", "casadi")
@@ -63,6 +64,7 @@ def test_a_short_descent_takes_the_jump_nearer() -> None:
     assert after < 0.65 * before
 
 
+@pytest.mark.slow
 def test_springs_hold_up_the_planar_hopper_in_the_guess() -> None:
     """It stays within 3 cm of its pose, on its foot, and the ground carries its weight."""
     made = shipped("planar_hopper", "casadi")
@@ -73,6 +75,7 @@ def test_springs_hold_up_the_planar_hopper_in_the_guess() -> None:
     np.testing.assert_allclose(carried, [0, 0, sum(hops.PLANAR_HOPPER.values()) * GRAVITY], atol=0.05)
 
 
+@pytest.mark.slow
 def test_with_its_leg_straight_down_the_guess_hops_on_the_spot() -> None:
     """Nothing pushes it aside, and in its three flights the centre of mass falls freely: thrust is an inner force."""
     made = shipped("three_hops", "casadi")
@@ -85,6 +88,7 @@ def test_with_its_leg_straight_down_the_guess_hops_on_the_spot() -> None:
     assert np.abs(motion["foot.position"][:, 0]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_three_hops_forget_another_start() -> None:
     """Of 0.3 m/s at the start, with the same commands, less than a twentieth is left after three hops."""
     made = shipped("three_hops", "casadi")

@@ -102,6 +102,7 @@ def test_friction_carries_the_box_with_mu_g_at_most(share: float) -> None:
     assert abs(motion["box_pitch.angle"][after]) < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.98, 1.1])
 def test_the_fastest_move_without_a_slip(share: float) -> None:
     """Bang-bang control at the limit of friction: d = (T / 2)^2 mu g, of which ramps of 0.1 s leave 9 tenths."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from data.shipped import shipped, solve
 from worlds import swings
 
@@ -43,6 +44,7 @@ def test_without_walls_the_pole_falls() -> None:
     assert np.tan(0.5) > 3 / ((1.0 + 0.1) * 9.81)
 
 
+@pytest.mark.slow
 def test_a_swing_that_half_the_step_refutes_is_not_solved() -> None:
     """Torques that are held, in steps of 0.1 s: what meets all there misses by twenty tolerances at half the step."""
     held = {"simulation.dt": 0.1, "twist.interpolation": "constant", "twist.knots": 20}

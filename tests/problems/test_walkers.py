@@ -20,6 +20,8 @@ from symphys.shooting import Array, ScenarioEvaluator
 from symphys.solvers import SOLVERS, Outcome
 from symphys.transcription import Transcription, transcribe
 
+pytestmark = pytest.mark.slow
+
 THIGH, SHANK, FOOT, GRAVITY = 0.209, 0.182126, 0.0175, 9.81
 UNSEEN, SPEED = 4711, "speed [m/s]"
 

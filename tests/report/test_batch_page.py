@@ -29,6 +29,7 @@ def page(made: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, st
     return folder, read(folder)
 
 
+@pytest.mark.slow
 def test_page_compares_all_solvers(page: tuple[Path, str]) -> None:
     text = plain(page[1])
     for word in ("Throw a giant soccer ball", "Two balls, one push", "5 of 5", "0 of 1", "not finite", "budget spent"):
@@ -60,6 +61,7 @@ def test_broken_and_foreign_folders_are_listed(page: tuple[Path, str]) -> None:
     assert re.search(r"elsewhere result.json: a JSON object is expected", text)
 
 
+@pytest.mark.slow
 def test_page_needs_nothing_else_and_is_the_same_again(page: tuple[Path, str]) -> None:
     batch, text = page
     assert "http://" not in text

@@ -23,6 +23,8 @@ from symphys.results.scene import Scene
 from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory
 
+pytestmark = pytest.mark.slow
+
 TRUST = {
     "energy": {key: [0.0, 1.0, 2.0] for key in ("time", "kinetic", "potential", "applied", "contact")},
     "growth": {"time": [0.0, 1.0, 2.0], "factor": [4.0, 2.0, 1.0]},

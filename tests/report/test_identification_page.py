@@ -74,6 +74,7 @@ def test_it_says_what_was_found(folder: Path) -> None:
     assert "Among the worst: drops/0002 Held back" in page
 
 
+@pytest.mark.slow
 def test_figures_hold_the_numbers(folder: Path) -> None:
     found = read_identification(folder)
     table = (folder / "figures" / "course.csv").read_text("utf-8")

@@ -57,6 +57,7 @@ def test_saturation_is_the_share_of_the_time_at_the_bounds(load: Load) -> None:
     assert motors_sentence([]) == ""
 
 
+@pytest.mark.slow
 def test_saturation_is_marked_where_it_is(load: Load) -> None:
     _, figure = draw_joints(*load(worked()))
     assert figure is not None

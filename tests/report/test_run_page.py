@@ -92,6 +92,7 @@ def test_page_tells_names_status_and_numbers(shown: Shown) -> None:
     assert "Agrees with finite differences." in page.text
 
 
+@pytest.mark.slow
 def test_page_needs_nothing_else(shown: Shown) -> None:
     text = shown.text
     page = Page(text)
@@ -286,7 +287,7 @@ def test_energy_is_drawn_where_it_was_recorded(run_dir: Path, edit: Callable[...
     assert "Angular momentum is not checked" in Page(text).text
 
 
-@pytest.mark.parametrize("entry", [[1, 2], {"time": [0, 1]}, {"time": [0], "factor": ["nan"]}, "text", None])
+@few("entry", [[1, 2], {"time": [0, 1]}, {"time": [0], "factor": ["nan"]}, "text", None], 3)
 def test_what_cannot_be_drawn_is_left_out(run_dir: Path, edit: Callable[..., None], entry: object) -> None:
     edit(run_dir / "result.json", trust={"energy": entry, "growth": entry, "gains": entry, "slides": entry})
     for name in ("trajectory.npz", "guess.npz"):

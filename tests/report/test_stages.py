@@ -125,6 +125,7 @@ def test_boundaries_and_exact_ends_are_where_the_stages_change(staged: Path) -> 
     assert ends == [(x[end], each["exact_objective"], each["solved"]) for end, each in zip(ENDS, STAGES, strict=True)]
 
 
+@pytest.mark.slow
 def test_the_figure_marks_them(staged: Path) -> None:
     run = run_of(staged)
     figure = draw_run(run)

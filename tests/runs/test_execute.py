@@ -100,6 +100,7 @@ def test_what_is_met_by_a_motion_that_cannot_be_is_not_solved(problem_file: Path
         assert standing(job).result == result
 
 
+@pytest.mark.slow
 @few(("status", "verdict"), [("budget", "best_found"), ("stalled", "best_found"), ("met", "solved")], 1)
 def test_with_nothing_to_meet_only_a_stationary_point_is_solved(
     problem_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: str, verdict: str

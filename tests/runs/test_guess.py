@@ -167,6 +167,7 @@ def test_the_page_says_where_it_starts(cart: Problem, found: Solution, tmp_path:
         assert (f"It starts from what {found.folder} found" in page) == told
 
 
+@pytest.mark.slow
 def test_multipliers_are_kept_and_taken(cart: Problem, found: Solution, tmp_path: Path) -> None:
     """A second solve from a finished run takes no iteration, and without the multipliers it takes some."""
     assert (found.folder / MULTIPLIERS).exists()

@@ -199,6 +199,7 @@ def test_a_real_full_disk_while_a_kernel_is_compiled_is_named(
     assert list((tmp_path / "cache").glob("*.so")) == []
 
 
+@pytest.mark.slow
 def test_a_kernel_that_a_real_full_disk_does_not_keep_is_used(disk: SmallDisk, compiler: None) -> None:
     own = Cache(disk.path / "cache")
     disk.fill(4096)
@@ -226,6 +227,7 @@ def test_a_cache_on_a_disk_that_can_only_be_read_is_used(
     assert main(["cache", "info"]) == 0
 
 
+@pytest.mark.slow
 def test_a_run_and_a_report_on_a_disk_that_can_only_be_read_say_so(
     disk: SmallDisk, make_job: Callable[..., Job], problem_file: Path, tmp_path: Path, capsys: Capture
 ) -> None:

@@ -43,6 +43,7 @@ def folder(solved: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(solved, tmp_path / "run"))
 
 
+@pytest.mark.slow
 def test_a_run_is_the_same_to_the_bit(folder: Path) -> None:
     found = replay(folder)
     assert found.same and found.instants == 21 and not found.elsewhere

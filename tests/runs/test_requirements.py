@@ -99,6 +99,7 @@ def test_the_same_command_does_it_where_there_is_one(
     ]
 
 
+@pytest.mark.slow
 def test_what_was_begun_goes_on_after_a_refusal(varied: Path, tmp_path: Path, compiler: None) -> None:
     """An interrupted run keeps its checkpoint on a machine that cannot go on with it."""
     job, seen = job_of(varied, tmp_path), list[int]()

@@ -21,6 +21,8 @@ from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.solvers import TraceRow
 from symphys.transcription import Transcription, transcribe
 
+pytestmark = pytest.mark.slow
+
 SMOOTHINGS = [0.1, 0.01, 0.0]
 
 

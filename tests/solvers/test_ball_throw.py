@@ -60,12 +60,13 @@ def test_least_squares(backend: str, distance: float) -> None:
 
 
 @pytest.mark.slow
-@few("hessian", ["limited-memory", "exact"], 2)
+@pytest.mark.parametrize("hessian", ["limited-memory", "exact"])
 @every_throw
 def test_ipopt(backend: str, distance: float, hessian: str) -> None:
     assert solve("ipopt", throw(distance, backend), options={"hessian": hessian}).status is Status.MET
 
 
+@pytest.mark.slow
 @few("backend", ["casadi", "c", "simd"], 1)
 @seeds(3)
 def test_cma(backend: str, seed: int) -> None:

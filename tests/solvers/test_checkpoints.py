@@ -36,7 +36,9 @@ def same(a: Outcome, b: Outcome) -> None:
 
 
 @few(("name", "options"), EXACT, 2)
-@few("problem", [pytest.param(rosenbrock(), id="rosenbrock"), pytest.param(target(), id="target", marks=THOROUGH)], 2)
+@pytest.mark.parametrize(
+    "problem", [pytest.param(rosenbrock(), id="rosenbrock"), pytest.param(target(), id="target", marks=THOROUGH)]
+)
 def test_the_same_to_the_last_bit(name: str, options: dict[str, Any], problem: Any) -> None:
     whole = solve(name, problem, seed=2, options=options)
     for stop in {0, 1, 2, len(whole.trace) // 2, len(whole.trace) - 2, len(whole.trace) - 1}:
@@ -47,8 +49,8 @@ def test_the_same_to_the_last_bit(name: str, options: dict[str, Any], problem: A
         same(rest, whole)
 
 
-@few("name", ["gradient", "least_squares", "cma"], 7)
-@few("evaluation", [1, 2, 5, 8], 7)
+@pytest.mark.parametrize("name", ["gradient", "least_squares", "cma"])
+@few("evaluation", [1, 2, 5, 8], 2)
 def test_interrupted_in_the_middle_of_an_evaluation(name: str, evaluation: int) -> None:
     problem = rosenbrock()
     kind = {"gradient": "value", "least_squares": "residuals", "cma": "value"}[name]

@@ -39,6 +39,7 @@ def test_the_acrobot_swings_up_from_rest() -> None:
     assert last == pytest.approx([np.pi, 0, 0, 0], abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_body_turns_by_180_degrees() -> None:
     found = solve(boxed(attitude()))
     assert found.status is Status.CONVERGED

@@ -19,6 +19,7 @@ from symphys.solvers.methods.multiple_shooting import DEFECT
 from symphys.solvers.multiple_shooting.multipliers import fitted
 
 
+@pytest.mark.slow
 @few(("backend", "hessian", "every"), [(*way, every) for way, every in zip(WAYS, (1, 4, 4, 1), strict=True)], 1)
 def test_acrobot_swings_up_from_a_straight_line(backend: str, hessian: str, every: int) -> None:
     """Hanging to upright through states that no motion has, without a guess of the controls."""
@@ -50,6 +51,7 @@ def test_angles_that_are_known_but_for_whole_turns(backend: str) -> None:
     assert len(wrapped.trace) == len(known.trace)
 
 
+@pytest.mark.slow
 @every_way
 def test_a_body_turns_by_180_degrees(backend: str, hessian: str) -> None:
     """And by 60 about another axis: tangents turn far, so the nodes get new references."""
@@ -171,6 +173,7 @@ def test_a_motion_on_another_grid_is_a_guess() -> None:
     assert len(again.trace) < len(solve(fine, nodes=LINE).trace)
 
 
+@pytest.mark.slow
 def test_what_no_step_depends_on_stays() -> None:
     """A knot without weight keeps its guess."""
     chain = pendulum(knots=11)

@@ -137,8 +137,8 @@ def lost(found: Outcome, problem: ShootingProblem, name: str, seen: list[Seen]) 
     return [each for each in seen if each.rank(problem, name) < min(ranks)]
 
 
-@few("name", PLAIN, 12)
-@few("kind", PROBLEMS, 12)
+@few("name", PLAIN, 4)
+@few("kind", PROBLEMS, 2)
 @seeds(4)
 def test_the_result_is_the_best_of_what_was_evaluated(name: str, kind: str, seed: int) -> None:
     problem, evaluator = recorded(PROBLEMS[kind]())
@@ -233,8 +233,8 @@ def sampled(name: str, winds: Watched, smoothings: tuple[float, ...] = (0.0,), s
     return SOLVERS[name].solve(problem, BEST + 2.5, SOLVERS[name].Options(**options), seed)
 
 
-@few("name", SAMPLED, 5)
-@few("kind", HILLS, 5)
+@few("name", SAMPLED, 2)
+@few("kind", HILLS, 2)
 def test_where_samples_differ_the_guess_is_validated_too(name: str, kind: str) -> None:
     for seed in range(3):
         winds = Watched(*HILLS[kind])

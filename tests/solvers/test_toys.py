@@ -212,7 +212,7 @@ def test_cma_leaves_the_global_random_stream_alone() -> None:
 
 
 @every_way
-@few("backend", ["c", "simd"], 2)
+@pytest.mark.parametrize("backend", ["c", "simd"])
 def test_compiled_toys(backend: str, name: str, options: dict[str, Any]) -> None:
     require(backend)
     assert solve(name, quadratic(backend=backend), options=options).z == pytest.approx([1, 2, 3], abs=1e-3)

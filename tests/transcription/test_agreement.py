@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 HEAVY = {"load on two boards", "inertia and centre of mass", "loop of joints"}
 """What takes seconds to build, or minutes."""
-COMPILED = {"impacts with friction", "smoothed contact", "references", "universal joint", "sensors and controllers"}
+COMPILED = {"impacts with friction", "smoothed contact", "references"}
 """What is compiled in every run of the tests; kernels of the others in those of ``make test-all``."""
 
 

@@ -65,6 +65,7 @@ def motion(file: Path, marker: ArrayLike = (0, 0, 0)) -> np.ndarray:
     return np.hstack([found["cube.position"] + arm, q])
 
 
+@pytest.mark.slow
 def test_a_toss_with_another_inertia(tmp_path: Path) -> None:
     """As that of a file which states it."""
     moments, correlations = np.array([3e-4, 5e-4, 2e-4]), np.array([0.3, -0.2, 0.4])

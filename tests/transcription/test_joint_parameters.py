@@ -84,7 +84,7 @@ def test_an_affine_motor(tmp_path: Path, sets: str, slope: float) -> None:
 
 
 @few("stated", [(0, 0), (0.02, 0), (0, 0.01), (0.02, 0.01)], 3)
-@few("sets", ["kp", "kv"], 3)
+@pytest.mark.parametrize("sets", ["kp", "kv"])
 def test_an_affine_motor_with_feedback(tmp_path: Path, stated: tuple[float, float], sets: str) -> None:
     """I q'' = gear (gain u + offset) - kp gear^2 q - kv gear^2 q', where the file has no feedback too."""
     guess = {"kp": 0.02, "kv": 0.01}[sets]

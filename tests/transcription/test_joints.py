@@ -122,6 +122,7 @@ def make(tmp_path: Path) -> Make:
     return build
 
 
+@pytest.mark.slow
 def test_angle_and_rate_of_a_pendulum(make: Make) -> None:
     """Those of its orientation against the start, and of its angular velocity; the file's costs by hand."""
     made = make(PENDULUM)

@@ -23,6 +23,8 @@ from symphys.verification import examine
 from symphys.verification.gradient import compare_gradient
 from symphys.verification.sensitivity_growth import sensitivity_growth
 
+pytestmark = pytest.mark.slow
+
 Array = NDArray[np.float64]
 
 HOPPING = (

@@ -40,6 +40,7 @@ def test_value_and_gradient_are_those_of_the_expression(problem: Problem) -> Non
         assert gradient[0] == pytest.approx(slope, rel=1e-9, abs=1e-11 * np.abs(slope).max())
 
 
+@pytest.mark.slow
 def test_residuals_and_their_jacobian_are_those_of_the_expression() -> None:
     transcription = transcribe(load_problem(find("ball_throw")), backend="casadi")
     kernel = compile_program(rollout_program(transcription.rollout), seeded=("residuals",), threads=1)
@@ -50,6 +51,7 @@ def test_residuals_and_their_jacobian_are_those_of_the_expression() -> None:
     assert jacobian == pytest.approx(expected, rel=1e-9, abs=1e-11 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 @first("name", ["ball_throw", "bank_shot"])
 def test_the_exact_kernel_is_the_smoothed_one_at_zero(name: str) -> None:
     rollout = transcribe(load_problem(find(name), {"simulation.duration": 1.0})).rollout

@@ -18,6 +18,8 @@ from symphys.shooting import ScenarioSamples
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.randomization.sampler import Sampler
 
+pytestmark = pytest.mark.slow
+
 Array = NDArray[np.float64]
 WALKER = """
 [simulation]

@@ -45,7 +45,7 @@ def Z() -> np.ndarray:
 
 
 @pytest.mark.slow
-@few("smoothing", [0.0, 0.05], 2)
+@pytest.mark.parametrize("smoothing", [0.0, 0.05])
 @few("what", ["value", "gradient", "residuals", "jacobian"], 2)
 def test_each_point_is_evaluated_with_its_own_numbers(what: str, smoothing: float, Z: np.ndarray) -> None:
     for shared, own in pairs():
@@ -58,6 +58,7 @@ def test_each_point_is_evaluated_with_its_own_numbers(what: str, smoothing: floa
                 np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
+@pytest.mark.slow
 def test_points_differ(Z: np.ndarray) -> None:
     """Otherwise any binding of the numbers would pass."""
     merits = [each.shooting.evaluator.value(Z[:1], 0.0).merit[0] for each in made("simd")]

@@ -61,6 +61,7 @@ def test_nothing_moves_after_the_termination(ball: Transcription) -> None:
     assert np.all(height[HALF + 1 :] == height[HALF + 1])
 
 
+@pytest.mark.slow
 def test_costs_are_those_of_the_time_before(ball: Transcription) -> None:
     """Trapezoids of what is alive: the step of the termination counts half, the time left twice."""
     costs = ball.judge(np.array([1.0, 0, 0])).costs

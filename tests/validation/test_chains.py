@@ -40,6 +40,7 @@ class Cradle:
         self.crowded, self.ambiguous = (int(np.array(found[name]).sum()) for name in ("crowded", "ambiguous"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap", [1e-3, 1e-4, 1e-6])
 def test_a_cradle_with_gaps_hands_the_blow_on(gap: float) -> None:
     """Elastic balls of equal mass exchange velocities, one pair after the other: (0, 0, 0, 0, 1) (Newton)."""
@@ -56,6 +57,7 @@ def test_enough_cuts_or_a_small_step_resolve_it_in_time() -> None:
     assert Cradle(1e-3, Scheme(dt=0.0005)).crowded == 0
 
 
+@pytest.mark.slow
 @few("e", [0.0, 0.5, 1.0], 1)
 @few("speed", [1.0, 3.0, 10.0], 2)
 @few("gap", [0.0, 1e-3, 5e-3], 2)

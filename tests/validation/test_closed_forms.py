@@ -75,8 +75,8 @@ def test_v10_sliding_stops():
     assert np.abs(states["block.velocity"][-1]).max() < 1e-9
 
 
-@few("heading", [0.0, 0.7, 2.0, 4.0], 5)
-@few("share", [0.967, 0.998, 1.002, 1.547], 5)
+@few("heading", [0.0, 0.7, 2.0, 4.0], 2)
+@pytest.mark.parametrize("share", [0.967, 0.998, 1.002, 1.547])
 def test_v10_incline_sticks_inside_the_cone(heading, share):
     """Sticks if and only if tan(slope) <= mu, in every direction: friction acts on the disc."""
     mu = 0.6

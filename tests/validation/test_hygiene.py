@@ -179,7 +179,7 @@ def test_forward_results_do_not_depend_on_gradients():
     assert (value == np.array(alone(POINT))).all()
 
 
-@pytest.mark.parametrize("law", ["hard", "spins", "plastic"])
+@few("law", ["hard", "spins", "plastic"], 1)
 def test_smoothing_goes_to_the_exact_step(law):
     """The error falls with the smoothing, and smoothing 0 is the limit."""
     lab = Lab(two_balls(LAWS[law]), Scheme())

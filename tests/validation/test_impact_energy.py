@@ -52,6 +52,7 @@ def largest_gain(capped):
     return max(np.diff(energies(lab.states(start(seed, 0.8, 1.0, 3), 1.0))).max() for seed in range(4))
 
 
+@pytest.mark.slow
 def test_newtons_law_with_friction_adds_energy_and_the_cap_does_not():
     """What is left with it is the error of the free motion, at up to 30 rad/s."""
     assert largest_gain(False) > 0.2

@@ -129,6 +129,7 @@ def test_compound_comes_to_rest_and_stays():
     assert np.abs(moved).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_warm_start_carries_a_stack():
     """At four sweeps a stack of five stands with it and sags without it."""
     balls = [Body.ball(f"s{i}", 0.2, 1.0) for i in range(5)]

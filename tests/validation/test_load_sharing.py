@@ -59,6 +59,7 @@ def test_a_turning_crate_approaches_linear_loads_with_the_step() -> None:
     assert abs(slid(0.005, load_sharing=False) - turned()) > 10 * errors[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("load_sharing", "most"), [(True, 1e-4), (False, 10.0)])
 def test_what_was_before_is_forgotten(load_sharing: bool, most: float) -> None:
     """Forces across the diagonal, which have no resultant, are added to a crate at rest."""

@@ -153,6 +153,7 @@ def test_a_box_slides_over_the_corner_of_four_tiles(y: float, yaw: float) -> Non
     assert it["position"][-1] - start["position"] == pytest.approx([3 * along, 0.3 * along, 0], abs=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ball", thorough("rod")])
 @pytest.mark.parametrize("shift", [0.0, 0.3, 0.7])
 @first("dt", [0.02, 0.01, 0.005])
@@ -176,6 +177,7 @@ def test_a_capsule_slides_end_first_over_a_seam(dt: float, speed: float) -> None
     assert it["velocity"][-1] == pytest.approx([speed - FRICTION * GRAVITY * time, 0, 0], abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "high"), [("cube", 0.02), ("ball", 0.04), thorough("cube", 0.005), thorough("rod", 0.04)]
 )

@@ -95,6 +95,7 @@ def test_v6_ten_sweeps_are_not_enough_for_that() -> None:
     assert 1e-5 < pushed([0.99, 0, 0], sweeps=10, newton_start=False)[0] < 1e-4
 
 
+@pytest.mark.slow
 def test_v6_smoothing_makes_a_sigmoid_across_the_cone() -> None:
     """Sideways: monotonous up to what sweeps leave, rises before the kink and goes to it with the smoothing."""
     shares = np.linspace(0.5, 1.5, 11)

@@ -155,6 +155,7 @@ STRUCK = {
 """A body; where a ball comes from, how fast, where it hits and the normal there."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STRUCK)
 def test_a_ball_hits_a_free_body_off_its_centre(name: str) -> None:
     """Elastic, frictionless: J = -2 n.v / (1/m + 1/M + (r x n) I^-1 (r x n)); momenta and energy follow."""

@@ -53,6 +53,7 @@ def energy(inertia: Any, q: Any, momentum: Array) -> float:
     return float(np.sum(own**2 / np.array(inertia)) / 2)
 
 
+@pytest.mark.slow
 @few("name", SOLIDS, 2)
 @few("angle", [0.1, 0.3, 1.0], 2)
 def test_free_rotation_keeps_its_energy(name: str, angle: float) -> None:

@@ -30,8 +30,8 @@ def oscillator(ratio: float, dt: float, steps: int) -> Array:
     return np.array([expm(rates * dt * k) @ [0, 1] for k in range(steps + 1)])
 
 
-@few("ratio", [0, 0.05, 0.3, 1, 2], 4)
-@few("angle", [0.05, 0.3, 1.0], 4)
+@few("ratio", [0, 0.05, 0.3, 1, 2], 3)
+@few("angle", [0.05, 0.3, 1.0], 1)
 def test_a_mass_on_a_soft_joint_is_the_exact_oscillator(angle: float, ratio: float) -> None:
     dt, steps = angle / OMEGA, 20
     joint = Joint("j", BALL, 0, None, FRAMES, frequency=HZ, damping=ratio)
@@ -98,8 +98,8 @@ def rebound(ratio: float, height: float, time: float) -> Array:
     return y
 
 
-@few("ratio", [0, 0.05, 0.3, 1, 2], 9)
-@few("dt", [0.0025, 0.01, 0.03], 9)
+@few("ratio", [0, 0.05, 0.3, 1, 2], 3)
+@few("dt", [0.0025, 0.01, 0.03], 2)
 def test_a_ball_rebounds_from_soft_ground_as_integrated(dt: float, ratio: float) -> None:
     """At 0.08, 0.3 and 0.94 rad a step; touch and parting lie within steps."""
     law = Law(0.5, 0.0, frequency=HZ, damping=ratio)

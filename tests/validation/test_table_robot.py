@@ -15,6 +15,8 @@ from symphys.transcription import Rollout, symbolic_rollout
 from symphys.transcription.program import rollout_program
 from symphys.transcription.simulation import Record, recorder, simulate
 
+pytestmark = pytest.mark.slow
+
 Array = NDArray[np.float64]
 STEPS = 50
 

@@ -43,6 +43,7 @@ def exact_top(tilt: float, w: Array, time: float) -> tuple[Array, Array]:
     return about_a_point(ABOUT_TIP, [0, 0, ARM], MASS * G, turned_by((1, 0, 0), tilt), w, time)
 
 
+@pytest.mark.slow
 @few("spin", [20.0, 40.0, 100.0], 1)
 def test_lagranges_top(spin: float) -> None:
     """Precession and nutation of a heavy symmetric top with its tip fixed, by its spin too: second order in dt."""
@@ -100,6 +101,7 @@ def gyroscope(dt: float) -> Lab:
     return Lab(World(bodies, joints=joints), Scheme(dt=dt))
 
 
+@pytest.mark.slow
 @few("spin", [50.0, 100.0, 150.0, 300.0], 1)
 def test_wheel_on_an_arm(spin: float) -> None:
     """A gyroscope held by the end of its arm, level at first: a top whose arm does not turn with the wheel.

@@ -62,6 +62,7 @@ def test_ball_circles_on_a_turntable(dt: float) -> None:
     assert slope[[0, 1, 3, 4]] == pytest.approx(differences(exact, at), abs=2e-5)
 
 
+@pytest.mark.slow
 @first("dt", [0.01, 0.0025])
 def test_ball_on_a_plank_that_slides(dt: float) -> None:
     """A plank M moves at V on ice, a ball m is put on it: momentum is kept, and it rolls from t1 on.

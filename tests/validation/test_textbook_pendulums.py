@@ -35,6 +35,7 @@ def kapitza(dt: float) -> Lab:
     return Lab(World(bodies, joints=(rail, pin)), Scheme(dt=dt), ["rail.command"])
 
 
+@pytest.mark.slow
 @few("share", [0.8, 1.3], 1)
 def test_kapitzas_pendulum(share: float) -> None:
     """Upright it is stable iff a w > sqrt(2 g l), a the amplitude, w the frequency of the pivot (Landau, Lifshitz 30).

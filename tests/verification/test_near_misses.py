@@ -85,6 +85,7 @@ def test_the_change_that_makes_or_loses_a_touch(throw, vz):
         assert (touches(throw, near) != row["touches"]) == changed
 
 
+@pytest.mark.slow
 def test_the_slope_of_a_gap_is_that_of_differences(throw):
     """By a velocity, a place of the wall and a force together, in scales and in spreads."""
     z = throw.shooting.start(0)
@@ -138,6 +139,7 @@ def test_a_variable_that_changes_nothing_is_not_felt(make):
     assert compare_gradient(held, np.array([30.0]))[0]["felt"] > 1e-3
 
 
+@pytest.mark.slow
 def test_more_sweeps_are_looked_at_where_contacts_have_not_settled(make):
     """A heavy ball on a light one: two sweeps are too few, and four leave less."""
     pile = make(PILE, simulation__sweeps=2)

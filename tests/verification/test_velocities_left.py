@@ -77,6 +77,7 @@ def test_what_is_left_is_what_settled_sweeps_find_and_is_not_solved(make, text, 
     assert ruling.verdict == DOUBTED and "more `sweeps` find its velocity" in " ".join(ruling.doubts)
 
 
+@pytest.mark.slow
 def test_what_has_settled_is_solved(make):
     """As a file is that does not switch Newton's method off."""
     crate = make(CRATE, simulation__newton_start=True)

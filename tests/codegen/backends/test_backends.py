@@ -66,6 +66,7 @@ def test_single_precision_is_off_by_no_more_than_it_says(kind: str) -> None:
     assert throw("simd32").backend.lanes == 2 * throw("simd").backend.lanes
 
 
+@pytest.mark.slow
 @few("kind", KINDS, 1)
 @few("backend", BACKENDS, 1)
 def test_a_row_does_not_depend_on_its_batch(backend: str, kind: str) -> None:

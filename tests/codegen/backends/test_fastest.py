@@ -80,6 +80,7 @@ def test_a_large_batch_goes_where_the_first_of_its_size_was_faster(
     assert kernel.chosen in evaluated_by(described(kernel, 0.0)).note
 
 
+@pytest.mark.slow
 def test_small_batches_ask_no_gpu(here: ProcessorKernel) -> None:
     def build() -> DeviceKernel:
         pytest.fail("a GPU was asked")
@@ -104,6 +105,7 @@ def test_without_a_gpu_it_is_looked_for_once(here: ProcessorKernel) -> None:
     assert (asked, kernel.chosen) == ([1], "")
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_gpu_that_fails_gives_way_to_the_processor_and_is_told(
     here: ProcessorKernel, there: DeviceKernel, monkeypatch: pytest.MonkeyPatch
@@ -120,6 +122,7 @@ def test_a_gpu_that_fails_gives_way_to_the_processor_and_is_told(
     assert kernel.chosen == "no memory is left"
 
 
+@pytest.mark.slow
 def test_auto_is_such_a_kernel(here: ProcessorKernel) -> None:
     assert isinstance(build_kernel(BEST, here.program, ["merit"], 1), FastestKernel)
     told = transcribe(load_problem(find("ball_throw"), {"simulation.duration": 0.2}), backend=BEST).backend

@@ -52,6 +52,7 @@ def test_gradients_that_are_right_are_not_doubted() -> None:
     rollout.gradient(rollout.z())  # warnings are errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor, words", [(0.6, "60 %"), (96.0, "96 times"), (np.nan, "any multiple")])
 def test_gradients_that_are_far_off_are_doubted(factor: float, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
     require("simd32")

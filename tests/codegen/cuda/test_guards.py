@@ -52,6 +52,7 @@ def test_a_heap_is_the_processors_and_that_of_all_calls(name: str, warps: int, t
     np.testing.assert_allclose(gradient, slopes, rtol=0, atol=(1e-7 if soft else 1e-9) * np.abs(slopes).max())
 
 
+@pytest.mark.slow
 @few("make", [halving, guarded_sections], 1)
 def test_small_programs(make: Callable[[bool], Program], tmp_path: Path) -> None:
     programs = [make(guard) for guard in (True, False)]

@@ -43,7 +43,7 @@ def pair(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return compile_on(device, pendulum(), warps=warps), compile_program(pendulum(), cache=cache, threads=1)
 
 
-@few("count", [1, 4, 11], 2)
+@few("count", [1, 4, 11], 1)
 def test_outputs_and_gradients_are_the_processors(pair: tuple[DeviceKernel, Kernel], count: int) -> None:
     there, here = pair
     z, seed, parameters = rows(here, count), seeds(here, count), [9.81]

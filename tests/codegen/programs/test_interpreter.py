@@ -138,6 +138,7 @@ def test_who_waits_is_given_what_was_compiled(tmp_path: Path) -> None:
     assert fixed.outputs.size
 
 
+@pytest.mark.slow
 def test_a_compiler_that_fails_later_leaves_the_interpreter_and_a_note(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -157,6 +158,7 @@ def test_a_compiler_that_fails_later_leaves_the_interpreter_and_a_note(
     assert cache.info().kernels == 1
 
 
+@pytest.mark.slow
 def test_without_a_cache_the_compiler_is_waited_for(tmp_path: Path) -> None:
     blocked = tmp_path / "a file"
     blocked.write_text("", "utf-8")

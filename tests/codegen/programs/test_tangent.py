@@ -22,6 +22,7 @@ def test_derivatives_are_those_of_the_adjoint(kernel: Kernel, directions: int) -
     assert found[tangent_name(name)].reshape(-1, directions) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_compiled_one_is_the_interpreted_one(kernel: Kernel, cache: Cache) -> None:
     program, name = kernel.program, kernel.seeded[0]
     forward = tangent_program(program, 2, [name])

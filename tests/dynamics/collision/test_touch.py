@@ -42,7 +42,7 @@ def fault(a: Thing, b: Thing, found: Meet, dt: float = DT) -> float:
     return float(max(abs(distance(a.at(found.first), b.at(found.first))), -course(a, b, found.first).min()))
 
 
-@few(("speed", "spin"), [(5.0, 5.0), thorough(1.0, 1.0), thorough(10.0, 0.0)], 3)
+@pytest.mark.parametrize(("speed", "spin"), [(5.0, 5.0), thorough(1.0, 1.0), thorough(10.0, 0.0)])
 @few("pair", PAIRS, 3)
 def test_touch_is_where_the_distance_ends(pair: tuple[str, str], speed: float, spin: float) -> None:
     """Hits, misses and instants. Arms are parabolas of time, so that of turning bodies is off by (w dt)^3 / 6 of them.

@@ -133,7 +133,7 @@ def machine(follower: dict[str, object], polynomial: list[float], spin: float = 
     )
 
 
-@pytest.mark.parametrize("ratio", [0.005 / (2 * pi), -0.05])
+@few("ratio", [0.005 / (2 * pi), -0.05], 1)
 def test_slides_follow_screws_and_drums_over_turns(ratio: float) -> None:
     """A spindle of 5 mm lead, and a drum of 50 mm radius: one constant rate, no jump by a lead."""
     found = machine({"slider": {"axis": [1, 0, 0]}}, [0.0, ratio])

@@ -259,6 +259,7 @@ def survives(folder: Path, table: dict[str, Any], **simulation: float) -> Proble
         return None
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     header=st.sampled_from(["time,z", "time;z", "z,time", "time", "t,z", "time,z,z", ""]),

@@ -48,6 +48,7 @@ def recorded(folder: Path, given: dict[str, Any], start: dict[str, str], **table
     return beside(folder, {"files": "a.npz", "measured": measured, "start": start}, **{**CHAIN, **tables})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", ["one", "two", "three"])
 def test_joints_carry_the_others(body: str, tmp_path: Path) -> None:
     """Whichever body is given: joints hold together, have the coordinates and rates that are given, and no others."""
@@ -66,6 +67,7 @@ def test_joints_carry_the_others(body: str, tmp_path: Path) -> None:
         np.testing.assert_allclose(own[f"{body}.{field}"], value, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_velocities_are_those_of_the_moving_joint(tmp_path: Path) -> None:
     """The difference of two starts, a moment apart, is the velocity of the third body: its own law of motion."""
     moment = 1e-6

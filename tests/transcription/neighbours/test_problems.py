@@ -21,6 +21,8 @@ from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.transcription import Transcription
 from symphys.verification.examination import examine, survey
 
+pytestmark = pytest.mark.slow
+
 BALLS = 5
 TABLES = """
 [simulation]

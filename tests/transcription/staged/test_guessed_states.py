@@ -47,6 +47,7 @@ def test_a_line_between_states() -> None:
     assert rate == pytest.approx(1.5)
 
 
+@pytest.mark.slow
 def test_a_formula_and_rates_of_its_own() -> None:
     """A formula is followed; a rate that is named is that, whatever the slope."""
     made, z, found = stages(states=[{"at": 1.0, "elbow": {"rate": 2.0}}], follows={"elbow.angle": "sin(time)"})

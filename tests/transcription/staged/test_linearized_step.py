@@ -20,6 +20,8 @@ from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.staged import linearized_step
 from symphys.transcription.staged.linearization import Linearization
 
+pytestmark = pytest.mark.slow
+
 KERNELS = ("leg", *map(thorough, ("loop", "soft", "hopper_jump")))
 
 
