@@ -25,7 +25,7 @@ from symphys.codegen.emit.guarding import guarding_of
 from symphys.codegen.emit.plan import plan
 
 
-@pytest.fixture(params=["spheres", thorough("capsules"), "a box", thorough("soft")])
+@pytest.fixture(params=["spheres", *map(thorough, ("capsules", "a box", "soft"))])
 def heap_program(request: pytest.FixtureRequest) -> Program:
     return program_of(request.param)
 
