@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+INSTALL := $(BIN)/python -m pip install --quiet --editable
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
 .PHONY: help demo demo-walk test test-quick test-rest test-all test-loaded test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports bench-idto bench-tosses profiles gallery clean
@@ -112,12 +113,12 @@ bench-runs: $(VENV)/.developing  ## the table of ten thousand runs
 	$(BIN)/python benchmarks/table_of_runs.py
 
 bench-gaits: $(VENV)/.benching  ## gaits of Gymnasium's models, rated as Gymnasium does, here and in MuJoCo
-	$(BIN)/python -m pip install --quiet --editable '.[models]'
+	$(INSTALL) '.[models]'
 	$(BIN)/python benchmarks/imported_gaits.py build/gaits
 	$(BIN)/python benchmarks/shac_ant.py
 
 bench-imports: $(VENV)/.benching  ## 56 robots of gymnasium, dm_control and example-robot-data after import, against MuJoCo (two hours)
-	$(BIN)/python -m pip install --quiet --editable '.[models]'
+	$(INSTALL) '.[models]'
 	$(BIN)/python benchmarks/imported_robots.py build/imported
 	$(BIN)/python benchmarks/imported_statics.py
 
@@ -154,20 +155,22 @@ gallery: $(VENV)/.installed  ## make the figures of the README again
 clean:  ## remove what the other targets made, reports aside
 	rm -rf $(VENV) build dist *.egg-info
 
-$(VENV)/.installed: setup.cfg pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable . && touch $@
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: setup.cfg pyproject.toml | $(BIN)/python
+	$(INSTALL) . && touch $@
 
 $(VENV)/.benching: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --editable '.[bench]' && mkdir -p build && touch $@
+	$(INSTALL) '.[bench]' && mkdir -p build && touch $@
 
-$(VENV)/.developing: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --editable '.[dev]' && touch $@
+$(VENV)/.developing: setup.cfg pyproject.toml | $(BIN)/python
+	$(INSTALL) '.[dev]' --no-compile && touch $(VENV)/.installed $@
 
 $(VENV)/.documenting: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --editable '.[docs]' && touch $@
+	$(INSTALL) '.[docs]' && touch $@
 
 $(VENV)/.pipelining: $(VENV)/.developing  # PyTorch for processors is a tenth of what comes with a GPU's libraries
 	$(BIN)/python -m pip install --quiet --retries 1 torch --index-url https://download.pytorch.org/whl/cpu \
 	    || echo "PyTorch could not be fetched from download.pytorch.org: its tests are skipped"
-	$(BIN)/python -m pip install --quiet --editable '.[env,jax]' && touch $@
+	$(INSTALL) '.[env,jax]' && touch $@
