@@ -5,18 +5,20 @@ from __future__ import annotations
 import json
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from symphys.cli.arguments import UsageFault, read_settings
 from symphys.problem.reading.value_texts import read_value
 
 
+@settings(deadline=None)
 @given(st.recursive(st.booleans() | st.integers(-(2**60), 2**60) | st.floats(allow_nan=False), st.lists, max_leaves=5))
 def test_a_toml_value_is_read_as_such(value: object) -> None:
     assert read_value(json.dumps(value).replace("Infinity", "inf")) == value
 
 
+@settings(deadline=None)
 @given(st.text())
 def test_anything_else_is_text(text: str) -> None:
     assert read_value(f"no {text}") == f"no {text}"
