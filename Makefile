@@ -13,7 +13,7 @@ help:  ## list the targets
 demo: $(VENV)/.installed  ## solve the ball throw with four solvers and write the report
 	$(BIN)/symphys solve problems/ball_throw.toml --solver gradient,least_squares,ipopt,cma --out reports
 
-demo-walk: $(VENV)/.installed  ## a quadruped learns to walk, in half a minute; Ctrl-C stops it, and the same command goes on
+demo-walk: $(VENV)/.installed  ## a quadruped learns to walk, in some two minutes; Ctrl-C stops it, and the same command goes on
 	$(BIN)/symphys solve quadruped_walk --unexamined --out reports/walk
 
 test: $(VENV)/.developing  ## run the tests; ARGS=tests/runs passes options to pytest
