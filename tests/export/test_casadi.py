@@ -10,6 +10,7 @@ from pathlib import Path
 import casadi
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.export import casadi_files, write_folders
 from symphys.export.casadi_files import RESULTS
@@ -64,9 +65,7 @@ def test_the_readme_names_everything(kick: Transcription) -> None:
         assert line in text
 
 
-@pytest.mark.parametrize(
-    "name", ["kick", "fastest_move", "cart_pole", pytest.param("ice_and_asphalt", marks=pytest.mark.thorough)]
-)
+@few("name", ["kick", "fastest_move", "cart_pole", pytest.param("ice_and_asphalt", marks=pytest.mark.thorough)], 1)
 def test_slopes_of_a_step_are_those_of_linearize(name: str, kick: Transcription) -> None:
     one = kick if name == "kick" else transcribe(load_problem(find(name)), backend="casadi")
     linearize = slopes_function(tangent_of(one))

@@ -121,6 +121,7 @@ def test_noise_is_estimated_quantity_by_quantity() -> None:
     assert found["gravity"].value == pytest.approx(expected["gravity"].value, abs=0.2 * spread)
 
 
+@pytest.mark.slow
 def test_the_estimate_of_noise_has_no_bias() -> None:
     """4 samples for 2 numbers: without the leverage it would be too small by a factor of 1.4."""
     line = Truth(

@@ -245,6 +245,7 @@ def gymnasium(name: str) -> Path:
     return Path(spec.submodule_search_locations[0]) / "envs" / "mujoco" / "assets" / f"{name}.xml"
 
 
+@pytest.mark.slow
 @few(
     ("name", "bodies", "frames", "joints", "motors"),
     [

@@ -116,6 +116,7 @@ def test_the_compiled_rollout_is_the_forward_pass(monkeypatch: pytest.MonkeyPatc
     assert cost == pytest.approx([merit(row) for row in wanted.z], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_without_a_compiler_a_rollout_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     made = planner()
     policy = PlanPolicy(plan().x[:-1], plan().v, np.full((20, 1), 0.3), plan().back)

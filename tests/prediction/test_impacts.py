@@ -107,6 +107,7 @@ def test_starts_of_what_is_held_back_come_from_where_the_setting_says() -> None:
     assert abs(heights["whole"] - HEIGHTS[-1]) > 0.003, "the other restitution bends it"
 
 
+@pytest.mark.slow
 def test_settings_are_checked() -> None:
     tables = problem()
     with pytest.raises(symphys.SymphysError, match=r"above 0 .*1"):

@@ -51,6 +51,7 @@ def test_the_check_finds_the_drop_that_bounces_as_measured(guess: float, wrong: 
     assert "the fit was in a local one" in found.search.text and found.search.found < plain.merit / 1000
 
 
+@pytest.mark.slow
 def test_where_the_fit_is_right_the_check_agrees() -> None:
     found = symphys.identify(from_height(0.7), threads=1, check="cma", check_evaluations=200)
     assert found["height"].lower < HEIGHT < found["height"].upper

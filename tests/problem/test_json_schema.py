@@ -6,6 +6,8 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
+import pytest
+
 from symphys.model.shapes import SHAPES
 from symphys.problem import json_schema
 from symphys.problem.schema import Document
@@ -93,6 +95,7 @@ def test_without_solvers_any_option_passes() -> None:
     assert "properties" not in json_schema()["properties"]["solver"]
 
 
+@pytest.mark.slow
 def test_a_problem_may_include_its_bodies() -> None:
     schema = json_schema()
     include = definition(schema, schema["properties"]["include"]["items"])

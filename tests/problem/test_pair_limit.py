@@ -70,6 +70,7 @@ def test_spheres_are_not_advised_to_be_spheres(refused: Refused) -> None:
     assert "in place of" not in message
 
 
+@pytest.mark.slow
 def test_what_may_not_meet_does_not_count(load: Load) -> None:
     apart = BASE + crowd(40, 'group = "g"') + '[[pair]]\nbetween = ["g", "g"]\ncollide = false\n'
     assert len(load(text=apart).world().pairs) == 40 * DOWN

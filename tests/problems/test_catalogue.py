@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
+from tools.repeats import few
 
 from symphys import problems
 from symphys.cli import main
@@ -74,7 +75,7 @@ def test_all_are_listed_here() -> None:
     assert list(problems.catalogue()) == SHIPPED
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@few("name", SHIPPED, 16)
 def test_shipped_problems_are_valid(name: str) -> None:
     problem = load_problem(problems.catalogue()[name])
     assert problem.name == name

@@ -120,6 +120,7 @@ def test_what_is_not_determined_is_named(tmp_path: Path) -> None:
     assert found.open[0].advice in page
 
 
+@pytest.mark.slow
 def test_report_makes_it_again(folder: Path) -> None:
     page = folder / "report.html"
     before = page.read_text("utf-8")

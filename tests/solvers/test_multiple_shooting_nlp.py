@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 from worlds.shots_of_toys import every_backend, program, solve
 from worlds.staged_toys import Chain, acrobot, attitude, boxed, pendulum
 
@@ -21,7 +22,7 @@ SLOPED: dict[str, tuple[Chain, int, tuple[float, ...]]] = {
 }
 
 
-@pytest.mark.parametrize("name", SLOPED)
+@few("name", SLOPED, 1)
 @every_backend
 def test_slopes_are_those_of_differences(name: str, backend: str) -> None:
     """Of objective, constraints and the Lagrangian's gradient, away from the references, in both layouts."""

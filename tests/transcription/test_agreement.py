@@ -18,7 +18,7 @@ from symphys.transcription import Transcription, transcribe
 Array = NDArray[np.float64]
 
 
-HEAVY = {"load on two boards", "inertia and centre of mass", "loop of joints"}
+HEAVY = {"load on two boards", "inertia and centre of mass", "loop of joints", "orientation"}
 """What takes seconds to build, or minutes."""
 COMPILED = {"impacts with friction", "smoothed contact", "references"}
 """What is compiled in every run of the tests; kernels of the others in those of ``make test-all``."""

@@ -52,6 +52,7 @@ def gaps(file: Path) -> np.ndarray:
     return np.stack([found[name] for name in names], axis=1)
 
 
+@pytest.mark.slow
 @few("ground", ["[ground]", '[[terrain]]\nname = "ground"\nheight = "0 * x * y"'], 1)
 @few("pitch", [0, 30, 60], 1)
 def test_the_lowest_point_of_a_tilted_crate(tmp_path: Path, ground: str, pitch: float) -> None:

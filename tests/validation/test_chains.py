@@ -68,7 +68,7 @@ def test_a_chain_adds_no_energy(gap: float, speed: float, e: float) -> None:
     assert cradle.speeds.sum() == pytest.approx(speed)
 
 
-@pytest.mark.parametrize(("gap", "e", "named"), [(0.0, 1.0, True), (0.0, 0.0, False), (1e-3, 1.0, False)])
+@few(("gap", "e", "named"), [(0.0, 1.0, True), (0.0, 0.0, False), (1e-3, 1.0, False)], 1)
 def test_impacts_at_one_instant_are_named(gap: float, e: float, named: bool) -> None:
     """Touching balls that rebound have no one answer; plastic ones, and such with gaps, have."""
     assert (Cradle(gap, Scheme(dt=0.01), e).ambiguous > 0) is named

@@ -116,6 +116,7 @@ KNOCKED_DOWN = {
 }
 
 
+@pytest.mark.slow
 def test_a_ball_that_another_knocks_down_bounces_before_it_is_hit_again():
     """Both impacts are in one step: the ground throws the lower ball up, behind the upper one that has just left it."""
     coarse = balls(2, 0.9, 0.3).states(KNOCKED_DOWN, 0.02)

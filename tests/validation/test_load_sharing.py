@@ -86,6 +86,7 @@ def test_loads_are_linear_across_a_braking_crate() -> None:
     assert sorted(found)[4:] == pytest.approx([9.81 / 4 - shift] * 2 + [9.81 / 4 + shift] * 2, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_crate_on_its_edge_keeps_its_loads() -> None:
     """Two corners say how they share a load; the others, in the air, get none.
 

@@ -145,6 +145,7 @@ def test_a_cylinder_stands_on_its_rim_and_falls_to_the_lower_side() -> None:
         assert motion.position[-1, 0, 2] == pytest.approx(0.1, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_an_ellipsoid_that_rocks_keeps_its_energy() -> None:
     """Rolling without slip on a plane takes and gives none: to second order of the step."""
     body = egg(position=(0, 0, 0.1089), orientation=turned_by((1, 0, 0), 0.25))

@@ -192,6 +192,7 @@ def test_a_riser_stops_what_runs_into_it(kind: str, high: float) -> None:
     assert it["position"][:, 0].max() < SEAM
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("z", "down"), [(0.0, 0.0), (0.03, -3.0), thorough(0.045, -0.5)])
 @first("dt", [0.005, 0.02])
 def test_a_box_that_falls_past_an_edge_meets_the_side(z: float, down: float, dt: float) -> None:

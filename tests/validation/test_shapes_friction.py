@@ -120,6 +120,7 @@ def pulled_block(dt: float, cuts: int | None) -> Lab:
     return Lab(World(world.bodies, world.statics, pairs), Scheme(dt=dt, cuts=cuts), inputs=["box.force"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dt", "time", "cuts"),
     [

@@ -197,6 +197,7 @@ def test_motors_and_springs_account_for_energy(make: Make) -> None:
     assert drifts[1] < drifts[0] / 3
 
 
+@pytest.mark.slow
 def test_springs_and_motors_of_a_foot_on_the_ground_account_for_energy(make: Make) -> None:
     """Steps are cut there, and lags shorter: what its contact seems to add is little beside what the motor does."""
     told = found(make(CROUCH, simulation__dt=0.01))[1]

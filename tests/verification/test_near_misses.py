@@ -103,6 +103,7 @@ def test_the_slope_of_a_gap_is_that_of_differences(throw):
     assert row["gap"] / row["spreads"] == pytest.approx(0.5 * abs(slopes[0]), rel=2e-2)
 
 
+@pytest.mark.slow
 def test_what_bounces_or_flies_far_away_is_no_near_miss(throw):
     z = throw.shooting.start(0)
     z[0] = 9.0

@@ -82,6 +82,7 @@ def test_free_flight(make):
         assert swept == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_growth_is_the_norm_of_the_derivative_where_all_directions_are_swept(make, monkeypatch):
     flight = make(FLIGHT)
     monkeypatch.setattr("symphys.verification.sensitivity_growth.DIRECTIONS", 99)

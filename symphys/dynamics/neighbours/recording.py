@@ -95,7 +95,7 @@ class MemberRecorder(Recorder):
                 used.setdefault(code[0], len(used))
         symbols = [ca.SX.sym("a", self._sizes[k]) for k in used]
         entries = [ca.SX(c) if isinstance(c, float) else symbols[used[c[0]]][c[1]] for c in column]
-        function = self.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
+        function = self._pieces.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
         (number,) = self._add("", function, list(used))
         self.roots[number] = body
         return self._slots[number]

@@ -90,7 +90,9 @@ class Recorder(Tracer):
                 used.setdefault(number, len(used))
         symbols = [ca.SX.sym("a", self._sizes[k]) for k in used]
         results = [ca.vertcat(*(symbols[used[k]][j] for k, j in column)) for column in columns.values() if column]
-        new = iter(self._apply(self.shared(ca.Function("piece", symbols, results)), list(used)) if results else ())
+        new = iter(
+            self._apply(self._pieces.shared(ca.Function("piece", symbols, results)), list(used)) if results else ()
+        )
         taken = {slot: (next(new), count()) for slot, column in columns.items() if column}
         found = []
         for slot, leaf, each in zip(slots_of(shape), leaves, codes, strict=True):
@@ -106,7 +108,7 @@ class Recorder(Tracer):
         codes = [(slots.setdefault(c[0], len(slots)), c[1]) if isinstance(c, tuple) else c for c in stacked.codes]
         symbols = [ca.SX.sym("a", self._slots[k].size) for k in slots]
         entries = [ca.SX(c) if isinstance(c, float) else symbols[c[0]][c[1]] for c in codes]
-        function = self.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
+        function = self._pieces.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
         (given,) = self._add(name, function, list(slots))
         return self._slots[given]
 
@@ -128,7 +130,7 @@ class Recorder(Tracer):
         homes = {symbol.element_hash(): self._homes[symbol.element_hash()][0] for symbol in ca.symvar(column)}
         slots = list(dict.fromkeys(homes.values()))
         symbols = [self._column(slot) for slot in slots]
-        (given,) = self._add("", self.shared(ca.Function("piece", symbols, [column])), slots)
+        (given,) = self._add("", self._pieces.shared(ca.Function("piece", symbols, [column])), slots)
         self._adopted.append(column)
         self._homes |= {entry.element_hash(): (given, k) for k, entry in enumerate(column.nonzeros())}
 

@@ -22,14 +22,30 @@ MOST_KEPT = 300_000
 """Branches that are kept: more would take memory for what no call takes again."""
 
 
-class Structures:
-    """Numbers of structures, and the branches that have been looked at."""
+class Numbers:
+    """Numbers of structures.
 
-    def __init__(self, codes: Callable[[Expr], tuple[Code, ...]], sizes: Sequence[int]) -> None:
-        """``codes`` of an expression's entries; ``sizes`` of the slots."""
-        self._codes, self._sizes = codes, sizes
+    Attributes:
+        passing: those of trees that may change, so that what is known of one of them is not kept.
+    """
+
+    def __init__(self) -> None:
+        """None yet."""
         self._numbers: dict[Hashable, int] = {}
-        self._passing: set[int] = set()
+        self.passing: set[int] = set()
+
+    def of(self, key: Hashable) -> int:
+        """The number of what equals ``key``."""
+        return self._numbers.setdefault(key, len(self._numbers))
+
+
+class Structures:
+    """The structures of trees, and the branches that have been looked at."""
+
+    def __init__(self, numbers: Numbers, codes: Callable[[Expr], tuple[Code, ...]], sizes: Sequence[int]) -> None:
+        """``codes`` of an expression's entries; ``sizes`` of the slots."""
+        self._number, self._passing = numbers.of, numbers.passing
+        self._codes, self._sizes = codes, sizes
         self._branches: dict[int, tuple[Any, Structure]] = {}
 
     def of(self, tree: Any) -> Structure:
@@ -65,9 +81,6 @@ class Structures:
         if len(self._branches) >= MOST_KEPT:
             self._branches.clear()
         self._branches[id(tree)] = tree, structure
-
-    def _number(self, key: Hashable) -> int:
-        return self._numbers.setdefault(key, len(self._numbers))
 
     def _leaf(self, leaf: Leaf, codes: Sequence[Code]) -> Structure:
         slots: dict[int, int] = {}

@@ -1,5 +1,8 @@
 """The calls of a step as functions that are built once: equal calls of equal structure share one casadi function.
 
+That holds for all steps that a process traces: the next use of a problem, or the next problem of its kind, builds what
+is new to it.
+
 The first time a traced function is called with arguments of some structure it is called with symbols in place of all
 that varies, and its result becomes a casadi function. From then on that function is called: by ``InlineTracer`` within
 one expression, by a ``Recorder`` as a call of its own. Entries that are constants stay constants, so that
@@ -32,7 +35,7 @@ from symphys.dynamics.tracing.pytree import (
     rebuild,
     slots_of,
 )
-from symphys.dynamics.tracing.structure import Blueprint, Structures
+from symphys.dynamics.tracing.structure import Blueprint, Numbers, Structures
 from symphys.maths.verbatim import verbatim
 
 T = TypeVar("T")
@@ -58,6 +61,38 @@ class Template:
     matrices: tuple[tuple[Leaf, tuple[Code, ...]], ...]
 
 
+class Pieces:
+    """What tracers have built, for all tracers of this process: one problem's step is traced for several uses.
+
+    Attributes:
+        numbers: of the structures of arguments.
+        templates: by function, structure and whether it is reduced.
+    """
+
+    def __init__(self) -> None:
+        """Nothing yet."""
+        self.numbers = Numbers()
+        self.templates: dict[Hashable, Template] = {}
+        self._functions: dict[str, ca.Function] = {}
+
+    def shared(self, function: ca.Function) -> ca.Function:
+        """A function, or an equal one that was there before."""
+        return self._functions.setdefault(function.serialize(), function)
+
+
+MOST_PIECES = 10_000
+"""Templates that are kept for the next tracer, some 90 MB."""
+_PIECES = Pieces()
+
+
+def _pieces() -> Pieces:
+    """What is there for the next tracer."""
+    global _PIECES
+    if len(_PIECES.templates) > MOST_PIECES:
+        _PIECES = Pieces()
+    return _PIECES
+
+
 class Tracer(ABC):
     """Calls traced functions; see ``decorator``."""
 
@@ -68,9 +103,8 @@ class Tracer(ABC):
         self._entries: list[list[Expr]] = []
         self._sizes: list[int] = []
         self._homes: dict[int, tuple[int, int]] = {}
-        self._structures = Structures(self._codes, self._sizes)
-        self._templates: dict[Hashable, Template] = {}
-        self._functions: dict[str, ca.Function] = {}
+        self._pieces = _pieces()
+        self._structures = Structures(self._pieces.numbers, self._codes, self._sizes)
 
     def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
         """The state after ``count`` times ``state = once(context, state)``."""
@@ -145,9 +179,10 @@ class Tracer(ABC):
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
         """``function(*arguments, **named)``."""
         number, slots = self._structures.of_call(arguments, named)
-        template = self._templates.get((function, number))
+        key = function, number, self._reduces
+        template = self._pieces.templates.get(key)
         if template is None:
-            template = self._templates[function, number] = self._build(function, arguments, named, slots)
+            template = self._pieces.templates[key] = self._build(function, arguments, named, slots)
         tree: T = self._fill(template, slots)
         return tree
 
@@ -187,12 +222,8 @@ class Tracer(ABC):
             columns = ca.cse(columns)
         needed = {symbol.element_hash() for symbol in ca.symvar(ca.vertcat(*columns))}
         used = [k for k, column in enumerate(entries) if any(e.element_hash() in needed for e in column)]
-        built = self.shared(ca.Function("piece", [symbols[k] for k in used], columns))
+        built = self._pieces.shared(ca.Function("piece", [symbols[k] for k in used], columns))
         return Template(built, tuple(used), blueprint, matrices)
-
-    def shared(self, function: ca.Function) -> ca.Function:
-        """A function, or an equal one that was there before."""
-        return self._functions.setdefault(function.serialize(), function)
 
     def _fill(self, template: Template, slots: Sequence[int]) -> Any:
         """The tree that a template stands for, given the slots that its arguments lie in."""

@@ -81,7 +81,7 @@ def test_a_row_does_not_depend_on_its_batch(backend: str, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("backend", BACKENDS)
+@few("backend", BACKENDS, 3)
 def test_a_row_that_is_not_finite_leaves_the_others_alone(backend: str, kind: str) -> None:
     Z = points(9)
     good = evaluated(throw(backend), kind, Z)

@@ -86,6 +86,7 @@ def poisoned(twice: bool = False) -> Program:
     return Program(at.size, z, Place(0, 0), 1, {"end": out}, body=body, zeroed=(out,))
 
 
+@pytest.mark.slow
 def test_calls_are_left_out_where_no_robot_of_a_block_needs_them(device: Emulated) -> None:
     """A call that runs makes what is none of a negative number, even if its guard is 0."""
     kernel = compile_on(device, poisoned(), warps=2)

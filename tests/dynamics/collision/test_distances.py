@@ -34,7 +34,7 @@ def errors(pair: tuple[str, str], gap: float, static: bool, count: int = 16) -> 
     return np.array(found)
 
 
-@pytest.mark.parametrize("static", [False, True])
+@few("static", [False, True], 1)
 @few("gap", [0.1, 0.01, 1e-5, -1e-3], 2)
 @few("pair", PAIRS, 11)
 def test_smallest_gap_is_the_distance(pair: tuple[str, str], gap: float, static: bool) -> None:

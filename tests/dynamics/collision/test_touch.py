@@ -81,7 +81,7 @@ def test_error_is_of_third_order(pair: tuple[str, str]) -> None:
 
 @first("travel", [2.0, 0.5])
 @few("wall", KINDS, 2)
-@few("kind", KINDS, 2)
+@few("kind", KINDS, 1)
 def test_nothing_flies_through_thin_walls(kind: str, wall: str, travel: float) -> None:
     """Many times its size and the wall's within one step, straight on or past: hit when, and only when, it must be.
 

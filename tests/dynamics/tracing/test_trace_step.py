@@ -10,6 +10,7 @@ import pytest
 from tools.repeats import first
 
 from symphys.dynamics.functions import TracedStep, step_function, trace_step
+from symphys.dynamics.tracing import trace
 from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import repeat, traced, tracing
 from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector
@@ -64,6 +65,21 @@ def run(
         for slot in recording.results.keys() & set(piece.outputs):
             after[recording.results[slot]] = values[slot]
     return after
+
+
+def test_what_was_built_for_one_step_serves_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another world of the same parts builds nothing, until so much is kept that the next one begins anew."""
+    built = []
+    build = trace.Tracer._build
+    monkeypatch.setattr(trace, "_PIECES", trace.Pieces())
+    monkeypatch.setattr(trace.Tracer, "_build", lambda *given: built.append(given[1]) or build(*given))
+    step, count = trace_step(worlds()["one ball"]), len(built)
+    again = trace_step(worlds()["one ball"])
+    assert count == len(built) > 0
+    assert [call.function.serialize() for call in again.calls] == [call.function.serialize() for call in step.calls]
+    monkeypatch.setattr(trace, "MOST_PIECES", 0)
+    trace_step(worlds()["one ball"])
+    assert len(built) == 2 * count
 
 
 @pytest.mark.slow

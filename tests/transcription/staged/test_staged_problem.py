@@ -281,7 +281,7 @@ def made(text: str, knots: int, interpolation: str) -> tuple[Transcription, Stag
     return transcription, staged, staged.roll_out(transcription.shooting.start(3), 0.0)
 
 
-@few("case", CASES, 3)
+@few("case", CASES, 1)
 def test_measures_are_those_of_the_whole(case: tuple[str, int, str]) -> None:
     transcription, staged, motion = made(*case)
     Z = np.stack([motion.z, transcription.shooting.start(4)])
@@ -296,7 +296,7 @@ def test_measures_are_those_of_the_whole(case: tuple[str, int, str]) -> None:
     np.testing.assert_array_equal(staged.upper, shooting.constraint_upper)
 
 
-@few("case", CASES, 3)
+@few("case", CASES, 1)
 def test_the_gradient_along_the_steps_is_that_of_the_whole(case: tuple[str, int, str]) -> None:
     transcription, staged, motion = made(*case)
     size, rollout, terms = len(motion.z), transcription.rollout, transcription.terms
@@ -350,7 +350,7 @@ def state_slopes(staged: StagedProblem, motion: StagedMotion) -> Array:
     return slopes
 
 
-@few("case", CASES, 3)
+@few("case", CASES, 1)
 def test_slopes_of_limits_are_those_of_the_whole(case: tuple[str, int, str]) -> None:
     transcription, staged, motion = made(*case)
     values, by_x, by_u, by_s = staged.limit_slopes(motion)
