@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element, fromstring
 import numpy as np
 import pytest
 from robots import REST, quadruped, state_of
+from tools.repeats import few
 from worlds.mixed import mixed
 
 from symphys.export import ExportError, mjcf, mjcf_files
@@ -162,7 +163,7 @@ def test_mujoco_reads_a_quadruped() -> None:
         assert value == pytest.approx(start[name], abs=1e-9), name
 
 
-@pytest.mark.parametrize("name", ["table_robot", "gait_robot", "arm", "hopper", "cart_pendulum"])
+@few("name", ["table_robot", "gait_robot", "arm", "hopper", "cart_pendulum"], 2)
 def test_mujoco_reads_shipped_robots(tmp_path: Path, name: str) -> None:
     mujoco = pytest.importorskip("mujoco")
     path = tmp_path / "robot.toml"

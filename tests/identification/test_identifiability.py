@@ -84,7 +84,7 @@ def test_an_own_number_that_follows_is_named() -> None:
         assert np.isfinite(found["friction"].error) and np.isinf(found.own_error[:, 1]).all()
 
 
-@few("name", TRUTHS, 2)
+@few("name", TRUTHS, 1)
 def test_what_is_determined_raises_no_alarm(name: str) -> None:
     for seed in SEEDS:
         assert identify(recordings(TRUTHS[name], seed), IdentificationOptions(draws=0)).open == ()

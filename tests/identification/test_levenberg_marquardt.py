@@ -170,6 +170,7 @@ def test_exact_recordings_are_met_exactly() -> None:
     np.testing.assert_allclose(outcome.state.shared, truth.shared, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_memory_is_linear_in_the_recordings() -> None:
     """Of one iteration: eight times the recordings take eight times the memory, not sixty-four."""
     peaks = []

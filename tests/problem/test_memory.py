@@ -69,6 +69,7 @@ def test_one_that_is_not_varied_takes_less(tmp_path: Path, monkeypatch: pytest.M
     assert "c" in refused(tmp_path, text + WEIGHTS)
 
 
+@pytest.mark.slow
 def test_steps_and_knots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Which key is to be changed is the one that brings it over what there is."""
     states = 20

@@ -109,7 +109,7 @@ POLE = (
 """A pendulum that should pass from one side to the other, where it has 1 rad/s."""
 
 
-@pytest.mark.parametrize("method", ["least_squares", "ilqr", "multiple_shooting"])
+@few("method", ["least_squares", "ilqr", "multiple_shooting"], 1)
 def test_solvers_choose_them(load: Load, method: str) -> None:
     """A motion from -a to a in half a second with 1 rad/s there: by symmetry it begins with 1 rad/s too."""
     made, chosen = transcribe(load(text=POLE), backend="casadi"), solver(method)

@@ -572,7 +572,7 @@ TABLE = [
     *rows("stairs", {"gradient": 12, "ipopt": 12, "cma": 250}, answer=flights.STAIRS, within=2e-3, seeds=2,
           backend="casadi"),
     *rows("table_tennis", "least_squares", law=lands_and_kicks_on, seeds=3),
-    *rows("three_hops", "ipopt", finer=1, law=hops_three_times, seeds=3),
+    *rows("three_hops", "ipopt", "ipopt", finer=1, law=hops_three_times, seeds=3),
     *rows("transport", "ilqr", "ilqr", finer=1, law=slides_within_friction, seeds=3),
     *rows("two_balls", "gradient ipopt", solved=None,
           law=comes_down_to_the_goal(1.3965, 1.3975, 60)),

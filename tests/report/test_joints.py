@@ -71,6 +71,7 @@ def test_saturation_is_marked_where_it_is(load: Load) -> None:
     assert other.get_title(loc="right") == ""
 
 
+@pytest.mark.slow
 def test_targets_of_servos_are_dashed_and_limits_shaded(load: Load) -> None:
     arrays = motion()
     arrays["joint_command"][:, KNEE, 0] = np.linspace(0, 0.5, STEPS)

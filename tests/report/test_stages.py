@@ -70,6 +70,7 @@ def test_a_table_tells_what_each_stage_came_to(staged: Path) -> None:
     assert "jacobians" not in text.partition("Stages of smoothing")[2].partition("Convergence")[0]
 
 
+@pytest.mark.slow
 def test_a_run_without_smoothing_has_no_such_table(run_dir: Path, edit: Edit) -> None:
     edit(run_dir / "result.json", stages=[STAGES[-1]])
     assert "Stages of smoothing" not in text_of(write_run_report(run_dir))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 import symphys
 from symphys import Problem, Solution, SymphysError
@@ -149,7 +150,7 @@ def test_the_motion_is_the_guess_of_the_states(cart: Problem, found: Solution) -
         assert off[1] == pytest.approx(share * float(recorded["rail.rate"][middle]), abs=1e-9)
 
 
-@pytest.mark.parametrize("solver", [name for name, each in SOLVERS.items() if each.scenarios is not True])
+@few("solver", [name for name, each in SOLVERS.items() if each.scenarios is not True], 2)
 def test_every_solver_starts_there(solver: str, cart: Problem, found: Solution, tmp_path: Path) -> None:
     """The first row of its trace is the solution of the run; on another grid it is as good as its control is."""
     few = {"generations": 1} if solver == "evolution" else {"evaluations": 20} if solver == "cma" else {"iterations": 1}

@@ -36,9 +36,7 @@ def same(a: Outcome, b: Outcome) -> None:
 
 
 @few(("name", "options"), EXACT, 2)
-@pytest.mark.parametrize(
-    "problem", [pytest.param(rosenbrock(), id="rosenbrock"), pytest.param(target(), id="target", marks=THOROUGH)]
-)
+@few("problem", [pytest.param(rosenbrock(), id="rosenbrock"), pytest.param(target(), id="target", marks=THOROUGH)], 1)
 def test_the_same_to_the_last_bit(name: str, options: dict[str, Any], problem: Any) -> None:
     whole = solve(name, problem, seed=2, options=options)
     for stop in {0, 1, 2, len(whole.trace) // 2, len(whole.trace) - 2, len(whole.trace) - 1}:

@@ -23,7 +23,7 @@ from symphys.solvers import SOLVERS, MultipleShootingOptions, Status
 
 @every_backend
 @few("kind", ["step", "linearize", "expand"], 1)
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), RuntimeError("out of order"), MemoryError("72 TiB")])
+@few("error", [KeyboardInterrupt(), RuntimeError("out of order"), MemoryError("72 TiB")], 1)
 def test_what_an_evaluation_raises(backend: str, kind: str, error: BaseException, monkeypatch: Any) -> None:
     """An interruption goes on from the last iterate, all else is a failure; neither is lost in the library."""
     chain = acrobot()

@@ -18,17 +18,23 @@ from symphys.transcription import Transcription, transcribe
 Array = NDArray[np.float64]
 
 
-HEAVY = {"load on two boards", "inertia and centre of mass", "loop of joints", "orientation"}
-"""What takes seconds to build, or minutes."""
+HEAVY = {"inertia and centre of mass", "loop of joints", "orientation"}
+"""What takes seconds to build."""
 COMPILED = {"impacts with friction", "smoothed contact", "references"}
 """What is compiled in every run of the tests; kernels of the others in those of ``make test-all``."""
 
 
-def every(later: Container[str]) -> pytest.MarkDecorator:
-    """All features; those in ``later`` with ``make test-all``."""
-    return pytest.mark.parametrize(
-        "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in later)) for name in FEATURES]
-    )
+LONGEST = {"load on two boards"}
+"""What takes half a minute; ``soft joint`` has the longest compile."""
+
+
+def every(later: Container[str], last: Container[str] = LONGEST) -> pytest.MarkDecorator:
+    """All features; those in ``later`` with ``make test-all``, those in ``last`` with ``make thorough``."""
+    marks = {
+        name: [pytest.mark.thorough] if name in last else [pytest.mark.slow] if name in later else []
+        for name in FEATURES
+    }
+    return pytest.mark.parametrize("name", [pytest.param(name, marks=marks[name]) for name in FEATURES])
 
 
 @cache
@@ -53,7 +59,7 @@ def merit_and_slope(name: str, backend: str) -> tuple[Array, Array]:
     return found.merit, found.gradient
 
 
-@every(later=FEATURES.keys() - COMPILED)
+@every(later=FEATURES.keys() - COMPILED, last=LONGEST | {"soft joint"})
 def test_a_kernel_gives_what_the_virtual_machine_gives(name: str) -> None:
     merit, slope = merit_and_slope(name, "casadi")
     compiled, compiled_slope = merit_and_slope(name, "simd")

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.dynamics.contact.coupling import may_couple
 from symphys.dynamics.functions import report_function
@@ -55,7 +56,7 @@ def pressing(friction: float, angle_deg: float, sign: int) -> float:
     return 9.81 / (1 + (rx * rx + sign * friction * rx * rz) / INERTIA)
 
 
-@pytest.mark.parametrize("friction", [1.2, 1.4, 2.0, 3.0])
+@few("friction", [1.2, 1.4, 2.0, 3.0], 1)
 def test_the_tip_of_a_rod_that_trails(friction: float) -> None:
     """No paradox there, at any friction; the last sweep changes nothing."""
     for angle in (30, 45, 60, 70, 80):

@@ -110,6 +110,7 @@ def test_random_scenes_are_finite(a, b, va, wa, law, smoothing, snap):
         assert np.isfinite(np.array(slope)).all()
 
 
+@pytest.mark.slow
 def test_reported_velocities_are_true():
     """At rest 0 from the first step on; in flight v0 + a t; sliding v0 - mu g t."""
     ball = Lab(two_balls(Law(0.3, 0.0)), Scheme())

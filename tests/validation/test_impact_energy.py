@@ -126,6 +126,7 @@ def test_a_ball_that_another_knocks_down_bounces_before_it_is_hit_again():
         assert coarse[name][-1] == pytest.approx(fine[name][-1], abs=1e-6), name
 
 
+@pytest.mark.slow
 @few("seeds", [(10,), thorough(range(20))], 1)
 @few(("count", "restitution", "friction"), [(8, 0.9, 0.3), (8, 1.0, 0.0)], 1)
 def test_a_cloud_of_balls_that_falls_gains_nothing(count, restitution, friction, seeds):

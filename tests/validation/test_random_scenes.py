@@ -29,7 +29,7 @@ def test_random_scenes_are_finite(structure: Structure) -> None:
     assert not_finite(structure, 80, cuts=0) == set()
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_smoothed_contact_that_waits_for_its_impact_is_not_pulled() -> None:
     """It carried load, so that what gapes is closed, but in this part of the step it gives no impulse."""
     parts, rng = lot(*STRUCTURES[1]), np.random.default_rng(1)

@@ -91,8 +91,8 @@ def turned_freely(name: str, turned: float, dt: float) -> tuple[float, float, fl
     return float(away), float(np.abs(kept / kept[0] - 1).max()), float(off)
 
 
-@pytest.mark.parametrize("turned", [0.02, 0.1])
-@pytest.mark.parametrize("name", ["brick", "coin", "plate"])
+@few("turned", [0.02, 0.1], 1)
+@few("name", ["brick", "coin", "plate"], 1)
 def test_free_rotation_converges_at_fourth_order(name: str, turned: float) -> None:
     """Against Euler's equations; angular momentum to rounding at every step."""
     errors = np.array([turned_freely(name, turned, dt) for dt in (0.01, 0.005, 0.0025)])

@@ -47,7 +47,7 @@ def two_falling(z: Array, masses: tuple[float, float], e: float, time: float) ->
 
 @first("dt", [0.01, 0.001])
 @few("gap", [0.1, 0.01, 0.001, 1e-5], 1)
-@few(("masses", "e"), [((5.0, 1.0), 1.0), ((1000.0, 1.0), 1.0), ((8.0, 1.0), 0.8)], 2)
+@few(("masses", "e"), [((5.0, 1.0), 1.0), ((1000.0, 1.0), 1.0), ((8.0, 1.0), 0.8)], 1)
 def test_ball_on_ball(masses: tuple[float, float], e: float, gap: float, dt: float) -> None:
     """Harter 1971: dropped together they hit one after the other; a light one leaves almost three times as fast."""
     height, time = 1.0, 0.6

@@ -127,7 +127,7 @@ FIRST = pytest.mark.xfail(
 )
 
 
-@pytest.mark.parametrize("gap", [0.05, pytest.param(0.001, marks=FIRST)])
+@few("gap", [0.05, pytest.param(0.001, marks=FIRST)], 1)
 @few("spin", [0.3, 0.0, -1.0], 2)
 def test_follow_and_draw(spin: float, gap: float) -> None:
     """A head-on elastic hit leaves the cue ball its spin only: v = 2/7 r w in the end, the other's 5/7 v0.

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from fakes.emulated import Emulated, needs_compiler
-from tools.repeats import few, thorough
+from tools.repeats import few
 from worlds.guarded import guarded_sections, halving, program_of, whole
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Place, Program, compile_program
@@ -31,9 +31,9 @@ def entries_of(program: Program, phase: str) -> list[int]:
     return found
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["spheres", thorough("capsules"), thorough("a box"), thorough("soft")])
-@pytest.mark.parametrize("warps", [4, thorough(1)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["spheres", "capsules", "a box", "soft"])
+@pytest.mark.parametrize("warps", [4, 1])
 def test_a_heap_is_the_processors_and_that_of_all_calls(name: str, warps: int, tmp_path: Path, cache: Cache) -> None:
     program, soft = program_of(name, duration=0.1), name == "soft"
     here = compile_program(program, cache=cache, threads=1, seeded=("merit",), lanes=4)

@@ -96,6 +96,7 @@ def test_a_device_without_room_says_what_is_wanted(device: Emulated) -> None:
         kernel.forward(rows(kernel, 1))
 
 
+@pytest.mark.slow
 def test_single_precision_rounds_and_no_more(device: Emulated, cache: Cache) -> None:
     there, here = compile_on(device, pendulum(), "single"), compile_program(pendulum(), cache=cache, threads=1)
     z, seed = rows(here, 5), seeds(here, 5)

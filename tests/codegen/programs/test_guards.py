@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tools.plain_c import plain
-from tools.repeats import thorough
+from tools.repeats import few, thorough
 from worlds.guarded import guarded_sections, halving, program_of, whole
 
 from symphys.codegen import (
@@ -111,7 +111,7 @@ def test_a_guard_that_the_driver_cannot_follow_is_refused() -> None:
             guarding_of(replace(program, body=calls), tables)
 
 
-@pytest.mark.parametrize("lanes", [1, 4])
+@few("lanes", [1, 4], 1)
 def test_sections_of_which_nothing_is_left(lanes: int, cache: Cache) -> None:
     try:
         kernels = [compile_program(guarded_sections(guard), cache=cache, lanes=lanes) for guard in (True, False)]

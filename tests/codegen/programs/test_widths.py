@@ -72,7 +72,7 @@ def test_the_rows_choose_the_lanes() -> None:
     ("name", "precision"),
     [
         *((name, precision) for name in ("pendulum", "chain") for precision in ("double", "single")),
-        pytest.param("spheres", "double", marks=pytest.mark.slow),
+        thorough("spheres", "double"),
         thorough("spheres", "single"),
     ],
     1,
@@ -171,7 +171,7 @@ def test_a_plan_that_was_kept_has_all_widths(own: Cache, monkeypatch: pytest.Mon
 
 
 @pytest.mark.usefixtures("at_once")
-@pytest.mark.parametrize("found", [False, True])
+@few("found", [False, True], 1)
 def test_a_library_that_cannot_be_made_is_done_without(
     found: bool, own: Cache, monkeypatch: pytest.MonkeyPatch
 ) -> None:

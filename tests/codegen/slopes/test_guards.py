@@ -8,7 +8,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from tools.repeats import thorough
 from worlds.guarded import HEAPS, whole
 
 import symphys
@@ -33,8 +32,8 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Cache:
     return Cache(tmp_path_factory.mktemp("kernels"))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["spheres", thorough("capsules"), thorough("a box"), thorough("soft")])
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["spheres", "capsules", "a box", "soft"])
 def test_a_heap_is_that_of_all_calls_to_the_last_bit(name: str, tmp_path: Path, cache: Cache) -> None:
     path = tmp_path / "heap.toml"
     path.write_text(HEAPS[name], "utf-8")

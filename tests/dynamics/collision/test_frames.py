@@ -29,7 +29,7 @@ def from_surface(point: Array, solid: Solid) -> float:
     return abs(distance(Solid(point, np.eye(3), np.zeros(3), 0.0), solid))
 
 
-@pytest.mark.parametrize("pair", PAIRS)
+@few("pair", PAIRS, 1)
 def test_frames_at_the_touch(pair: tuple[str, str]) -> None:
     """One point in space, on both surfaces, and a step along the normal parts them.
 

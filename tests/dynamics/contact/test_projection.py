@@ -18,7 +18,7 @@ from symphys.model.world import Law
 MANY = 200
 
 
-@pytest.mark.parametrize("coupled", [False, True])
+@few("coupled", [False, True], 1)
 @few("seed", range(6), 1)
 def test_a_contact_obeys_its_law(seed: int, coupled: bool) -> None:
     """0 <= normal and u_n >= target, one of them with equality; |tangent| <= mu normal, against the slip if equal."""

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from tools.laboratory import Lab, central_difference, value_and_gradient
+from tools.repeats import few
 from worlds.linkage import ABOUT_Y, ABOUT_Z, Array, chain, hanging, momenta, separations
 
 from symphys.model.joints import (
@@ -126,8 +127,8 @@ def test_a_damper_under_a_load_is_of_second_order() -> None:
     assert errors[0] == pytest.approx(4 * errors[1], rel=0.05)
 
 
-@pytest.mark.parametrize("dt", [0.02, 0.005])
-@pytest.mark.parametrize("stiffness", [2000.0, 50000.0])
+@few("dt", [0.02, 0.005], 1)
+@few("stiffness", [2000.0, 50000.0], 1)
 def test_what_is_held_comes_to_rest_where_its_force_is_the_load(dt: float, stiffness: float) -> None:
     """k (target - q) = m g of a position motor, m g and a torque motor's force of a spring; at any time step."""
     load, damping = 2.0 * 9.81, 2 * np.sqrt(stiffness * 2.0)
