@@ -16,12 +16,8 @@ import numpy as np
 from measured_worlds import problem_of
 from numpy.typing import NDArray
 
-from symphys import Body, Law, Plane, Scheme
 from symphys.codegen import compile_program
-from symphys.codegen.neighbours.kernel import compile_crowd
-from symphys.model.world import World
 from symphys.transcription import rollout_program
-from symphys.transcription.neighbours.program import crowd_of
 from symphys.transcription.rollout import symbolic_rollout
 
 STEPS = (0.01, 0.005, 0.0025)
@@ -90,21 +86,6 @@ class Here:
         return batch * self.steps / fastest(lambda: kernel.forward(Z, [0.0]))
 
 
-def found_anew(dt: float) -> tuple[float, float]:
-    """Steps of the box in a second where each finds its pairs anew, and how far its places are from ``Here``'s [m]."""
-    places, velocities = starts("box")
-    bodies = [Body.ball(f"b{i}", RADIUS, mass=1.0, position=tuple(place)) for i, place in enumerate(places)]
-    walls = [Plane(name, (*normal, 0), -HALF) for name, normal in WALLS.items()]
-    world, law = World(tuple(bodies), (Plane.ground(), *walls)), Law(friction=0.3, restitution=0.7)
-    crowd = crowd_of(world, law, Scheme(dt=dt, sweeps=8), exact=True)
-    kernel, steps = compile_crowd(crowd, lanes=1, threads=1), round(duration("box") / dt)
-    start = np.zeros((len(bodies), BODY))
-    start[:, :3], start[:, 3], start[:, 7:10] = places, 1, velocities
-    roll = partial(kernel.rollouts, np.append(start, 0.0)[None], np.zeros((1, crowd.given)), steps)
-    ends = roll()[0, -1, :-1].reshape(-1, BODY)[:, :3]
-    return steps / fastest(roll), float(np.abs(ends - Here("box", dt).places()).max())
-
-
 def there(scene: str, dt: float) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """The scene for MuJoCo with its own defaults, and a contact that gives back about 0.7 of the speed."""
     contact = 'friction="0.3 0 0" solref="-20000 -45" priority="0"'
@@ -162,8 +143,6 @@ def main() -> None:
                 f"{scene:7} dt {dt:7}  symphys {ours.rate(1):10.0f}/s one, {ours.rate(128):10.0f}/s in a batch", end=""
             )
             print(f", error {error:8.1e}   MuJoCo {rate:10.0f}/s, error {other:8.1e}", flush=True)
-            if scene == "box":
-                print("{:32}pairs found anew: {:10.0f}/s one, places off by {}".format("", *found_anew(dt)), flush=True)
 
 
 if __name__ == "__main__":

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 BUILDING, BUILDING_TAKES = "building the problem", 8.0
 """What comes before an examination, and about how long it takes beside the parts of that."""
 
-FOUND = "of all with all; each step finds the pairs that are near"
-
 
 @click.command()
 @click.argument("source", metavar="FILE", shell_complete=complete_problem)
@@ -107,7 +105,7 @@ def describe(problem: Problem) -> list[str]:
         f"  time         {simulation.duration:g} s in {simulation.steps} steps of {simulation.dt:g} s{free}",
         f"  bodies       {listed(body.name for body in world.bodies)}",
         f"  planes       {listed(plane.name for plane in world.statics)}",
-        f"  contacts     {FOUND if problem.parametric.finds_pairs else listed(pairs)}",
+        f"  contacts     {listed(pairs)}",
     ]
     if world.joints:
         lines.append(f"  joints       {listed(f'{joint.name} ({joint.kind.name})' for joint in world.joints)}")

@@ -60,8 +60,6 @@ class StepContext:
         inputs: names of the forces and torques that ``u`` stacks.
         u: what the inputs stack, constant over the step.
         near: per pair: 1 if it may act in the step, 0 if it is too far apart; empty: all may.
-        sample: whether the world's bodies stand for many more: pairs that are far are looked for however few there are.
-        again: whether what is near is looked at again in each substep.
     """
 
     world: World
@@ -69,8 +67,6 @@ class StepContext:
     inputs: tuple[str, ...]
     u: Expr
     near: tuple[Expr, ...] = ()
-    sample: bool = False
-    again: bool = False
 
     def pairs_and_near(self) -> Iterator[tuple[Pair, Expr]]:
         """The pairs, and whether they may act."""

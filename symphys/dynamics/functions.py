@@ -55,55 +55,32 @@ def step_function(
         >>> round(float(x[Layout(world)["ball.velocity"]][0]), 12)
         0.01
     """
-    return InlineSteps(world, inputs, parameters).step(scheme)
+    arguments, layout = arguments_of(world, inputs, parameters), Layout(world)
+    tracer = inline(world, arguments)
+    with tracing(tracer):
+        after, _ = take_step(context_of(world, scheme, inputs, arguments), parts_of(layout, arguments[0]))
+    packed = _packed(layout, tracer, after)
+    step = ca.Function("step", arguments, [packed], ["x", "u", "p", "smoothing"], ["x_next"])
+    if step.n_instructions() > MOST_INSTRUCTIONS:
+        return step
+    with verbatim():
+        packed = ca.cse(packed)
+    return ca.Function("step", arguments, [packed], ["x", "u", "p", "smoothing"], ["x_next"])
 
 
 def report_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
     """The same step with all of its ``StepReport``: (x, u, p, smoothing) -> (x_next, forces, gaps, .. paradox)."""
-    return InlineSteps(world, inputs, parameters).report(scheme)
-
-
-class InlineSteps:
-    """Steps of one world as casadi functions; what steps of several schemes have in common is built once.
-
-    With more sweeps that is nearly all, with another time step what does not depend on it.
-    """
-
-    def __init__(self, world: World, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()) -> None:
-        """See ``step_function``; nothing is built yet."""
-        self._world, self._inputs, self._layout = world, inputs, Layout(world)
-        self._arguments = arguments_of(world, inputs, parameters)
-        self._tracer: InlineTracer | None = None
-
-    def step(self, scheme: Scheme | None = None) -> ca.Function:
-        """See ``step_function``."""
-        if self._tracer is None:
-            self._tracer = inline(self._world, self._arguments)
-        arguments, tracer = self._arguments, self._tracer
-        with tracing(tracer):
-            context = context_of(self._world, scheme, self._inputs, arguments)
-            after, _ = take_step(context, parts_of(self._layout, arguments[0]))
-        packed = _packed(self._layout, tracer, after)
-        step = ca.Function("step", arguments, [packed], ["x", "u", "p", "smoothing"], ["x_next"])
-        if step.n_instructions() > MOST_INSTRUCTIONS:
-            return step
-        with verbatim():
-            packed = ca.cse(packed)
-        return ca.Function("step", arguments, [packed], ["x", "u", "p", "smoothing"], ["x_next"])
-
-    def report(self, scheme: Scheme | None = None) -> ca.Function:
-        """See ``report_function``."""
-        arguments = self._arguments
-        tracer = self._tracer or inline(self._world, arguments, reduces=False)
-        with tracing(tracer):
-            context = context_of(self._world, scheme, self._inputs, arguments)
-            after, substeps = take_step(context, parts_of(self._layout, arguments[0]))
-            r = report(context, substeps)
-        reported = {field.name: tracer.value(getattr(r, field.name)) for field in fields(r)}
-        outputs, names = [_packed(self._layout, tracer, after), *reported.values()], ["x_next", *reported]
-        return ca.Function("report", arguments, outputs, ["x", "u", "p", "smoothing"], names)
+    arguments, layout = arguments_of(world, inputs, parameters), Layout(world)
+    tracer = inline(world, arguments, reduces=False)
+    with tracing(tracer):
+        context = context_of(world, scheme, inputs, arguments)
+        after, substeps = take_step(context, parts_of(layout, arguments[0]))
+        found = report(context, substeps)
+    reported = {field.name: tracer.value(getattr(found, field.name)) for field in fields(found)}
+    outputs, names = [_packed(layout, tracer, after), *reported.values()], ["x_next", *reported]
+    return ca.Function("report", arguments, outputs, ["x", "u", "p", "smoothing"], names)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
 from symphys.dynamics.joints.joint_impulse import JointImpulse
 from symphys.dynamics.joints.loop_closure import Displacements, TreeDisplacement, close_loops, displaced
 from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
-from symphys.dynamics.tracing.decorator import gathered, opened, repeat, traced
+from symphys.dynamics.tracing.decorator import gathered, repeat, traced
 from symphys.dynamics.unknowns import (
     AllVelocities,
     GeneralizedVelocities,
@@ -51,7 +51,6 @@ def displacements(
     late = [_drift(motion, state, duration) for motion, state in zip(trees.motions, solved, strict=True)]
     if not context.settings.scheme.time_of_impact:
         return late
-    late = [opened(each, k) for k, each in enumerate(late)]
     for each, *impulses in zip(constraints, started, given, strict=True):
         turning = tuple(trees.motions[body].inverse_mid for body in each.bodies)
         own = tuple(late[carrier] for carrier in each.carriers)

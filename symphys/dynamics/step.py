@@ -9,13 +9,12 @@ velocities change, and leapfrog begins anew. Without an impact substeps have equ
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.broad_phase import Approach, approaches_at, near_pairs, near_within
+from symphys.dynamics.collision.broad_phase import near_pairs
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.impact.deferred_impacts import defer_impacts
 from symphys.dynamics.impact.impact import StepSplit, find_split, resolve_impact
@@ -38,22 +37,18 @@ def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
     x = _with_unit_orientations(context, x)
     context = replace(context, near=near_pairs(context, x))
     count = splits_of(context.world, context.settings.scheme)
-    ahead, approaches = context, _approaches(context, x)
     substeps, splits = list[Substep](), list[StepSplit]()
 
     for k in range(count):
         # up to the first impact, equation (22); contacts that close fast give no impulse before it
-        split = find_split(ahead, x, left, 1 / (count - k + 1))
-        until = _narrowed(ahead, approaches, split.first)
-        before = advance(until, x, split.first, suppressed=split.fast)
+        split = find_split(context, x, left, 1 / (count - k + 1))
+        before = advance(context, x, split.first, suppressed=split.fast)
 
         # the impact: no time passes
         section(split.impact)
-        impact = resolve_impact(until, before.x, split)
+        impact = resolve_impact(context, before.x, split)
 
         x, left = impact.x, left - split.first
-        approaches = _approaches(context, x)
-        ahead = _narrowed(context, approaches, left)
         substeps += [before, impact]
         splits.append(split)
 
@@ -62,7 +57,7 @@ def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
     else:
         # the rest of the step; of several more impacts of a body all but the first wait for the next step
         deferred = defer_impacts(context, x, left, splits)
-        last = advance(ahead, x, left, deferred.suppressed, deferred.plastic)
+        last = advance(context, x, left, deferred.suppressed, deferred.plastic)
         last = replace(last, chained=deferred.chained)
     return last.x, [*substeps, last]
 
@@ -76,18 +71,6 @@ def _with_unit_orientations(context: StepContext, x: State) -> State:
 @traced
 def _normalised(orientation: Expr) -> Expr:
     return rotation.normalised(orientation)
-
-
-def _approaches(context: StepContext, x: State) -> Sequence[Approach]:
-    """Of all pairs where they are looked at again in each substep, else nothing."""
-    return approaches_at(context, x) if context.again else ()
-
-
-def _narrowed(context: StepContext, approaches: Sequence[Approach], duration: Expr) -> StepContext:
-    """The same with less that is near: what may act within ``duration`` [s]."""
-    if not approaches:
-        return context
-    return replace(context, near=near_within(context, approaches, context.near, duration))
 
 
 def splits_of(world: World, scheme: Scheme) -> int:

@@ -39,7 +39,7 @@ from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply, is
 from symphys.dynamics.pgs import apply_start, iterate
 from symphys.dynamics.position_correction import Corrected, close_gaps, displacements
 from symphys.dynamics.prediction import bodies_of, detect_contacts, free_motions, jointed_bodies, predicted_motions
-from symphys.dynamics.tracing.decorator import gathered, opened, traced
+from symphys.dynamics.tracing.decorator import gathered, traced
 from symphys.dynamics.unknowns import AllVelocities, Momenta, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.maths.smoothing import TINY_SQUARE
@@ -234,7 +234,7 @@ def _store_forces(
 ) -> list[tuple[Expr, Expr]]:
     """Persistent contact forces (impacts left out) into ``values``; returns their sum on each body."""
     scheme = context.settings.scheme
-    total = [opened((ca.SX.zeros(3), ca.SX.zeros(3)), k) for k in range(len(context.world.bodies))]
+    total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in context.world.bodies]
     for pair, each, impulse in zip(context.world.pairs, constraints, impulses, strict=True):
         moving = tuple(solved[i] for i in each.carriers) if pair.law.soft else ()
         force, torque = _persistent(each.constraint, impulse, kick, context.shortest_kick, moving)
@@ -270,7 +270,7 @@ def _with_late_impulses(
 ) -> tuple[tuple[ContactImpulse, ...], Momenta]:
     """Add the late impulses of soft contacts that begin or end in the substep; see ``SoftImpulse.late``."""
     whole, soft = list(impulses), [k for k, each in enumerate(constraints) if each.constraint.law.soft]
-    found = [opened(each, k) if soft else each for k, each in enumerate(momenta)]
+    found = list(momenta)
     for k in soft:
         bodies = constraints[k].bodies
         whole[k], moved = _late(constraints[k].constraint, impulses[k], tuple(found[i] for i in bodies))

@@ -79,7 +79,7 @@ def problem_model(
     laws = [Departure("left out", (law.name,), "a force law; MuJoCo has no formulas") for law in problem.forces]
     text = "numbers that hold in a phase alone; a model of MuJoCo has one of each"
     laws += [Departure("left out", (phase.name,), text) for phase in problem.phases if phase.sets]
-    world = problem.parametric.world({}, listed=True)
+    world = problem.parametric.world({})
     felt = problem.sensors
     return mjcf_model(world, problem.initial, dt, name, felt, laws, approximate=approximate, stiffer=stiffer)
 

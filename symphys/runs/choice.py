@@ -97,14 +97,6 @@ def limited(problem: Problem) -> bool:
 
 SITUATIONS = (
     Situation(
-        "so many bodies that steps find their pairs",
-        lambda problem: problem.parametric.finds_pairs,
-        (
-            ChosenSolver("gradient", "of so many bodies motions and their gradients are known, and no expressions"),
-            ChosenSolver("cma", "a search passes kinks, of which so many contacts have many"),
-        ),
-    ),
-    Situation(
         "scenarios, few numbers",
         few_scenarios,
         (

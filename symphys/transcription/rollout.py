@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics.kept import kept, structure
-from symphys.errors import Issue, ProblemError
+from symphys.dynamics.kept import kept
 from symphys.expression import Formula
 from symphys.maths.verbatim import verbatim
-from symphys.model.world import Scheme, World
+from symphys.model.world import World
 from symphys.problem import Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controllers import Control
@@ -31,7 +30,7 @@ from symphys.transcription.objective import plain_sums
 from symphys.transcription.termination import termination_function
 
 if TYPE_CHECKING:  # the physics of a step is imported where it is called: a start from a kept kernel needs none
-    from symphys.dynamics.functions import InlineSteps
+    pass
 
 T = TypeVar("T")
 Expr = Any
@@ -66,7 +65,6 @@ class Rollout:
     x0: Expr
     given: Expr
     p: Expr
-    like: Rollout | None = None
 
     @property
     def controls(self) -> int:
@@ -82,33 +80,14 @@ class Rollout:
         """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
         from symphys.dynamics.functions import step_function
 
-        if self._shares:
-            return self.remembering(self.built(step_function))
-        steps, scheme = self._inline
-        return self.remembering(steps.step(scheme))
+        return self.remembering(self.built(step_function))
 
     @cached_property
     def report(self) -> ca.Function:
         """The step with all that happens in it; see ``report_function``."""
         from symphys.dynamics.functions import report_function
 
-        if self._shares:
-            return self.remembering(self.built(report_function))
-        steps, scheme = self._inline
-        return self.remembering(steps.report(scheme))
-
-    @property
-    def _inline(self) -> tuple[InlineSteps, Scheme]:
-        """The steps of this world, and the scheme of this rollout in their symbols."""
-        first = self.like or self
-        return first._steps, first.parameters.scheme(self.problem.simulation)
-
-    @cached_property
-    def _steps(self) -> InlineSteps:
-        from symphys.dynamics.functions import InlineSteps
-
-        require_listed_pairs(self.problem)
-        return InlineSteps(self.world, self.inputs, self.parameters.symbols)
+        return self.remembering(self.built(report_function))
 
     @property
     def _shares(self) -> bool:
@@ -117,7 +96,6 @@ class Rollout:
 
     def built(self, make: Callable[..., T], *more: Hashable) -> T:
         """What a function makes of the world; problems of a sweep share it, as far as their worlds are equal."""
-        require_listed_pairs(self.problem)
         scheme = self.parameters.scheme(self.problem.simulation)
         arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
         return kept(make, *arguments, *more) if self._shares else make(*arguments, *more)
@@ -259,28 +237,8 @@ class Rollout:
         return any(variable.name in formula.names for variable in self.problem.variables)
 
 
-def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None, like: Rollout | None = None) -> Rollout:
-    """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of.
-
-    ``like``: a rollout of the problem under another scheme. Where their worlds are equal, steps are built together.
-    ProblemError where steps find their pairs: the world lists none.
-    """
-    require_listed_pairs(problem)
-    made = rollout_of(problem, inputs)
-    if like is None or not same_worlds(made, like):
-        return made
-    return replace(made, like=like.like or like)
-
-
-def require_listed_pairs(problem: Problem) -> None:
-    """ProblemError if there are so many bodies that steps find their pairs, from what needs a list of all pairs."""
-    if problem.parametric.finds_pairs:
-        text = "has so many that a step finds the pairs that are near, which can be simulated and solved, but not this"
-        raise ProblemError(problem.file, [Issue("body", text)])
-
-
-def rollout_of(problem: Problem, inputs: tuple[str, ...] | None = None) -> Rollout:
-    """See ``symbolic_rollout``, whether or not the world lists its pairs."""
+def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None) -> Rollout:
+    """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of."""
     parameters = varied_parameters(problem)
     scheduled = tuple((share.name, share.symbol) for share in parameters.phases.shares)
     inputs = (*(input_names(problem) if inputs is None else inputs), *(name for name, _ in scheduled))
@@ -289,12 +247,6 @@ def rollout_of(problem: Problem, inputs: tuple[str, ...] | None = None) -> Rollo
     smoothing = ca.MX.sym("smoothing")
     start, memory = start_of(problem, world, inputs, parameters, z), memory_of(problem, world)
     return Rollout(problem, world, inputs, parameters, memory, z, smoothing, memory.start(start.x0), start.u, start.p)
-
-
-def same_worlds(one: Rollout, other: Rollout) -> bool:
-    """Whether the steps of two rollouts are equal functions, but for their schemes."""
-    first, second = (structure(each.world, each.parameters.symbols) for each in (one, other))
-    return first == second and one.inputs == other.inputs
 
 
 def call(function: ca.Function, *arguments: Expr) -> list[Expr]:

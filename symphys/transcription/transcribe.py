@@ -25,7 +25,6 @@ def transcribe(
     exact: bool = False,
     backend: str = BEST,
     threads: int | None = None,
-    like: Rollout | None = None,
 ) -> Transcription:
     """Build everything that solving, judging and recording this problem needs.
 
@@ -34,7 +33,6 @@ def transcribe(
         exact: whether smoothing 0 is all that will be asked for; kernels then leave the smoothing out.
         backend: what evaluates it, a name of ``symphys.codegen.backends.NAMES``.
         threads: that share a batch; None: one for each processor.
-        like: the rollout of the problem under another scheme; what steps of both have in common is built once.
 
     Example:
         >>> import symphys
@@ -48,26 +46,20 @@ def transcribe(
         from symphys.transcription.randomization import with_scenarios
 
         require_small_nets(problem, "a problem with scenarios")
-        plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads, like)
+        plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads)
         return with_scenarios(plain, problem, exact, backend, threads)
     if has_large_nets(problem):
         from symphys.transcription.network_rollout import transcribe_large
 
         require_fixed_duration(problem)
         return transcribe_large(problem, exact, backend, threads)
-    if problem.parametric.finds_pairs:
-        from symphys.transcription.neighbours.transcription import transcribe_crowd
-
-        return transcribe_crowd(problem, threads)
-    return _transcribed(problem, exact, backend, threads, like)
+    return _transcribed(problem, exact, backend, threads)
 
 
-def _transcribed(
-    problem: Problem, exact: bool, backend: str, threads: int | None, like: Rollout | None
-) -> Transcription:
+def _transcribed(problem: Problem, exact: bool, backend: str, threads: int | None) -> Transcription:
     """Of one rollout that is an expression."""
     began = perf_counter()
-    rollout = symbolic_rollout(problem, like=like)
+    rollout = symbolic_rollout(problem)
     functions = ExpressionFunctions(rollout)
     names, lower, upper = bounds(problem, lambda formula: int(rollout.compiled(formula).size1_out(0)))
     built = perf_counter() - began

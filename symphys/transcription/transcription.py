@@ -85,7 +85,7 @@ class Transcription:
         simulation, duration = self.problem.simulation, float(record.arrays.time[-1])
         timed = replace(simulation, duration=duration, dt=duration / simulation.steps)
         problem = replace(self.problem, simulation=timed)
-        rollout = replace(self.rollout, problem=problem, like=self.rollout.like or self.rollout)
+        rollout = replace(self.rollout, problem=problem)
         return replace(self, problem=problem, rollout=rollout)
 
     def prices(

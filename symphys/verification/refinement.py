@@ -174,4 +174,4 @@ def finer_problem(transcription: Transcription, what: str) -> Transcription:
         MORE_SWEEPS: replace(simulation, sweeps=2 * simulation.sweeps),
         ONE_MORE: replace(simulation, sweeps=simulation.sweeps + 1),
     }
-    return transcribe(replace(problem, simulation=finer[what]), backend="casadi", like=transcription.rollout)
+    return transcribe(replace(problem, simulation=finer[what]), backend="casadi")

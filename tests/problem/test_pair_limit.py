@@ -50,7 +50,7 @@ def crowd(count: int, keys: str = "", shape: str = BOX) -> str:
 
 
 def test_number_contributors_and_remedy_are_named(refused: Refused, names: Names) -> None:
-    error = refused(text=BASE + crowd(40).replace("mass = 1", "mass = 1\nfriction = 0.1", 1))
+    error = refused(text=BASE + crowd(40))
     largest = rf"\(40 boxes against each other: {780 * EACH}, 40 boxes against ground: {40 * DOWN}\)"
     names(error, "body", f"{780 * EACH + 40 * DOWN} points .* 2000 are allowed {largest}; let")
     names(error, "body", "group, .* collides_with .* spheres in place of boxes")
@@ -65,7 +65,7 @@ def test_groups_and_compounds_are_called_by_name(refused: Refused) -> None:
 
 def test_spheres_are_not_advised_to_be_spheres(refused: Refused) -> None:
     balls = crowd(80, shape="{ sphere = { radius = 0.1 } }")
-    message = str(refused(text=BASE + balls.replace("mass = 1", "mass = 1\nfriction = 0.1", 1)))
+    message = str(refused(text=BASE + balls))
     assert "3240 points" in message
     assert "in place of" not in message
 

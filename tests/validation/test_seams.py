@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tools.repeats import few, first, thorough
 from worlds.blocks import block, rod, turned_by
 
-from symphys.dynamics.functions import InlineSteps
+from symphys.dynamics.functions import step_function
 from symphys.model.shapes import Box, Fixture
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, make_world
@@ -46,11 +46,11 @@ class Boards:
             for y in sides[0]
         ]
         world = make_world([bodies()[kind]], blocks, Law(FRICTION))
-        self.layout, self.world, self.steps = Layout(world), world, InlineSteps(world, (), self.numbers)
+        self.layout, self.world = Layout(world), world
 
     @cache  # noqa: B019
     def step(self, sweeps: int, newton: bool) -> ca.Function:
-        return self.steps.step(Scheme(dt=self.dt, sweeps=sweeps, newton_start=newton))
+        return step_function(self.world, Scheme(dt=self.dt, sweeps=sweeps, newton_start=newton), (), self.numbers)
 
     def states(
         self,

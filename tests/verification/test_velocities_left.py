@@ -50,7 +50,7 @@ def missed(few: Transcription) -> float:
     """[m/s] The largest error of a velocity after one step from a state of the motion, as 60 sweeps find it."""
     record, rollout = few.record(few.shooting.start(0)), few.rollout
     simulation = replace(few.problem.simulation, sweeps=60)
-    settled = transcribe(replace(few.problem, simulation=simulation), backend="casadi", like=rollout)
+    settled = transcribe(replace(few.problem, simulation=simulation), backend="casadi")
     x, u, p = record.arrays.x, record.arrays.u, np.tile(record.arrays.p[:, None], rollout.steps)
     after = np.array(settled.rollout.step.map(rollout.steps)(x[:-1].T, u.T, p, 0.0)).T
     return float(speeds(rollout, bodies(rollout, record), after - x[1:]).max())

@@ -124,14 +124,6 @@ def near_points(
     return tuple((ca.logic_and(near, ca.logic_or(gap < ahead, smoothing > 0)),) for gap in gaps)
 
 
-@traced
-def point_gaps(
-    shapes: tuple[Surface, Surface], bodies: tuple[Sight, Sight | None], reach: Travel
-) -> tuple[list[Expr], Expr]:
-    """(of each point of a pair at least how far it is apart, how far it comes within ``reach``) [m]."""
-    return _measured(shapes, bodies, reach)
-
-
 def _measured(
     shapes: tuple[Surface, Surface], bodies: tuple[Sight, Sight | None], reach: Travel
 ) -> tuple[list[Expr], Expr]:

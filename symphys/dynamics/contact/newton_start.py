@@ -109,7 +109,7 @@ class Member:
 
 def open_groups(context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State]) -> list[Group]:
     """Those whose loads may be open, or whose points may lie close together."""
-    if context.sample or not context.settings.scheme.newton_start:
+    if not context.settings.scheme.newton_start:
         return []
     members: dict[int, set[int]] = {k: {k} for k, state in enumerate(states) if state is not None}
     for each in constraints:

@@ -13,7 +13,7 @@ from symphys.dynamics.context import State, StepContext, StepSettings
 from symphys.dynamics.impact.impact import TOGETHER, TOUCHING, StepSplit, strikes
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
-from symphys.dynamics.tracing.decorator import opened, traced
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import either
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Sphere
@@ -55,18 +55,18 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
     hits = [_hit(context.settings, pair.law, contact, each) for pair, each, contact in looked_at]
     eccentric, sides = eccentric_bodies(world), {k for pair in pairs for k in bodies_of(pair)}
     rebounds = {k for pair in pairs if not is_zero(pair.law.restitution) for k in bodies_of(pair)}
-    first: dict[int, Expr] = {body: opened(duration, body) for body in sorted(sides & (eccentric | rebounds))}
+    first: dict[int, Expr] = dict.fromkeys(sorted(sides & (eccentric | rebounds)), duration)
     for pair, contact, (_, meets) in zip(pairs, contacts, hits, strict=True):
         for body in first.keys() & set(bodies_of(pair)):
             first[body] = _sooner(first[body], meets, contact.time)
-    struck = {body: opened(ca.SX(0), body) for body in sorted(first.keys() & eccentric)}
+    struck = {body: ca.SX(0) for body in sorted(first.keys() & eccentric)}
     for j, pair in enumerate(pairs):
         for body in struck.keys() & set(bodies_of(pair)):
             for split in splits:
                 struck[body] = _or(struck[body], split.struck[j])
     rooms = [_room(world, pair, eccentric) for pair in pairs]
     central = {k for pair, room in zip(pairs, rooms, strict=True) if room is not None for k in bodies_of(pair)}
-    blows = {body: opened(ca.SX.zeros(3), body) for body in sorted(central)}
+    blows = {body: ca.SX.zeros(3) for body in sorted(central)}
     for pair, contact, (_, meets) in zip(pairs, contacts, hits, strict=True):
         bodies = bodies_of(pair)
         masses = tuple(motions[i].mass for i in bodies)
@@ -74,7 +74,7 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
             if body in blows:
                 so_far = blows[body], first[body]
                 blows[body] = _blown(context.settings, pair.law, side, masses, so_far, meets, contact)
-    found, chained, plastic = list[Expr](), opened(ca.SX(0)), opened(ca.SX(0))
+    found, chained, plastic = list[Expr](), ca.SX(0), ca.SX(0)
     for (pair, each, contact), (fast, meets), room in zip(looked_at, hits, rooms, strict=True):
         waits, bodies = _passes(fast, meets), bodies_of(pair)
         for body in sorted(first.keys() & set(bodies)):

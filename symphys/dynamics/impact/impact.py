@@ -25,7 +25,7 @@ from symphys.dynamics.joints.assembly import locks_at, momenta_of, prepare_trees
 from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.substep import Substep
-from symphys.dynamics.tracing.decorator import gathered, opened, traced
+from symphys.dynamics.tracing.decorator import gathered, traced
 from symphys.dynamics.unknowns import Iterate, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.maths.smoothing import either, positive
@@ -70,7 +70,7 @@ def find_split(context: StepContext, x: State, duration: Expr, share: float) -> 
         strikes(context.settings, pair.law, contact, near)
         for (pair, near), contact in zip(context.pairs_and_near(), contacts, strict=True)
     ]
-    earliest = opened((ca.SX(0), duration))
+    earliest = (ca.SX(0), duration)
     for contact, closes in zip(contacts, fast, strict=True):
         earliest = _earlier(earliest, closes, contact.hit, contact.time, context.settings.scheme.dt)
     first = _inside(earliest, duration, share)
@@ -223,9 +223,6 @@ def _delay(
     Impacts of several bodies at one instant share a split, but each has an instant with a slope of its own.
     """
     held = {index for joint in context.world.joints for index in joint.bodies}
-    for index, body in enumerate(context.world.bodies):
-        own = tuple(f"{body.name}.{part}" for part in POSE)
-        x |= zip(own, opened(tuple(x[name] for name in own), index), strict=True)
     for each, impulse, time in zip(constraints, impulses, late, strict=True):
         free = [(k, index) for k, index in enumerate(each.bodies) if index not in held]
         if not free:

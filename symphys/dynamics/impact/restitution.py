@@ -22,7 +22,7 @@ from symphys.dynamics.context import StepContext
 from symphys.dynamics.joints.assembly import KinematicTrees, momenta_of
 from symphys.dynamics.motion import PredictedMotion, apply, inverse_inertia
 from symphys.dynamics.pgs import iterate
-from symphys.dynamics.tracing.decorator import folded, gathered, opened, traced
+from symphys.dynamics.tracing.decorator import gathered, traced
 from symphys.dynamics.unknowns import (
     AnyImpulse,
     GeneralizedVelocities,
@@ -59,7 +59,7 @@ def rebound(
     plastic = iterate(context, dead, start, trees)
     between = replace(plastic, momenta=gathered(plastic.momenta)) if context.near else plastic
     newton = iterate(context, constraints, between, trees)
-    sums: tuple[Expr, Expr, Expr] = opened((ca.SX(0), ca.SX(0), ca.SX(0)))
+    sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
     solutions = replace(start, momenta=trees.states), plastic, newton
     bodies = (momenta_of(context, trees, solution.momenta) for solution in solutions)
     for motion, *momenta in zip(motions, *bodies, strict=True):
@@ -83,7 +83,7 @@ def _without_rebound(constraint: Any) -> Any:
     return replace(constraint, target=ca.fmin(constraint.target, 0))
 
 
-@folded
+@traced
 def _energies(
     sums: tuple[Expr, Expr, Expr], motion: PredictedMotion, momenta: list[Momentum]
 ) -> tuple[Expr, Expr, Expr]:

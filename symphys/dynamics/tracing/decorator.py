@@ -8,7 +8,7 @@ depend on its arguments alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import wraps
@@ -22,7 +22,7 @@ C = TypeVar("C")
 class Tracing(Protocol):
     """What traces the calls of a step."""
 
-    def guard(self, word: Any, of: Hashable, point: int | None, late: bool) -> None:
+    def guard(self, word: Any) -> None:
         """Where ``word`` is 0, what depends on it may be left out."""
         ...
 
@@ -36,14 +36,6 @@ class Tracing(Protocol):
 
     def gathered(self, tree: T) -> T:
         """The same, its numbers side by side."""
-        ...
-
-    def opened(self, tree: T, body: int | None) -> T:
-        """The same, ready to be handed on from one member to the next."""
-        ...
-
-    def in_sight(self, bodies: Sequence[Any], striking: Any) -> None:
-        """See the function of that name."""
         ...
 
     def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
@@ -75,18 +67,14 @@ def traced(function: Callable[P, T]) -> Callable[P, T]:
     return call
 
 
-def guard(word: T, of: Hashable = None, point: int | None = None, late: bool = False) -> T:
+def guard(word: T) -> T:
     """The same word, 0 or 1, marked: a compiled kernel leaves out the calls that are without effect where it is 0.
 
-    Args:
-        word: marked.
-        of: what it is about.
-        point: about which point of that alone; None: about all.
-        late: whether it is known only within the step; else all that it depends on comes before what is left out.
+    All that it depends on comes before what is left out.
     """
     tracer = _TRACER.get()
     if tracer is not None:
-        tracer.guard(word, of, point, late)
+        tracer.guard(word)
     return word
 
 
@@ -102,33 +90,6 @@ def gathered(tree: T) -> T:
     """The same tree; between calls its numbers lie side by side, so that they can stand for results of a call."""
     tracer = _TRACER.get()
     return tree if tracer is None else tracer.gathered(tree)
-
-
-def opened(tree: T, body: int | None = None) -> T:
-    """The same tree, marked as what one member after the other adds to, or hands on: the start of a chain.
-
-    Members are the pairs of a ``body``; without it they are all bodies or all pairs.
-    """
-    tracer = _TRACER.get()
-    return tree if tracer is None else tracer.opened(tree, body)
-
-
-def folded(function: Callable[P, T]) -> Callable[P, T]:
-    """``traced``, for a function that hands its first argument on to the next body, with what this one adds."""
-    function.folds = True  # type: ignore[attr-defined]
-    return traced(function)
-
-
-def in_sight(bodies: Sequence[Any], striking: Any) -> None:
-    """By what pairs that are near are found.
-
-    Args:
-        bodies: of each its position and its reach [m]: pairs with a gap between two reaches do not act in the step, but
-        striking: if that is less than this [m].
-    """
-    tracer = _TRACER.get()
-    if tracer is not None:
-        tracer.in_sight(bodies, striking)
 
 
 def repeat(count: int, once: Callable[[C, T], T], context: C, state: T) -> T:

@@ -68,7 +68,6 @@ def with_guards(
     calls: Sequence[TracedCall],
     guards: Sequence[TracedVector],
     sections: Sequence[tuple[TracedVector, int]],
-    late: Sequence[TracedVector] = (),
 ) -> tuple[TracedCall, ...]:
     """The calls, with what leaves them without effect; each section in one piece.
 
@@ -76,12 +75,11 @@ def with_guards(
         calls: of a step.
         guards: words that each leave out a few calls, here and there. What they depend on comes first.
         sections: words, as entries of vectors, that each leave out many calls that follow one another.
-        late: more guards, known only where they are computed.
     """
     search = _Search(calls)
-    first, found, words = search.needed(guards), dict[int, Guard](), [*guards, *late]
-    own, implied, taken = search.implied(words), dict[int, list[int]](), set(first)
-    for word in sorted(words, key=lambda each: len(own[each.number])):
+    first, found = search.needed(guards), dict[int, Guard]()
+    own, implied, taken = search.implied(guards), dict[int, list[int]](), set(first)
+    for word in sorted(guards, key=lambda each: len(own[each.number])):
         weaker = {k for number in own[word.number] for k in implied[number]}
         taken -= search.writers(own[word.number])
         left = search.left_out(Part(word), taken, weaker, [found[k] for k in weaker])

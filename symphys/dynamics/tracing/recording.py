@@ -7,7 +7,7 @@ arguments are recorded once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from itertools import count
 from typing import Any, NamedTuple, TypeVar
 
@@ -53,7 +53,6 @@ class Recorder(Tracer):
         super().__init__()
         self.calls: list[TracedCall] = []
         self.guards: list[TracedVector] = []
-        self.late_guards: list[TracedVector] = []
         self.sections: list[tuple[TracedVector, int]] = []
         self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
@@ -64,11 +63,11 @@ class Recorder(Tracer):
         """A slot for an argument of the step."""
         self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
 
-    def guard(self, word: Any, of: Hashable, point: int | None, late: bool) -> None:
+    def guard(self, word: Any) -> None:
         """See ``decorator.guard``; what is known already guards nothing."""
         (code,) = word.codes if isinstance(word, TracedMatrix) else self._codes(word)
         if not isinstance(code, float):
-            (self.late_guards if late else self.guards).append(self._slots[code[0]])
+            self.guards.append(self._slots[code[0]])
 
     def section(self, word: Any) -> None:
         """See ``decorator.section``."""

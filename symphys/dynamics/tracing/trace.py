@@ -97,7 +97,10 @@ class Tracer(ABC):
     """Calls traced functions; see ``decorator``."""
 
     def __init__(self, reduces: bool = True) -> None:
-        """``reduces``: what a function computes twice is looked for, which takes up to half of the building."""
+        """``reduces``: what a function computes twice is looked for, which takes up to half of the building.
+
+        Where that was done for another tracer, this one has it too.
+        """
         self._reduces = reduces
         self._columns: list[Expr | None] = []
         self._entries: list[list[Expr]] = []
@@ -112,9 +115,9 @@ class Tracer(ABC):
             state = once(context, state)
         return state
 
-    def guard(self, word: Any, of: Hashable, point: int | None, late: bool) -> None:
+    def guard(self, word: Any) -> None:
         """What tells which calls are without effect; of use to a recorder alone."""
-        del word, of, point, late
+        del word
 
     def section(self, word: Any) -> None:
         """Likewise."""
@@ -123,15 +126,6 @@ class Tracer(ABC):
     def gathered(self, tree: T) -> T:
         """The same tree."""
         return tree
-
-    def opened(self, tree: T, body: int | None) -> T:
-        """The same tree; see ``decorator.opened``."""
-        del body
-        return tree
-
-    def in_sight(self, bodies: Sequence[Any], striking: Any) -> None:
-        """See ``decorator.in_sight``; of use to a recorder of many bodies alone."""
-        del bodies, striking
 
     @abstractmethod
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
@@ -179,10 +173,10 @@ class Tracer(ABC):
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
         """``function(*arguments, **named)``."""
         number, slots = self._structures.of_call(arguments, named)
-        key = function, number, self._reduces
-        template = self._pieces.templates.get(key)
+        known = self._pieces.templates
+        template = known.get((function, number, True)) or known.get((function, number, self._reduces))
         if template is None:
-            template = self._pieces.templates[key] = self._build(function, arguments, named, slots)
+            template = known[function, number, self._reduces] = self._build(function, arguments, named, slots)
         tree: T = self._fill(template, slots)
         return tree
 

@@ -6,20 +6,21 @@ from collections.abc import Sequence
 
 from symphys.model.shapes import SHAPES, SURFACES, SolidShape, Surface, points_of_kinds
 from symphys.problem.parametric.collision_filter import BodyClass, CollisionFilter, PairCount
-from symphys.problem.parametric.meetings import MOST_POINTS, hindrance
 from symphys.problem.parametric.parts import ParametricBody
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults
 
 LISTED = 3
+MOST_POINTS = 2000
+"""Points of contact of a world: all are looked at in every step."""
 
 
 def check_pair_limit(world: ParametricWorld, faults: Faults) -> None:
-    """Every point where two surfaces may touch is computed in every step, unless steps find those that are near."""
+    """Every point where two surfaces may touch is computed in every step."""
     candidates = CollisionFilter(world.parts, (*world.pairs, *world.jointed))
     counted = candidates.count(MOST_POINTS)
-    if counted.points > MOST_POINTS and (why := hindrance(world)) is not None:
-        faults.stop(("body",), too_many(candidates, counted, why))
+    if counted.points > MOST_POINTS:
+        faults.stop(("body",), too_many(candidates, counted))
     if counted.uncovered:
         listed = ", ".join(f"{a} and {b}" for a, b in counted.uncovered[:LISTED])
         more = f" and {len(counted.uncovered) - LISTED} more" if len(counted.uncovered) > LISTED else ""
@@ -30,7 +31,7 @@ def check_pair_limit(world: ParametricWorld, faults: Faults) -> None:
         )
 
 
-def too_many(candidates: CollisionFilter, counted: PairCount, why: str) -> str:
+def too_many(candidates: CollisionFilter, counted: PairCount) -> str:
     """How many points there are, where most come from, and what to do."""
     sets = list(candidates.sets.values())
     largest = counted.shares.most_common(LISTED)
@@ -45,10 +46,7 @@ def too_many(candidates: CollisionFilter, counted: PairCount, why: str) -> str:
     others = sorted({solid.plural for solid in solids if most_points(type(solid)) > most_points(simplest)})
     if others:
         remedy += f"; or take {simplest.plural} in place of {' and '.join(others)}"
-    alone = f"free spheres, capsules and boxes that all touch all under one law, on planes, have no limit; here {why}"
-    return (
-        f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}; {alone}"
-    )
+    return f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}"
 
 
 def most_points(kind: type[Surface]) -> int:

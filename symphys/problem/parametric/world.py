@@ -23,7 +23,6 @@ from symphys.model.site import Site
 from symphys.model.world import Law, Pair, Side, World, points_of
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.joints import ParametricJoint
-from symphys.problem.parametric.meetings import found_anew
 from symphys.problem.parametric.parts import (
     COMBINE,
     Numbers,
@@ -92,16 +91,8 @@ class ParametricWorld:
                 found[f"{joint.name}.start_rate"] = np.zeros(count)
         return found
 
-    @cached_property
-    def finds_pairs(self) -> bool:
-        """Whether steps find the pairs that are near: then the world lists none."""
-        return found_anew(self)
-
-    def world(self, overrides: Mapping[str, Any], listed: bool = False) -> World:
-        """The world with some parameters replaced; KeyError for a name that is none.
-
-        ``listed``: with all pairs, even where steps find them.
-        """
+    def world(self, overrides: Mapping[str, Any]) -> World:
+        """The world with some parameters replaced; KeyError for a name that is none."""
         nominal = self.parameters()
         for name in overrides:
             if name not in nominal:
@@ -120,7 +111,7 @@ class ParametricWorld:
         return World(
             bodies,
             statics,
-            self._pairs(bodies, statics, value) if listed or not self.finds_pairs else (),
+            self._pairs(bodies, statics, value),
             value("gravity"),
             joints,
             placed_couplings(self.couplings, joints),

@@ -10,10 +10,10 @@ import pytest
 from tools.repeats import first
 
 from symphys.dynamics.functions import TracedStep, step_function, trace_step
-from symphys.dynamics.tracing import trace
 from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import repeat, traced, tracing
 from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector
+from symphys.maths.verbatim import verbatim
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, World, make_world
@@ -65,21 +65,6 @@ def run(
         for slot in recording.results.keys() & set(piece.outputs):
             after[recording.results[slot]] = values[slot]
     return after
-
-
-def test_what_was_built_for_one_step_serves_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another world of the same parts builds nothing, until so much is kept that the next one begins anew."""
-    built = []
-    build = trace.Tracer._build
-    monkeypatch.setattr(trace, "_PIECES", trace.Pieces())
-    monkeypatch.setattr(trace.Tracer, "_build", lambda *given: built.append(given[1]) or build(*given))
-    step, count = trace_step(worlds()["one ball"]), len(built)
-    again = trace_step(worlds()["one ball"])
-    assert count == len(built) > 0
-    assert [call.function.serialize() for call in again.calls] == [call.function.serialize() for call in step.calls]
-    monkeypatch.setattr(trace, "MOST_PIECES", 0)
-    trace_step(worlds()["one ball"])
-    assert len(built) == 2 * count
 
 
 @pytest.mark.slow
@@ -245,3 +230,31 @@ def test_parameters_in_expressions_have_a_piece() -> None:
 def start(world: World) -> tuple[np.ndarray, np.ndarray]:
     """(x, u) at the start, above the ground."""
     return np.array(initial_state(world, {"ball.position": [0, 0, 0.1]})).ravel(), np.zeros(0)
+
+
+@pytest.mark.slow
+def test_a_step_as_one_expression_has_the_bits_of_its_calls() -> None:
+    """Casadi simplifies nothing across them; with these velocities results differed from the fourteenth step on."""
+    places = [(0.24 * (i % 2) - 0.12, 0.24 * (i // 2), 0.15) for i in range(4)]
+    balls = [Body.ball(f"b{i}", radius=0.1, mass=1.0, position=place) for i, place in enumerate(places)]
+    world = make_world(balls, [Plane.ground(), Plane("wall", (1, 0, 0), -0.3)], Law(friction=0.4, restitution=0.5))
+    scheme = Scheme(dt=0.01, sweeps=6)
+    whole, traced, layout = step_function(world, scheme), trace_step(world, scheme), Layout(world)
+    velocities = np.random.default_rng(3).uniform(-1.5, 1.5, (4, 3))
+    x = np.array(ca.DM(initial_state(world, {f"b{i}.velocity": velocities[i] for i in range(4)}))).ravel()
+    for _ in range(25):
+        after = run(traced, layout, x, np.zeros(0), 0.0)
+        np.testing.assert_array_equal(np.array(whole(x, [], [], 0)).ravel(), after)
+        x = after
+
+
+def test_verbatim_expressions_may_be_nested() -> None:
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    back = ca.Function("back", [x, y], [x + y])
+    with verbatim():
+        with verbatim():
+            pass
+        kept = back(x - y, y)
+    assert kept.n_dep() == 2
+    assert ca.is_equal(back(x - y, y), x)
+    assert float(ca.Function("kept", [x, y], [kept])(1e-20, 1.0)) == 0

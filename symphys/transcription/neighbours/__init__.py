@@ -1,1 +1,0 @@
-"""Rollouts of many bodies: programs of loops, and what evaluates them."""
