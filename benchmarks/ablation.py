@@ -25,15 +25,14 @@ from ablation_worlds import (
     spinning_box,
 )
 from gradients import dropped
-from numpy.typing import NDArray
 from rolling import Rolling, Walk
 from scenes import Scene, Solid
 
 from symphys.dynamics.functions import step_function
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Scheme, World
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 DT = 0.01
 SCHEMES: dict[str, Mapping[str, Any]] = {
     "whole": {},

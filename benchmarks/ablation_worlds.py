@@ -6,14 +6,13 @@ from dataclasses import replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scenes import Scene, Solid, turned
 
 from symphys.model.shapes import Plane
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Law, Pair, World, make_world
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 RADIUS = 0.0286
 BOX = Solid("box", 1.0, (0.2, 0.15, 0.1))
 

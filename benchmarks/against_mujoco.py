@@ -14,11 +14,11 @@ from time import perf_counter
 import mujoco
 import numpy as np
 from measured_worlds import problem_of
-from numpy.typing import NDArray
 
 from symphys.codegen import compile_program
 from symphys.transcription import rollout_program
 from symphys.transcription.rollout import symbolic_rollout
+from symphys.types import Array
 
 STEPS = (0.01, 0.005, 0.0025)
 FINEST = STEPS[0] / 64
@@ -30,7 +30,6 @@ BODY = 19
 """Numbers of a body in a state."""
 SPREAD = 0.3
 """[m/s] between the velocities of a batch: no two of its scenes have the same contacts."""
-Array = NDArray[np.float64]
 
 
 def starts(scene: str) -> tuple[Array, Array]:

@@ -20,13 +20,12 @@ from typing import Any, Protocol
 import numpy as np
 from contact_figures import Curve, consistency_figure
 from mujoco_runs import Contact, Runs, model_of, states_of
-from numpy.typing import NDArray
 from rolling import Walk
 from scenes import Scene, heap_of_capsules, tumbling_box
 
 from symphys.model.world import Scheme, World
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 STEPS = (0.016, 0.008, 0.004, 0.002, 0.001, 0.0005, 0.00025)
 FINE = 0.001 / 64
 SAMPLE = 0.016

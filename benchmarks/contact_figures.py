@@ -12,11 +12,10 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from symphys.report.figures import style
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 LOOKS = {
     "symphys, e = 0": (style.BLUE, "o", "-"),
     "symphys, e = 0.5": (style.GREEN, "^", "-"),

@@ -17,7 +17,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scenes import Solid
 from table_robot import table_problem
 
@@ -29,8 +28,8 @@ from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Pair, Scheme, World, make_world
 from symphys.transcription import symbolic_rollout
 from symphys.transcription.simulation import recorder, simulate
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 HOMES = ("contact.coupling", "substep", "impact.impact")
 coupling, substep, impact = (import_module(f"symphys.dynamics.{name}") for name in HOMES)
 Run = tuple[float, Array, Array, Layout]

@@ -19,14 +19,13 @@ import casadi as ca
 import numpy as np
 from contact_figures import Curve, gradient_figure
 from mujoco_runs import Contact, Runs, model_of, states_of
-from numpy.typing import NDArray
 from rolling import Rolling
 from scenes import Scene, Solid, tumbling_box
 
 from symphys.model.state_layout import initial_state
 from symphys.model.world import Scheme
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 FINE = 0.001 / 32
 HALVINGS = 8
 DIFFERENCE = 1e-6

@@ -17,14 +17,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import symphys
 from symphys import threads
 from symphys.prediction.residuals import residuals_of
 from symphys.results.identification import Identification
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Tables = dict[str, Any]
 NOISE, RATE = 0.002, 100
 """[m], [Hz]."""

@@ -19,7 +19,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.sparse import lil_matrix
 from tosses_data import CUBE, RATE, Tosses, read
@@ -28,8 +27,8 @@ from tosses_symphys import CUBE_NUMBERS, GRAVITY, Options, assigned, recording, 
 import symphys
 from symphys.identification import FitOptions, fit
 from symphys.prediction.residuals import RecordingResiduals, residuals_of
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 FRAMES = 40
 """Of each toss: the flight and the first impacts."""
 STARTS = ("position", "orientation", "velocity", "angular_velocity")

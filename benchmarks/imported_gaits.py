@@ -21,15 +21,14 @@ from typing import Any
 import casadi as ca
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from robot_matching import Match
 
 import symphys
 from symphys.dynamics.observation import body_quantities, joint_quantities
 from symphys.importing.packages import model_file
 from symphys.model.state_layout import GIVEN, Layout, initial_state
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 STEPS = 1000
 """Of Gymnasium, the length of an episode."""
 

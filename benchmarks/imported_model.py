@@ -8,7 +8,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from robot_matching import FREE, Match
 from robot_models import RobotModel
 
@@ -16,8 +15,7 @@ import symphys
 from symphys.model.shapes import Plane
 from symphys.problem import Problem
 from symphys.problem.robot_alone import STANDS
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from symphys.report.scene.ground import draw_ground
 from symphys.report.scene.panel import ViewPanel
 from symphys.report.scene.views import choose_views
 from symphys.results.scene_of_problem import make_scene
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 SIZE, DPI = 2.0, 110
 """[in] of a picture, and its dots per inch."""

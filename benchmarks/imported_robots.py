@@ -29,7 +29,6 @@ import numpy as np
 from imported_model import begin, grounded, imported
 from imported_pictures import contact_sheet, picture, trajectory_of
 from imported_table import table
-from numpy.typing import NDArray
 from robot_matching import Match, matched
 from robot_models import RobotModel, all_models
 from robot_motion import agreement
@@ -38,8 +37,8 @@ from robot_speed import Compiled, compiled, motion, speed
 from symphys.model.state_layout import initial_state
 from symphys.problem import Problem
 from symphys.trajectory import Trajectory
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Row = dict[str, Any]
 POSES = 5
 MOST_POINTS = 120

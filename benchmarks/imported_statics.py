@@ -17,7 +17,6 @@ import casadi as ca
 import mujoco
 import numpy as np
 from imported_model import begin, grounded, imported
-from numpy.typing import NDArray
 from robot_matching import Match, matched
 from robot_models import all_models
 
@@ -25,8 +24,8 @@ from symphys.dynamics.functions import step_function
 from symphys.model.joints.joint import Limits, Spring
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 G = 9.81
 DT = 0.004
 SETTLED = 8.0

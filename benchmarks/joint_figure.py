@@ -10,11 +10,10 @@ import numpy as np
 from contact_figures import logarithmic, save
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from symphys.report.figures import style
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 MARKERS = "os^DvPX"
 ROUNDING = 1e-13
 """What lies below is not drawn."""

@@ -17,7 +17,6 @@ import numpy as np
 from ablation_worlds import mechanical_energy
 from joint_figure import Curve, joint_figure
 from joint_worlds import falling_chain, falling_quadruped, given_way, parallelograms, swinging, thrown_chain
-from numpy.typing import NDArray
 from robots import JointedScene
 from rolling import Walk
 
@@ -25,8 +24,8 @@ from symphys.dynamics.functions import trace_step
 from symphys.dynamics.observation import reading_function
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Switches = Mapping[str, Any]
 DT = 0.01
 SWEEPS = (1, 2, 5, 10, 20, 50)

@@ -9,15 +9,14 @@ import cma
 import mujoco
 import numpy as np
 from mujoco import rollout
-from numpy.typing import NDArray
 from race import MARKS, Course
 
 from symphys.codegen import processors
 from symphys.export import mjcf
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 SIGMA, FALLEN = 0.05, 0.5
 DT = 0.002
 """[s]: at 5 and 10 ms the stiff servos of our exporter are not stable there."""

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from consistency import SAMPLE
 from mujoco_runs import Runs, mujoco
-from numpy.typing import NDArray
 from robots import JointedScene
 
 from symphys.export import mjcf
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def model_of(scene: JointedScene, dt: float, integrator: str, cone: str = "elliptic", index: int = 0) -> mujoco.MjModel:

@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scenes import Scene
+
+from symphys.types import Array
 
 try:
     import mujoco
     from mujoco import rollout
 except ImportError:  # what is measured of this engine alone goes without
     mujoco = rollout = None
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from symphys.errors import SymphysError
 from symphys.problem import Problem, require_solvable
 from symphys.problem.loading import load
@@ -32,8 +29,7 @@ from symphys.shooting import Evaluator, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Outcome, Status, TraceRow
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.transcription import fastest
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 SLOWEST = 0.05
 """[s] that a gradient may take."""

@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from profile_runs import Budget, read_lines
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 Axis = Literal["work", "seconds"]
 
 TOLERANCES = (1e-1, 1e-3, 1e-5)

@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from walking import SEED, UNSEEN, Walks
 
 from symphys.problem import load_problem
@@ -28,8 +27,8 @@ from symphys.problems import find
 from symphys.report.figures import style
 from symphys.runs.job import solver_options
 from symphys.solvers import SOLVERS, TraceRow
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 WALK = "quadruped_walk"
 PAPER, AN_HOUR = 1.17, 3600.0
 MARKS = (1.17, 2.0, 2.5)

@@ -17,14 +17,13 @@ import numpy as np
 from consistency import FINE, Engine, Here, distance, samples
 from mujoco_robots import ThereJointed, model_of, states_of
 from mujoco_runs import Runs, mujoco
-from numpy.typing import NDArray
 from robot_consistency import BATCH, EVERY, WINDOW
 from robots import HELD, JointedScene, standing
 from rolling import Rolling
 
 from symphys.model.world import Scheme
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 DT = 0.01
 STEPS = 50
 TURNS = 7

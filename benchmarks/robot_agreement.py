@@ -10,14 +10,13 @@ from __future__ import annotations
 import numpy as np
 from mujoco_robots import ThereJointed, model_of, states_of
 from mujoco_runs import Runs
-from numpy.typing import NDArray
 from robots import JointedScene, Pose, Rotation, chain, quadruped, state_of
 from rolling import Walk
 
 from symphys.model.joints import Spring
 from symphys.model.world import Scheme, World
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 STEPS = (0.01, 0.005, 0.0025, 0.00125)
 FINE = 1e-4
 DURATION = 1.0

@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from table_robot import table_problem
 
 from symphys.codegen import Kernel, compile_program
@@ -19,8 +18,8 @@ from symphys.model.state_layout import Layout
 from symphys.transcription import symbolic_rollout
 from symphys.transcription.network_rollout.step_program import RolloutObjectives, start_function, step_program
 from symphys.transcription.rollout import Rollout
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 STEPS = 300
 DIRECTIONS = 16
 STEEP = 10.0

@@ -16,14 +16,13 @@ from typing import Any
 
 import numpy as np
 from casadi_code import compiled_by_casadi
-from numpy.typing import NDArray
 from table_robot import starts, table_problem
 
 from symphys.codegen import compile_program
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.program import rollout_program
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 STEPS, ROBOTS, FEW, ROUNDS = 20, 128, 4, 7
 LEVEL = "-O1"
 """Of optimisation of casadi's C: more takes the compiler beyond what was waited for."""

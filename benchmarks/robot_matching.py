@@ -11,7 +11,6 @@ from typing import Any
 import casadi as ca
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from robots import Pose, Values, state_of
 from scipy.spatial.transform import Rotation
 
@@ -19,8 +18,8 @@ from symphys.model.joints import kinematic_trees, tree_joints
 from symphys.model.joints.joint import Limits
 from symphys.model.state_layout import initial_state
 from symphys.model.world import World
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 BALL = int(mujoco.mjtJoint.mjJNT_BALL)
 SWITCHED_OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "EQUALITY", "ACTUATION")

@@ -16,9 +16,8 @@ from typing import Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 GYMNASIUM = (
     *("ant", "half_cheetah", "hopper", "walker2d_v5", "humanoid", "humanoidstandup", "inverted_pendulum"),

@@ -12,14 +12,13 @@ import casadi as ca
 import mujoco
 import numpy as np
 from mujoco_runs import Runs
-from numpy.typing import NDArray
 from robot_matching import Match, unforced
 
 from symphys.dynamics.functions import step_function
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 FINE = (1e-4, 2.5e-5, 6.25e-6, 1.5625e-6)
 """[s], of MuJoCo: the first one that the next one confirms; dampers of light links need small ones."""
 CONFIRMED = 1e-9

@@ -16,14 +16,13 @@ from time import perf_counter, process_time
 import mujoco
 import numpy as np
 from mujoco_runs import Runs
-from numpy.typing import NDArray
 from robot_matching import Match
 from rolling import Rolling
 
 from symphys.model.state_layout import Layout as Columns
 from symphys.model.world import Scheme, World
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 BATCH = 128
 TURNS = 5
 FALLEN = 0.5

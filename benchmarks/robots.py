@@ -8,15 +8,14 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from symphys.model.joints import HINGE, Joint, JointFrame, Link, Motor, Servo, Spring, kinematic_trees
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, World, make_world
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Values = dict[str, Any]
 HALF = float(np.sqrt(0.5))
 AXES = {"x": (1.0, 0.0, 0.0, 0.0), "y": (HALF, 0.0, 0.0, HALF), "z": (HALF, 0.0, -HALF, 0.0)}

@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from walking import LEAST, LONG, UNSEEN, Walks
 
 from symphys.problem import load_problem
@@ -26,8 +25,8 @@ from symphys.problems import find
 from symphys.report.figures import style
 from symphys.runs.job import solver_options
 from symphys.solvers import SOLVERS
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 WIDTHS = (0.5, 1.0, 1.5, 2.0)
 SEEDS, STREAM = 5, 1997
 WAYS = {"varied": "learnt under domain randomization", "nominal": "learnt in one sample"}

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import FunctionCall, Kernel, MemoryLayout, Place, Program, compile_program
 from symphys.dynamics.functions import trace_step
 from symphys.model.state_layout import Layout as Columns
 from symphys.model.world import Scheme, World
+from symphys.types import Array, Expr
 
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX"""
 WORDS = 2_000_000
 """Of memory a lane for states in one call; longer rollouts are done in several calls, a state handed on."""
 

@@ -10,14 +10,13 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-from numpy.typing import NDArray
 from table_robot import starts, table_problem
 
 from symphys.codegen import Kernel, compile_program
 from symphys.transcription import rollout_program, symbolic_rollout
+from symphys.types import Array
 
 STEPS = (10, 100, 1000)
-Array = NDArray[np.float64]
 
 
 def main() -> None:

@@ -8,13 +8,12 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.shapes import Box, Capsule, Plane, Sphere
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, World, make_world
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 KINDS = ("sphere", "capsule", "box")
 """By how many sizes they have."""
 

@@ -24,7 +24,6 @@ import numpy as np
 from against_mujoco import text
 from measured_worlds import problem_of
 from mujoco_runs import mujoco
-from numpy.typing import NDArray
 from table_robot import table_problem
 
 from symphys.codegen import compile_program
@@ -36,7 +35,6 @@ from symphys.transcription.staged.linearization import Linearization
 from symphys.transcription.staged.linearized_step import LinearizedStep
 from symphys.transcription.staged.step_program import StepArguments, step_program
 
-Array = NDArray[np.float64]
 STEPS, SETTLED, TURNS = 32, 0.3, 9
 """Steps of a call; [s] after which MuJoCo's are counted."""
 Call = Callable[[], Any]

@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.problem import Problem, load_problem
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 LEGS = {"fl": 1, "fr": -1, "hl": -1, "hr": 1}
 """With the phase of each in a trot."""
 SENSORS = ("angles", "rates", "commands", "impulses", "imu", "loads", "clock", "height")

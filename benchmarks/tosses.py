@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tosses_data import CUBE, ELBOW, Tossed, Tosses, read
 from tosses_flights import flights_of, starts_of
 from tosses_limits import ABLATIONS, SPLITS, ablated, limits, split
@@ -30,8 +29,8 @@ from tosses_search import kept, search
 from tosses_symphys import CUBE_NUMBERS, ELBOW_NUMBERS, Simulator
 
 from symphys.results.identification import summary
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 PARTS = ("fit", "check")
 ENGINES, CASES = ("symphys", "mujoco"), ("a", "b")
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from symphys.types import Array, Ints
+
 RATE = 148.0
 """[Hz] of the recordings."""
 MEASURED = ("position", "orientation", "velocity", "angular_velocity", "angle", "rate")

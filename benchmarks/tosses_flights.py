@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tosses_data import CUBE, RATE, Tossed, Tosses, flights, joined
 from tosses_symphys import CUBE_NUMBERS, ELBOW_NUMBERS, GRAVITY, cube_tables, elbow_tables, recording, write
 
 import symphys
 from symphys.results.identification import Identification, read_identification
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Tables = dict[str, Any]
 NOISE = {
     "cube": {"position": 1e-4, "orientation": 5e-4},

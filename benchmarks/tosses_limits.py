@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tosses_data import CUBE, Tosses, angles_between, flights, mean_errors, read
 from tosses_flights import flights_of, starts_of
 from tosses_search import Number, search
 from tosses_symphys import CUBE_NUMBERS, HALF, MOMENT, RESTITUTION, Options, Simulator
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from symphys.types import Array, Bools
+
 NARROW = 0.5
 """A search that goes on from what was found begins with this share of the first steps."""
 SOFT = ("frequency", "damping")

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 import mujoco
 import mujoco.rollout
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tosses_data import BOX, CUBE, HINGE, RATE, Tossed, Tosses, angles_between, mean_errors
 from tosses_search import Number
 from tosses_symphys import CUBE_NUMBERS, ELBOW_NUMBERS, GRAVITY, LAW, MASS
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 SUBSTEPS, CHUNK = 4, 24
 """Time steps of a frame, and how many tosses of about the same length are simulated in one call."""
 OWN = (

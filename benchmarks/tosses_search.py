@@ -12,9 +12,9 @@ from typing import Any
 
 import cma
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 SIGMA, POPULATION = 1.0, 12
 
 

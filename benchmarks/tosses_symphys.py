@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tosses_data import BOX, CUBE, HINGE, RATE, Tossed, Tosses, mean_errors
 from tosses_search import Number
 
 import symphys
 from symphys.prediction.residuals import RecordingResiduals, residuals_of
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Tables = dict[str, Any]
 GRAVITY, MASS, MOMENT, HALF = 9.601, 0.37, 8.1e-4, 0.0524
 """[m/s^2] that flights give in the lengths of the recordings; published: [kg], [kg m^2], [m]."""

@@ -9,13 +9,12 @@ changes explode there are no differences to compare with, so lengths of gradient
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import Transcription, transcribe
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 STEP, SAMPLES, DIRECTIONS = 1e-7, 16, 8
 AMPLITUDES = (0.02, 0.05, 0.1, 0.15, 0.2)
 

@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import Place
 from symphys.problem import Problem, load_problem
@@ -25,8 +24,8 @@ from symphys.shooting import ScenarioSamples
 from symphys.solvers import SOLVERS
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.randomization.evaluator import KernelScenarioEvaluator
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 UNSEEN, SEED, LEAST = 500, 20161105, 0.7
 LONG: dict[str, Any] = {"iterations": 250, "samples": 32, "rate": 0.01, "horizons": (), "patience": 0.3}
 """Options of ``quadruped_walk`` without shorter motions first, which comparisons of single options begin with."""

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from symphys.api.loading import Source
 from symphys.api.stepping import CompiledStep, compile_step
 from symphys.errors import SymphysError
+from symphys.types import Array
 
 try:
     import gymnasium
@@ -24,7 +25,6 @@ try:
 except ImportError as error:
     raise ImportError('symphys.env needs Gymnasium: pip install "symphys[env]"') from error
 
-Array = NDArray[np.float64]
 Info = dict[str, Any]
 
 

@@ -9,9 +9,9 @@ from functools import cache, lru_cache
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 Text = Callable[[object], str]
 """How a text is read: ``name``, or ``verbatim`` where the file is known to be this program's own."""
 T = TypeVar("T")

@@ -10,20 +10,20 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.api.compiled import CompiledRollout, compile
 from symphys.api.loading import Source
 from symphys.api.stepping import CompiledStep, compile_step
 from symphys.transcription.open_step import StepResult, StepStart
 from symphys.transcription.recorded_rollout import RecordedRollout
+from symphys.types import Array
 
 try:
     import torch
 except ImportError as error:
     raise ImportError('symphys.torch needs PyTorch: pip install "symphys[torch]"') from error
 
-Array = NDArray[np.float64]
 Tensor = Any
 """torch.Tensor"""
 Policy = Callable[[Tensor], Tensor]

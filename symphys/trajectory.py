@@ -12,10 +12,7 @@ from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.suggest import hint, quote
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
+from symphys.types import Array
 
 OF_BODIES = {
     "position": "m",

@@ -12,8 +12,9 @@ import numpy as np
 
 from symphys.errors import SymphysError
 from symphys.shooting import ShootingProblem
-from symphys.solvers.core.outcome import Array, Counts, Outcome, StageResult, Status, TraceRow
+from symphys.solvers.core.outcome import Counts, Outcome, StageResult, Status, TraceRow
 from symphys.solvers.core.point import Point
+from symphys.types import Array
 
 T = TypeVar("T")
 READERS: dict[str, Callable[[Any], Any]] = {

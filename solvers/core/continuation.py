@@ -18,8 +18,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.outcome import Array, Counts, StageResult, Status, StopReason
+from symphys.solvers.core.outcome import Counts, StageResult, Status, StopReason
 from symphys.solvers.core.point import Incumbent, Point
+from symphys.types import Array
 
 Rate = Callable[[CountingEvaluator, Sequence[Array]], list[Point]]
 """Rates points as the solver compares them, without offering them to the incumbent; [] where it compares none."""

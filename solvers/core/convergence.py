@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.core.vanishing_gradient import FLAT, STEP, direction, flat
+from symphys.types import Array
 
 WORTH = 1e-5
 """A fall of the merit by this share of itself is progress."""

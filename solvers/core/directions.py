@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from symphys.solvers.core.outcome import Array
+from symphys.types import Array
 
 ADAM_FLOOR = 1e-8
 """Added to Adam's root mean square gradient, as in the paper."""

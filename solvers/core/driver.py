@@ -18,9 +18,10 @@ from symphys.solvers.core.continuation import Rate, exact_best, stage_result
 from symphys.solvers.core.evaluator import CountingEvaluator, WorkCounter
 from symphys.solvers.core.interface import Iteration, IterationRecorder, Log, Method, Solver, StageContext, nothing
 from symphys.solvers.core.options import SolverOptions
-from symphys.solvers.core.outcome import Array, Counts, Keep, Monitor, Outcome, StageResult, Status, StopReason
+from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageResult, Status, StopReason
 from symphys.solvers.core.point import Incumbent, Stop
 from symphys.solvers.core.trace import SolveTrace, counts_of
+from symphys.types import Array
 
 FINISHED: dict[str, object] = {}
 """The state of a stage that has nothing left to do."""

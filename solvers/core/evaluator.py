@@ -10,8 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from symphys.shooting import Evaluator, ScenarioEvaluator, ScenarioSamples, ShootingProblem, Values
-from symphys.solvers.core.outcome import Array, Counts
+from symphys.solvers.core.outcome import Counts
 from symphys.solvers.core.point import Incumbent, Point
+from symphys.types import Array
 
 
 class WorkCounter:

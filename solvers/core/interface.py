@@ -9,8 +9,9 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.outcome import Array, Counts, Keep, Monitor, Outcome, StopReason
+from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StopReason
 from symphys.solvers.core.point import Point
+from symphys.types import Array
 
 Log = Callable[[str], None]
 """Takes one line of text."""

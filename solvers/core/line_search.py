@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.outcome import Array
 from symphys.solvers.core.point import Point
+from symphys.types import Array
 
 SLOPE_SHARE = 1e-4
 """Of the decrease that the slope promises, so much must come (Armijo)."""

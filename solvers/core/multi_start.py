@@ -18,7 +18,8 @@ import numpy as np
 from symphys.errors import SymphysError
 from symphys.shooting import Evaluator, ShootingProblem, Values
 from symphys.solvers.core.interface import Solver
-from symphys.solvers.core.outcome import Array, Monitor, Outcome
+from symphys.solvers.core.outcome import Monitor, Outcome
+from symphys.types import Array
 
 Own = TypeVar("Own")
 

@@ -6,10 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import astuple, dataclass, field
 from enum import Enum
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class Status(Enum):

@@ -9,7 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.core.outcome import Status, StopReason
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.outcome import Array
 from symphys.solvers.core.point import Point
+from symphys.types import Array
 
 REFUSALS = 6
 """A step is shortened so often at most."""

@@ -12,10 +12,9 @@ from symphys.shooting import Expansion, Linearized
 from symphys.solvers.ddp.box_qp import solve_box_qp
 from symphys.solvers.ddp.knots import KnotStep
 from symphys.solvers.ddp.riccati import CostToGo, Feedback, LinearStep, riccati_recursion
+from symphys.types import Array, Ints
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Selection = slice | Indices
+Selection = slice | Ints
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ def backward_pass(
     slopes: Iterable[Linearized],
     costs: Expansion,
     knots: Sequence[KnotStep],
-    statics: Indices,
+    statics: Ints,
     bounds: Bounds,
     damping: float,
 ) -> Policy | None:
@@ -98,7 +97,7 @@ class _Steps:
     """
 
     def __init__(
-        self, costs: Expansion, knots: Sequence[KnotStep], statics: Indices, bounds: Bounds, damping: float
+        self, costs: Expansion, knots: Sequence[KnotStep], statics: Ints, bounds: Bounds, damping: float
     ) -> None:
         self.costs, self.knots, self.statics, self.bounds = costs, knots, statics, bounds
         self.gradient = np.zeros(len(bounds.scale))
@@ -209,7 +208,7 @@ def _places(n: int, o: int, s: int, new: int) -> Selection:
     return np.concatenate([np.arange(n, n + o), np.arange(n + o + s, n + o + s + new)]) if s else slice(n, n + o + new)
 
 
-def _static_step(slope: Array, curve: Array, bounds: Bounds, statics: Indices, damping: float) -> Array | None:
+def _static_step(slope: Array, curve: Array, bounds: Bounds, statics: Ints, damping: float) -> Array | None:
     """(s,) the best change of the static entries."""
     if not len(statics):
         return np.zeros(0)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from symphys.types import Array, Bools
 
 ROUNDS = 100
 ARMIJO = 0.1
@@ -23,7 +21,7 @@ class BoxSolution(NamedTuple):
     """A minimum: ``step`` (m,), which entries are ``free`` of the bounds, and their lower Cholesky factor."""
 
     step: Array
-    free: Mask
+    free: Bools
     factor: Array | None
 
 

@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.shooting import AffinePolicy, StagedMotion, StagedProblem
 from symphys.solvers.ddp.backward_pass import KnotGain, Policy
 from symphys.solvers.ddp.knots import KnotStep, PaddedKnots
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class MotionBatch(NamedTuple):

@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.shooting import ShootingProblem, StagedMotion, StagedProblem
 from symphys.solvers.ddp.backward_pass import Bounds, Policy, backward_pass
 from symphys.solvers.ddp.knots import KnotStep, knot_steps
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Gains = Mapping[str, Array]
 """See ``gain_arrays``."""
 DAMPINGS = 10.0 ** np.arange(-10, 3, 3)

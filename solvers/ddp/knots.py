@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.shooting import StagedProblem
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from symphys.types import Array, Ints
 
 
 @dataclass(frozen=True)
@@ -25,13 +22,13 @@ class KnotStep:
         kept: (o',) places among old and new of those that the next step has as its ``old``.
     """
 
-    old: Indices
-    new: Indices
+    old: Ints
+    new: Ints
     weights: Array
-    kept: Indices
+    kept: Ints
 
     @property
-    def acting(self) -> Indices:
+    def acting(self) -> Ints:
         """(o + w,)."""
         return np.concatenate([self.old, self.new])
 
@@ -49,8 +46,8 @@ class PaddedKnots:
     """
 
     steps: Sequence[KnotStep]
-    old: Indices
-    new: Indices
+    old: Ints
+    new: Ints
     weights: Array
     keep: Array
     lower: Array

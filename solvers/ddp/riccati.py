@@ -11,12 +11,10 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from symphys.solvers.ddp.box_qp import solve_box_qp
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class LinearStep(NamedTuple):

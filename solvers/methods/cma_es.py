@@ -28,12 +28,13 @@ from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, require
-from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import best_of
 from symphys.solvers.core.vanishing_gradient import FLAT
 from symphys.solvers.methods.cma_strategy import PLATEAU, CmaState, PycmaStrategy, load
 from symphys.solvers.randomized.candidates import Candidates, NominalCandidates, SampledCandidates
 from symphys.solvers.randomized.validation import ValidationBatch, rate_by_validation
+from symphys.types import Array
 
 BUDGETS = {"maxiter", "timeout"}
 CONVERGED = {"tolfun", "tolfunhist", "tolfunrel", "tolx", "ftarget"}

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from symphys.errors import SymphysError
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.options import nearest, refuse
-from symphys.solvers.core.outcome import Array
+from symphys.types import Array
 
 RESERVED = {
     "bounds": "the bounds of the problem's variables are used",

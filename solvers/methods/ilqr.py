@@ -18,12 +18,13 @@ from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, require
-from symphys.solvers.core.outcome import Array, Counts, Status, StopReason
+from symphys.solvers.core.outcome import Counts, Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.ddp.backward_pass import Bounds, Policy, backward_pass
 from symphys.solvers.ddp.forward_pass import MotionBatch, forward_pass
 from symphys.solvers.ddp.gains import gains_about
 from symphys.solvers.ddp.knots import KnotStep, PaddedKnots, knot_steps
+from symphys.types import Array
 
 LENGTHS = 0.5 ** np.arange(8.0)
 """Step lengths that are tried side by side."""

@@ -33,9 +33,10 @@ from symphys.solvers.core.driver import make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, IterationRecorder, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, require
-from symphys.solvers.core.outcome import Array, Counts, Status, StopReason
+from symphys.solvers.core.outcome import Counts, Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.methods.ipopt_options import SILENT, check
+from symphys.types import Array
 
 BUDGET = "the iterations are used up: raise `iterations`, or try the other `hessian`"
 ENDS: dict[str, tuple[Status, str]] = {

@@ -27,9 +27,10 @@ from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.line_search import ROUNDING
 from symphys.solvers.core.options import SolverOptions, at_least, require
-from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.core.vanishing_gradient import REFUSALS, vanished
+from symphys.types import Array
 
 LOOSEST = 1 / 3
 """lambda falls at most to this share after a step that went as foreseen."""

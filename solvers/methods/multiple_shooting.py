@@ -26,7 +26,7 @@ from symphys.solvers.core.driver import make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, IterationRecorder, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, refuse, require
-from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.methods.ipopt import ENDS, GOOD, worse
 from symphys.solvers.methods.ipopt_options import RESERVED
 from symphys.solvers.methods.ipopt_options import refusal as refused_by_ipopt
@@ -43,6 +43,7 @@ from symphys.solvers.multiple_shooting.library import ITERATIONS_USED, LibraryRe
 from symphys.solvers.multiple_shooting.multipliers import NlpMultipliers, at_nodes, barrier_at, fitted
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
 from symphys.solvers.multiple_shooting.programs import Programs
+from symphys.types import Array
 
 DEFECT = "largest defect"
 NO_STEPS = (

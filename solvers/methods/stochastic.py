@@ -19,7 +19,7 @@ import numpy as np
 from symphys.shooting import ScenarioSamples
 from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.options import at_least, require
-from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.randomized.aggregation import GradientAverage, average, evolution, mixed
 from symphys.solvers.randomized.descent import (
     LASTING,
@@ -30,6 +30,7 @@ from symphys.solvers.randomized.descent import (
     refusal,
 )
 from symphys.solvers.randomized.validation import NOISE, first_sample, rate_by_validation
+from symphys.types import Array
 
 NOT_FINITE = "not one sample of a batch is finite: bound the variables, lower `rate`, or add [termination]"
 

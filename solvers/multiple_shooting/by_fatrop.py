@@ -19,13 +19,13 @@ import numpy as np
 from symphys.solvers.multiple_shooting.library import (
     ITERATIONS_USED,
     POINT,
-    Array,
     IterateWatch,
     LibraryRequest,
     LibraryResult,
     NlpPart,
     called,
 )
+from symphys.types import Array
 
 SUCCEEDED, NO_STEP = "Solve_Succeeded", "Fatrop_No_Step"
 """How FATROP ends, beside a budget that is used up."""

@@ -11,12 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.shooting import StagedProblem
+from symphys.types import Array, Ints
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 STEP = 1e-3
 """Of the differences, in tangents: radians, metres. Their error is below 1e-12 for rotations of some radians."""
 FLAT = 1e-7
@@ -25,7 +23,7 @@ STENCIL = ((1, 8 / 12), (-1, -8 / 12), (2, -1 / 12), (-2, 1 / 12))
 """(offset, weight) of the fourth-order difference."""
 
 
-def curved_columns(problem: StagedProblem, states: Array) -> Indices:
+def curved_columns(problem: StagedProblem, states: Array) -> Ints:
     """The entries of tangents whose columns are not those of the unit matrix, found at random offsets from (M, nx)."""
     tangents = np.random.default_rng(0).standard_normal((len(states), problem.tangent_size))
     every, there = np.arange(problem.tangent_size), problem.retract(states, tangents)
@@ -36,7 +34,7 @@ def curved_columns(problem: StagedProblem, states: Array) -> Indices:
     return np.flatnonzero(found)
 
 
-def slopes(moved: Callable[[Array], Array], count: int, size: int, columns: Indices) -> Array:
+def slopes(moved: Callable[[Array], Array], count: int, size: int, columns: Ints) -> Array:
     """(count, size, size): slope of ``moved`` by offsets at 0, where it takes (rows, count, size) to the same.
 
     Of the columns that are not asked for the slope is that of the unit matrix.
@@ -51,7 +49,7 @@ def slopes(moved: Callable[[Array], Array], count: int, size: int, columns: Indi
     return matrix
 
 
-def pulled(problem: StagedProblem, reference: Array, nodes: Array, tangents: Array, columns: Indices) -> Array:
+def pulled(problem: StagedProblem, reference: Array, nodes: Array, tangents: Array, columns: Ints) -> Array:
     """(M, n, n): the node in its own tangent by the tangent d at its reference; reference, nodes (M, nx), d (M, n)."""
     count, size = tangents.shape
     if not np.any(tangents):
@@ -65,7 +63,7 @@ def pulled(problem: StagedProblem, reference: Array, nodes: Array, tangents: Arr
     return slopes(moved, count, size, columns)
 
 
-def transported(problem: StagedProblem, reference: Array, states: Array, columns: Indices) -> Array:
+def transported(problem: StagedProblem, reference: Array, states: Array, columns: Ints) -> Array:
     """(M, n, n): ``difference(reference, state)`` by the state in its own tangent; both (M, nx)."""
     count, size = len(reference), problem.tangent_size
 

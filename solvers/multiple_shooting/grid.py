@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.shooting import StagedProblem
+from symphys.types import Array, Ints
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 MOST_INTERVALS = 40
 """Of the default grid."""
 
@@ -34,10 +32,10 @@ class IntervalGrid:
         tangent_size: n.
     """
 
-    starts: Indices
-    knots: tuple[Indices, ...]
+    starts: Ints
+    knots: tuple[Ints, ...]
     shares: tuple[Array, ...]
-    statics: Indices
+    statics: Ints
     tangent_size: int
 
     @property
@@ -73,7 +71,7 @@ class IntervalGrid:
         return range(int(self.starts[interval]), int(self.starts[interval + 1]))
 
     @property
-    def stage_of_state(self) -> Indices:
+    def stage_of_state(self) -> Ints:
         """(N + 1,): the stage of each state."""
         return np.searchsorted(self.starts, np.arange(self.starts[-1] + 1), side="right") - 1
 

@@ -11,12 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.solvers.multiple_shooting.grid import IntervalGrid
+from symphys.types import Ints
 
-Indices = NDArray[np.int64]
 SPREAD = (
     "solver.multiple_shooting.backend: FATROP takes a constraint on the states and inputs of one interval, and "
     "constraint number {} depends on several: use backend = 'ipopt'"
@@ -40,12 +39,12 @@ class NlpLayout:
 
     size: int
     rows: int
-    home: Indices
-    local: tuple[Indices, ...]
-    nodes: Indices
-    defects: Indices
-    limits: Indices
-    copies: Indices
+    home: Ints
+    local: tuple[Ints, ...]
+    nodes: Ints
+    defects: Ints
+    limits: Ints
+    copies: Ints
     structure: dict[str, object] = field(default_factory=dict)
 
 
@@ -119,14 +118,14 @@ class StageChain:
         local = tuple(self._local(stage, nodes, places[stage]) for stage in range(grid.intervals + 1))
         return NlpLayout(size, rows, self.home, local, np.array(nodes), defects, limits, copies, structure)
 
-    def _local(self, stage: int, nodes: list[Indices], places: dict[int, int]) -> Indices:
+    def _local(self, stage: int, nodes: list[Ints], places: dict[int, int]) -> Ints:
         """The indices of the local vector of a stage."""
         knots = self.grid.knots[stage] if stage < self.grid.intervals else self.grid.statics[:0]
         entries = [places[entry] for entry in [*knots.tolist(), *self.grid.statics.tolist()]]
         own = nodes[stage - 1] if stage else nodes[0][:0]
         return np.concatenate([own, np.array(entries, np.int64)])
 
-    def _rows(self, places: list[dict[int, int]]) -> tuple[Indices, Indices, Indices, int]:
+    def _rows(self, places: list[dict[int, int]]) -> tuple[Ints, Ints, Ints, int]:
         """Rows of the defects, of the limits, of the copies, and how many there are."""
         grid, n, row = self.grid, self.grid.tangent_size, 0
         defects, copies = [], []

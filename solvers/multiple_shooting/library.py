@@ -17,11 +17,10 @@ from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 POINT = ca.Sparsity.dense(1, 1)
 ITERATIONS_USED = "Maximum_Iterations_Exceeded"
 """In IPOPT's words."""

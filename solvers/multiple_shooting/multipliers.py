@@ -10,11 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 STARTS, DEFECTS, LIMITS, BOUNDS, BARRIER = "starts", "defects", "limits", "bounds", "barrier"
 """Names of the arrays: (M + 1,), (M, n), (c,), (len(z),) and ()."""
 

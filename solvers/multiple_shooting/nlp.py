@@ -10,14 +10,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.solvers.core.outcome import Counts
 from symphys.solvers.multiple_shooting.layout import NlpLayout
 from symphys.solvers.multiple_shooting.shots import ShootingPlan, Shots
+from symphys.types import Array, Ints
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 STEP = 1e-6
 """Of the differences for an exact Hessian, in local vectors."""
 
@@ -32,14 +30,14 @@ class ScatterPattern:
     """
 
     sparsity: ca.Sparsity
-    place: Indices
+    place: Ints
 
     def nonzeros(self, entries: Array) -> Array:
         """Entries added up."""
         return np.bincount(self.place, weights=entries, minlength=self.sparsity.nnz()).astype(float)
 
 
-def pattern(shape: tuple[int, int], rows: Indices, columns: Indices) -> ScatterPattern:
+def pattern(shape: tuple[int, int], rows: Ints, columns: Ints) -> ScatterPattern:
     """The pattern of entries at (rows, columns)."""
     keys, place = np.unique(columns * shape[0] + rows, return_inverse=True)
     starts = np.searchsorted(keys, shape[0] * np.arange(shape[1] + 1))
@@ -50,7 +48,7 @@ class MultipleShootingNlp:
     """The program in w; the last evaluation is kept, since solvers ask for its parts one after the other."""
 
     def __init__(
-        self, plan: ShootingPlan, layout: NlpLayout, limit_rows: list[Indices], scale: Array, exact: bool
+        self, plan: ShootingPlan, layout: NlpLayout, limit_rows: list[Ints], scale: Array, exact: bool
     ) -> None:
         """Make the patterns.
 

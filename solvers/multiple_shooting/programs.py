@@ -6,12 +6,12 @@ import numpy as np
 
 from symphys.shooting import StagedMotion, StagedProblem
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.outcome import Array
 from symphys.solvers.multiple_shooting.chart import curved_columns, interpolated
 from symphys.solvers.multiple_shooting.grid import IntervalGrid
 from symphys.solvers.multiple_shooting.layout import shared, staged
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
 from symphys.solvers.multiple_shooting.shots import IntervalSteps, ShootingPlan
+from symphys.types import Array
 
 
 class Programs:

@@ -15,16 +15,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.shooting import Expansion, Linearized, StagedMotion, StagedProblem
 from symphys.shooting.staged_problem import Sparse
 from symphys.solvers.multiple_shooting.chart import pulled, transported
 from symphys.solvers.multiple_shooting.grid import IntervalGrid
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
+from symphys.types import Array, Ints
 
 SAME = 1e-10
 """Relative or absolute: steps whose results differ by less are the same function."""
@@ -41,7 +37,7 @@ class IntervalSteps:
         alone = self(np.arange(problem.steps), motion.x[:-1], motion.u, motion.z, motion.smoothing)
         self.alike = np.allclose(together, alone, rtol=SAME, atol=SAME, equal_nan=True)
 
-    def __call__(self, steps: Indices, X: Array, U: Array, z: Array, smoothing: float) -> Array:
+    def __call__(self, steps: Ints, X: Array, U: Array, z: Array, smoothing: float) -> Array:
         """(B,) steps, (B, nx), (B, m), (len(z),) -> (B, nx)."""
         Z = np.broadcast_to(z, (len(X), len(z)))
         if self.alike:
@@ -68,7 +64,7 @@ class ShootingPlan:
     steps: IntervalSteps
     reference: Array
     smoothing: float
-    curved: Indices
+    curved: Ints
 
 
 class Shots:
@@ -144,7 +140,7 @@ class Shots:
             found.append(gradient)
         return found
 
-    def limit_slopes(self, rows: list[Indices]) -> list[Array]:
+    def limit_slopes(self, rows: list[Ints]) -> list[Array]:
         """The slopes of the limits ``rows`` of each stage by its local vector; those by statics in a row's first stage.
 
         RuntimeError where a limit depends on a stage that ``rows`` does not give it.
@@ -181,7 +177,7 @@ class Shots:
             yield total
 
 
-def dense_blocks(matrix: Sparse, rows: list[Indices], spans: list[tuple[int, int]]) -> list[Array]:
+def dense_blocks(matrix: Sparse, rows: list[Ints], spans: list[tuple[int, int]]) -> list[Array]:
     """The rows and columns (first, one past the last) of each block; spans ascend, and have no gap between them.
 
     RuntimeError where the matrix has an entry in a column of a block, but not in its rows.

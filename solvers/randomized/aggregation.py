@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symphys.shooting import ScenarioSamples, Values
-from symphys.solvers.core.outcome import Array
+from symphys.types import Array
 
 TINY, LARGEST = 1e-300, 1e300
 

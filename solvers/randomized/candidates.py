@@ -11,9 +11,10 @@ from symphys.shooting import ScenarioSamples
 from symphys.solvers.core.convergence import converged
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Log
-from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.randomized.validation import SAMPLES, Validation, ValidationBatch, outputs_of
+from symphys.types import Array
 
 
 class Candidates(Protocol):

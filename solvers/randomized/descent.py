@@ -17,9 +17,10 @@ from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.directions import DirectionMemory, MomentumWeights, adam
 from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, require
-from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.randomized.validation import SAMPLES, Validation, ValidationBatch
+from symphys.types import Array
 
 NO_SCENARIO = (
     "this problem has no samples to draw: add [[scenario]] tables (and a C compiler, if there is none), or use "

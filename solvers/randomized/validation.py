@@ -14,9 +14,10 @@ from symphys.shooting import Values
 from symphys.solvers.core.continuation import Rate
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Log
-from symphys.solvers.core.outcome import Array, Status, StopReason
+from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.randomized.aggregation import mean
+from symphys.types import Array
 
 NO_BETTER = (
     "no point did better in the validation samples than the start, which is kept: take smaller steps, another "

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.api.transcriptions import linearized, recorded, transcribed
 from symphys.api.values import by_name, vector
@@ -19,11 +19,10 @@ from symphys.problem.loading import Source, load
 from symphys.shooting import Evaluator, Linearized, Values
 from symphys.trajectory import Trajectory
 from symphys.transcription import Transcription
+from symphys.types import Array
 
 if TYPE_CHECKING:
     from symphys.transcription.recorded_rollout import RecordedRollout
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

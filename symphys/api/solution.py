@@ -8,8 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.api import figures, notebook, tables
 from symphys.errors import SymphysError
@@ -25,13 +24,12 @@ from symphys.results.trace import Trace
 from symphys.results.trajectories import read_trajectory
 from symphys.suggest import hint, quote
 from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from symphys.runs.replay import Replay
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

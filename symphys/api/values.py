@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.errors import SymphysError
 from symphys.shooting import ShootingProblem, VariableBlock
 from symphys.suggest import hint, quote
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def shape_of(block: VariableBlock) -> tuple[int, ...]:

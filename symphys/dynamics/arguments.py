@@ -11,9 +11,7 @@ from symphys.dynamics.context import State, StepContext, make_context
 from symphys.dynamics.tracing.trace import InlineTracer
 from symphys.model.state_layout import Layout, input_symbols
 from symphys.model.world import Scheme, World
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 def inline(world: World, arguments: Sequence[Expr], reduces: bool = True) -> InlineTracer:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
@@ -12,9 +11,7 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.state_layout import input_columns
 from symphys.model.world import Pair, Scheme, World
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 SHORTEST_KICK = 1 / 8
 """Of dt; see ``StepContext.shortest_kick``."""

@@ -12,15 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from symphys.maths import rotation
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 OUTER = 1 / (2 - 2 ** (1 / 3))
 FOURTH_ORDER = (OUTER, 1 - 2 * OUTER, OUTER)

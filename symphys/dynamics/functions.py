@@ -20,9 +20,7 @@ from symphys.dynamics.tracing.trace import InlineTracer
 from symphys.maths.verbatim import verbatim
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 MOST_INSTRUCTIONS = 105_000
 """Of a step in which what several parts compute alike is looked for: that saves a tenth, but takes its time."""

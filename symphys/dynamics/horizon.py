@@ -6,8 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-Expr = Any
-"""casadi MX, SX or DM"""
+from symphys.types import Expr
 
 
 def roll_out(step: ca.Function, steps: int, x0: Expr, u: Expr, p: Expr, smoothing: Expr) -> tuple[Expr, ...]:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import casadi as ca
 
@@ -21,9 +20,7 @@ from symphys.dynamics.motion import PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Iterate, Momentum, PlacedConstraint, Velocities
 from symphys.model.world import UNEQUAL, World
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 EVERY = 4
 """Sweeps between two longer steps."""

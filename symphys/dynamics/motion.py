@@ -7,7 +7,6 @@ step reads as leapfrog; see docs/time_step.md, "2. Predicted motion".
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import casadi as ca
 
@@ -16,9 +15,7 @@ from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.maths.rotation import turn
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 MAX_TURN = 4.0
 """[rad] Largest angle by which the paths of a body's points turn in a step: beyond it parabolas leave the circles."""

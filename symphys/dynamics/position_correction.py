@@ -31,9 +31,8 @@ from symphys.dynamics.unknowns import (
 )
 from symphys.maths.smoothing import either
 from symphys.model.joints import kinematic_trees
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX, MX or DM"""
 TOGETHER = 0, 0
 """Steps of Newton's method on the gaps of contacts that share bodies."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import groupby
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import casadi as ca
 
@@ -18,9 +18,8 @@ from symphys.model.joints import kinematic_trees
 from symphys.model.shapes import Surface
 from symphys.model.state_layout import BODY_FIELDS
 from symphys.model.world import Pair, World
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX, MX or DM"""
 T = TypeVar("T")
 
 

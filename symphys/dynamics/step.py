@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from typing import Any
 
 import casadi as ca
 
@@ -23,9 +22,7 @@ from symphys.dynamics.substep import Substep, advance
 from symphys.dynamics.tracing.decorator import section, traced
 from symphys.maths import rotation
 from symphys.model.world import Scheme, World
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 SPLITS_OFF_CENTRE = 2
 """Of a step where bodies may be hit off their centres: a box seldom lands on one corner alone."""

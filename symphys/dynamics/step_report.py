@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import casadi as ca
 
@@ -16,9 +15,7 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import AnyImpulse
 from symphys.model.scalar import is_zero
 from symphys.model.world import Pair, World
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 ACROSS = 1e-3
 """Cosine of normals up to which two impacts of a body do not act on each other."""

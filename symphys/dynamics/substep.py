@@ -44,10 +44,7 @@ from symphys.dynamics.unknowns import AllVelocities, Momenta, Momentum, PlacedCo
 from symphys.maths import rotation
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.state_layout import BODY_FIELDS
-
-Expr = Any
-"""casadi SX, MX or DM"""
-
+from symphys.types import Expr
 
 NONE = ca.SX(0)
 SLIDES = 0.999

@@ -8,9 +8,7 @@ from typing import Any, Protocol
 import casadi as ca
 
 from symphys.maths.smoothing import ramp
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 COMPLIANCE = 1e-6
 """Compliance of rigid constraints in ``newton_start``, as a share of their inverse effective masses."""

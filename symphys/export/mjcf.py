@@ -36,7 +36,6 @@ from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.motion import inertia_matrix
 from symphys.export.mjcf_bodies import NestedBody, StartState, nested_bodies, relative
@@ -54,8 +53,6 @@ from symphys.model.site import Site
 from symphys.model.world import World
 from symphys.problem import Problem
 from symphys.problem.feedback import Sensor
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.joints.joint_frames import joint_frames_at
 from symphys.dynamics.observation.joint_coordinates import Reading, readings
@@ -21,8 +20,8 @@ from symphys.model.joints.start import moved_to_zero
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import World
 from symphys.problem.joint_tables import placed_joint, whole_state
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 APART = 1e-5
 """[m], [rad]: what of a joint's frames must not be apart."""
 RESIDUE = 1e-15

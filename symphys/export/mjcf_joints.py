@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.export.mjcf_bodies import NestedBody, StartState, plain, tidy
 from symphys.export.mjcf_surfaces import text
 from symphys.model.joints import Joint, Link
 from symphys.model.scalar import is_zero
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 UNBOUNDED = 1e10
 """[rad], [m] where one of two limits is missing."""
 

@@ -7,14 +7,13 @@ from xml.etree.ElementTree import Element
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.export.mjcf_bodies import StartState
 from symphys.model.height_limits import off_triangles
 from symphys.model.heightfield import FINER, Heightfield
 from symphys.model.shapes import Terrain
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 AROUND = 10.0
 """[m] on every side of the bodies at the start, where terrain without a grid is sampled."""
 STEP = 0.2

@@ -7,9 +7,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.expression.errors import UnfitError
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 def column(value: Any) -> Expr:

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import casadi as ca
 
-from symphys.expression.columns import Expr
 from symphys.expression.tree import Node, evaluate, renamed
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from functools import reduce
 
 import casadi as ca
 
-from symphys.expression.columns import Expr, length, require_fit, require_length, require_same
+from symphys.expression.columns import length, require_fit, require_length, require_same
 from symphys.expression.errors import UnfitError
 from symphys.maths import angles, rotation
+from symphys.types import Expr
 
 NORM_WIDTH = 1e-12
 """norm(v) is sqrt(v . v + NORM_WIDTH^2), and hypot likewise: finite derivatives at 0, where the value is 1e-12."""

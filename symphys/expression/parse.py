@@ -19,15 +19,16 @@ from symphys.expression.names import CONSTANTS, INSTANTS, OF_INSTANTS, OVER_TIME
 from symphys.expression.source import flatten, read
 from symphys.expression.tree import Constant, Node, Reference, apply
 from symphys.suggest import hint, quote
+from symphys.types import Expr
 
-OPERATORS: dict[type[ast.operator], Callable[..., columns.Expr]] = {
+OPERATORS: dict[type[ast.operator], Callable[..., Expr]] = {
     ast.Add: elementwise(ca.plus),
     ast.Sub: elementwise(ca.minus),
     ast.Mult: elementwise(ca.times),
     ast.Div: elementwise(ca.rdivide),
     ast.Pow: elementwise(ca.power),
 }
-SIGNS: dict[type[ast.unaryop], Callable[..., columns.Expr]] = {ast.UAdd: pos, ast.USub: neg}
+SIGNS: dict[type[ast.unaryop], Callable[..., Expr]] = {ast.UAdd: pos, ast.USub: neg}
 ALLOWED = (
     "a formula has numbers, names, + - * / **, components [i], ranges [i:j], vectors [a, b] and calls of functions"
 )

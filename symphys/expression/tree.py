@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from symphys.expression.columns import Expr, column
+from symphys.expression.columns import column
 from symphys.expression.errors import FormulaError, UnfitError
 from symphys.suggest import hint, quote
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ from typing import Self
 
 import numpy as np
 
-from symphys.json_values import Array, Text, name, record
+from symphys.json_values import Text, name, record
+from symphys.types import Array
 
 
 def nothing() -> Array:

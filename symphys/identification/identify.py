@@ -24,9 +24,10 @@ from symphys.identification.inference.residual_study import (
     study,
 )
 from symphys.identification.inference.uncertainty import Uncertainty
-from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
+from symphys.identification.interface import IdentificationError, RecordedResiduals
 from symphys.results.identification import HISTORY, GlobalSearch, Identification
 from symphys.suggest import hint
+from symphys.types import Array, Ints
 
 STARTS = ("guess", "before impact", "whole")
 """Where own numbers of recordings that are held back come from."""

@@ -11,13 +11,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
+from symphys.types import Array, Bools, Ints
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 Rows = list[tuple[Array, Array, Array]]
 """Of each recording: (m,) residuals, (m, s) and (m, o) their derivatives by the shared and by the own numbers."""
 

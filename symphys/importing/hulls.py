@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 FLAT = 1e-9
 """Share of a mesh's length below which it has no volume."""
 

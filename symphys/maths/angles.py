@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import casadi as ca
 
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 def nearest(angle: Expr, to: Expr) -> Expr:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, wraps
-from typing import Any
 
 import casadi as ca
 
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 def inlined(*sizes: int) -> Callable[[Callable[..., Expr]], Callable[..., Expr]]:

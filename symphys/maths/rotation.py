@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from math import factorial
-from typing import Any
 
 import casadi as ca
 
 from symphys.maths.inlined import inlined
 from symphys.maths.smoothing import length
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 SERIES_TERMS = 9
 """Terms of the series of cos and sinc: full double precision up to 2 rad, 1e-12 at half a turn."""

@@ -5,12 +5,9 @@ All have finite values and finite first and second derivatives everywhere, for e
 
 from __future__ import annotations
 
-from typing import Any
-
 import casadi as ca
 
-Expr = Any
-"""casadi SX, MX or DM, or a float"""
+from symphys.types import Expr
 
 TINY_SQUARE = 1e-24
 """Added under square roots of lengths: keeps the slope finite at zero length; 1e-12 in the length's own unit."""

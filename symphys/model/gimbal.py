@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 SINGULAR = 1e-5
 """Least singular value of unit screws that counts as 0."""
 TRIALS, REFINED = 60, 3

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 STEEPEST = 3.0
 """Largest slope at a height, as a multiple of the smaller of the slopes to its neighbours."""
 SIDES = (-1, 1)

@@ -9,17 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.height_limits import Slopes, limited, off_triangles
-
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX, MX or DM, or float"""
+from symphys.types import Array, Expr
 
 PIECES = (1, -4, 6, -4)
 """A cubic B-spline on the knots -2, -1, 0, 1, 2 is the sum of these times max(t - knot, 0)^3 / 6, up to t = 2."""

@@ -6,15 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.body import Body
 from symphys.model.joints import Joint
 from symphys.model.joints.placing import placed_joints
 from symphys.model.joints.specs import JointSpec
 from symphys.model.shapes import UPRIGHT
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 ORIGIN = (0.0, 0.0, 0.0)
 REST = {"position": ORIGIN, "orientation": UPRIGHT, "velocity": ORIGIN, "angular_velocity": ORIGIN}
 """Where bodies begin that do not say so."""

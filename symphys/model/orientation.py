@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.maths import rotation
 from symphys.model.shapes.shape import UPRIGHT
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
 """Turns about the x, y and z axis of the world, one after the other [degrees]."""
 Orientation = Sequence[float] | Mapping[str, float]

@@ -19,8 +19,8 @@ from symphys.errors import SymphysError
 from symphys.mpc.controller import Controller
 from symphys.mpc.planner import RecedingPlan
 from symphys.mpc.plant import Plant
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Tell = Callable[[float], None]
 """Is called with the simulated time [s]."""
 KEPT = 12

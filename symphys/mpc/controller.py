@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.errors import SymphysError
 from symphys.model.state_layout import input_columns
@@ -14,8 +14,8 @@ from symphys.mpc.planner import Planner, RecedingPlan
 from symphys.problem import Problem, RecedingHorizon
 from symphys.problem.loading import Source, load
 from symphys.transcription.feedback.state_reader import StateReader
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 State = ArrayLike | Mapping[str, ArrayLike]
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -22,11 +21,7 @@ from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.columns import ByColumns
 from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm
 from symphys.transcription.staged.tangent import Tangent
-
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX"""
-
+from symphys.types import Array, Expr
 
 DRIVEN = (
     "names an input that a controller or force law adds to, beside a state: a plan has no such sum at the end of a "

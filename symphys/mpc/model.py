@@ -6,14 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.errors import Issue, ProblemError
 from symphys.problem import Problem, ProblemData, RecedingHorizon, Variable
 from symphys.suggest import quote
 from symphys.transcription.formula_names import now
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def horizon_of(problem: ProblemData) -> RecedingHorizon:

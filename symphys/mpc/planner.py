@@ -23,8 +23,8 @@ from symphys.transcription.staged.linearized_step import LinearizedStep
 from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes
 from symphys.transcription.staged.stage_terms import StageSymbols, motion_sums, stage_terms
 from symphys.transcription.staged.tangent import Tangent
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 LENGTHS = 0.5 ** np.arange(8.0)
 """Step lengths that are tried side by side."""
 SHARES = np.array([1.0, 0.5, 0.0])

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import KernelUnavailable, ProcessorKernel, compile_program
 from symphys.mpc.model import horizon_of, receding_model
@@ -18,8 +17,7 @@ from symphys.transcription.rollout import call, symbolic_rollout
 from symphys.transcription.simulation import motion_of
 from symphys.transcription.staged.step_program import StepArguments, step_program
 from symphys.transcription.staged.tangent import Tangent
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class Plant:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys import files
 from symphys.dynamics.observation import reading_function
@@ -18,8 +17,8 @@ from symphys.results.file_names import PROBLEM, SCENE, TRAJECTORY
 from symphys.results.scene_of_problem import make_scene
 from symphys.trajectory import Trajectory
 from symphys.transcription.rollout import Rollout
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 MOST_VALUES = 24
 """Quantities of a plan that are recorded."""
 

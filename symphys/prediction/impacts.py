@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 JUMP = 0.1
 """Share of the greatest speed of a body in a motion by which its velocity jumps at an impact, at least."""
 FALLS = 3.0

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.identification import FitParameters
 from symphys.problem import Problem, Variable
 from symphys.problem.units import formula_units
+from symphys.types import Array, Ints
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 DRY = "dry_friction"
 """What advice calls the friction of a joint, which another recording determines than that of a surface."""
 TURN = 0.1

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.expression import parse
 from symphys.model.joints.joint import UNWRAPPED
@@ -22,8 +21,8 @@ from symphys.transcription.quantity_slopes import QuantitySlopes
 from symphys.transcription.randomization.numbers import hidden
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.simulation import recorder, simulate
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 CLOSE = 1e-9
 """Steps: a sample so near to the start of a step is there."""
 SCALED = ("position", "velocity")

@@ -15,12 +15,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.problem import RecordedInput, Recording, Variable, VariableSlot
 from symphys.transcription.randomization.numbers import hidden
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 SLACK = 1e-9
 """Of a step: a jump so near to the end of a step is there."""
 

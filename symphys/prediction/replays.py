@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.prediction.residuals import RecordingResiduals, difference
 from symphys.problem import Problem
@@ -17,8 +16,8 @@ from symphys.results.identification.replays import RecordingReplay, ReplayedQuan
 from symphys.results.scene import Scene
 from symphys.results.scene_of_problem import make_scene
 from symphys.trajectory import Trajectory, shapes
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 MOST = 3
 """Recordings that are replayed."""
 POSE = re.compile(r"(?P<body>[^.]+)\.(?P<field>position|orientation)(\[(?P<component>[0-9])\])?")

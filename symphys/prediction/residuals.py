@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.expression.units import unit_of
 from symphys.identification import FitParameters, IdentificationError, ResidualRows
@@ -16,10 +15,8 @@ from symphys.prediction.predictor import PredictedSamples, Predictor
 from symphys.prediction.rotations import rotation_slopes, rotation_vectors
 from symphys.problem import Measured, Problem, Recording
 from symphys.problem.units import quantity_unit
+from symphys.types import Array, Bools, Ints
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
 WHOLE_TURN = 2 * np.pi
 LENGTHS = ("m", "m/s", "m/s^2")
 """Units of what a scale of lengths scales."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 SMALL = 1e-4
 """Of the sine of half an angle: below it series stand for quotients."""
 

@@ -7,7 +7,6 @@ from dataclasses import fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.model.jointed import REST
@@ -18,8 +17,8 @@ from symphys.model.joints.start import State, moved_to_zero, placed_frames, span
 from symphys.model.scalar import is_zero
 from symphys.model.world import World
 from symphys.problem.plain import floats, numbers
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 ZERO = 1e-9
 """Coordinates below this are 0 [rad] or [m]."""
 

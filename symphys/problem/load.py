@@ -21,7 +21,7 @@ from symphys.problem.checks.start_values import StartValues
 from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
 from symphys.problem.guess.table import read_guess
 from symphys.problem.include.files import appendix
-from symphys.problem.model import ALIVE, Array, ProblemData, Simulation, Termination, Variable
+from symphys.problem.model import ALIVE, ProblemData, Simulation, Termination, Variable
 from symphys.problem.parametric.forward_kinematics import forward_kinematics
 from symphys.problem.parametric.parts import Part
 from symphys.problem.parametric.reposition import check_anchors
@@ -69,6 +69,7 @@ from symphys.problem.tables.statics import read_statics
 from symphys.problem.tables.termination import read_termination, with_termination_cost
 from symphys.problem.tables.variables import read_variables
 from symphys.problem.units import formula_units
+from symphys.types import Array
 
 if TYPE_CHECKING:
     from symphys.problem.sweeps.sweep import Sweep

@@ -10,7 +10,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.expression import Formula
 from symphys.model.world import Scheme, World
@@ -22,11 +21,11 @@ from symphys.problem.receding_horizon import RecedingHorizon
 from symphys.problem.recordings.kept import without_places
 from symphys.problem.recordings.types import IdentifySettings, RecordedFile, Recording
 from symphys.problem.references import ReferenceTrajectory
+from symphys.types import Array
 
 if TYPE_CHECKING:
     from symphys.problem.sweeps.sweep import Sweep
 
-Array = NDArray[np.float64]
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 Kind = Literal["initial", "parameter", "control", "weight", "duration", "recording"]

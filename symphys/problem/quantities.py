@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from math import inf, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.state_layout import input_sizes
 from symphys.problem.feedback import FeedbackController
@@ -18,8 +17,7 @@ from symphys.problem.parametric.parts import COMBINE, STRUCTURAL, VARIABLE
 from symphys.problem.parametric.world import CONTACT, ParametricWorld
 from symphys.problem.references import DELAY, ReferenceTrajectory
 from symphys.suggest import hint, quote
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 SLOT = re.compile(r"\s*([^\[\]\s]+)\s*(?:\[\s*(-?\d{1,9})?\s*(:)?\s*(-?\d{1,9})?\s*\])?\s*")
 EDGE = "edge"

@@ -6,20 +6,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.world import NOTHING
 from symphys.problem.reading.faults import Faults
 from symphys.problem.reading.time_series import SeriesError, read_series, series_text, written
 from symphys.problem.schema import Document
+from symphys.types import Array, Expr
 
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX, MX or DM"""
 DELAY = "delay"
 
 

@@ -8,8 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from symphys.types import Array, Ints
 
 COLLINEAR = 1e-9
 """A corner counts where it makes a triangle with its neighbours of more than this area, by the square of the size."""

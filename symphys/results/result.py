@@ -15,8 +15,9 @@ from symphys import files
 from symphys import json_values as values
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import ACCEPTED, NOT_SOLVED, Ruling, rule
-from symphys.json_values import Array, Text
+from symphys.json_values import Text
 from symphys.results.trace import renamed
+from symphys.types import Array
 
 FORMAT = 1
 ADDED_LATER = {"verdict", "doubts", "again", "provenance"}

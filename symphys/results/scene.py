@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from symphys import json_values as values
-from symphys.json_values import Array, Text
+from symphys.json_values import Text
 from symphys.model.shapes import SHAPES
 from symphys.results.drawable import LARGEST, small
 from symphys.results.polytope import Polytope, make_polytope
 from symphys.results.scene_joints import SceneJoint
 from symphys.results.text_files import read_table
+from symphys.types import Array
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 

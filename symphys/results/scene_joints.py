@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from symphys import json_values as values
-from symphys.json_values import Array, Text
+from symphys.json_values import Text
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from symphys.problem import Problem
 from symphys.problem.plain import floats
 from symphys.results.scene import Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
 from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneJointFrame, SceneMotor
-from symphys.shooting import Array
 from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 MOTORS: dict[type[Motor], str] = {
     Servo: "servo",

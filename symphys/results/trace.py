@@ -12,8 +12,8 @@ import numpy as np
 
 from symphys import json_values as values
 from symphys.files import check_regular
-from symphys.json_values import Array
 from symphys.results.text_files import reason
+from symphys.types import Array
 
 OUTPUT = "output: "
 """Before the names of columns with reported quantities of the problem, and of the solver's iteration."""

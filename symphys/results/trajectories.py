@@ -15,7 +15,8 @@ from symphys.archives import MOST_BYTES, NUMBER
 from symphys.results.archives import read_archive
 from symphys.results.drawable import largest, oversized
 from symphys.results.text_files import ReportError
-from symphys.trajectory import Array, Trajectory, shapes
+from symphys.trajectory import Trajectory, shapes
+from symphys.types import Array
 
 ABSENT = {"force": 0.0, "torque": 0.0, "contact_force": 0.0}
 """What stands for quantities that a file does not have, where that is not nan."""

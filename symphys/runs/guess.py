@@ -20,8 +20,8 @@ from symphys.results.file_names import CONFIG, MULTIPLIERS, PROBLEM, TRAJECTORY
 from symphys.results.run import read_run
 from symphys.results.trajectories import read_trajectory
 from symphys.runs.knots import resampled
-from symphys.shooting import Array
 from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 DIGITS = 8
 """Of the digest, in the names of folders."""

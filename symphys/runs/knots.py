@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from symphys.shooting import Array
+from symphys.types import Array
 
 
 def resampled(values: Array, before: str, count: int, after: str) -> Array:

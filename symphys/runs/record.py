@@ -28,11 +28,12 @@ from symphys.results.trace import OUTPUT
 from symphys.runs.job import Job
 from symphys.runs.provenance import provenance as origin
 from symphys.runs.provenance import versions
-from symphys.shooting import Array, VariableBlock
+from symphys.shooting import VariableBlock
 from symphys.solvers import Counts, Outcome, StageResult, Status, TraceRow
 from symphys.trajectory import Trajectory
 from symphys.transcription import Assessment, Transcription
 from symphys.transcription.decision_variables import blocks as blocks_of
+from symphys.types import Array
 
 JUDGED = frozenset(("objective", "costs", "outputs", "checks"))
 """What is not known where the exact rollout cannot be simulated."""

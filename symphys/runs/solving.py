@@ -19,9 +19,10 @@ from symphys.runs.claim import Claim
 from symphys.runs.job import Job
 from symphys.runs.record import Judgement, judged, make_result, trace_row, used
 from symphys.runs.standing import Standing
-from symphys.shooting import Array, ShootingProblem
+from symphys.shooting import ShootingProblem
 from symphys.solvers import OUTCOME, Keep, Monitor, Outcome, Status, plain_outcome, revived_outcome, solver
 from symphys.transcription import Record, Transcription
+from symphys.types import Array
 
 SMOOTHED = (
     "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing, or add a stage at 0, "

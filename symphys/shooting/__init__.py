@@ -1,7 +1,6 @@
 """What solvers see of a problem: as one function of z, or step by step."""
 
 from symphys.shooting.shooting_problem import (
-    Array,
     Evaluator,
     Function,
     GuessedStates,
@@ -18,7 +17,6 @@ from symphys.shooting.staged_problem import AffinePolicy, Expansion, Followed, L
 
 __all__ = [
     "AffinePolicy",
-    "Array",
     "Evaluator",
     "Expansion",
     "Followed",

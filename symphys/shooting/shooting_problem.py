@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from symphys.shooting.staged_problem import Indices, StagedProblem
+from symphys.shooting.staged_problem import StagedProblem
+from symphys.types import Array, Ints
 
-Array = NDArray[np.float64]
 Function = Any
 """casadi.Function"""
-GuessedStates = Callable[[Array, Indices, float], Array]
+GuessedStates = Callable[[Array, Ints, float], Array]
 """See ``ShootingProblem.guessed_states``."""
 
 

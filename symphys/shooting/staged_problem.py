@@ -12,11 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from symphys.types import Array, Ints
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Sparse = Any
 """scipy.sparse.csr_array"""
 Followed = tuple[Array, Array, Array]
@@ -133,7 +130,7 @@ class StagedProblem(Protocol):
     state_size: int
     tangent_size: int
     input_size: int
-    statics: Indices
+    statics: Ints
     weights: Sparse
     lower: Array
     upper: Array

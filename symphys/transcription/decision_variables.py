@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -15,9 +14,7 @@ from symphys.model.world import World
 from symphys.problem import Problem, Variable, begin, carried, placing, reposition
 from symphys.shooting import VariableBlock
 from symphys.transcription.formula_names import Parameters, spans
-
-Expr = Any
-"""casadi MX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

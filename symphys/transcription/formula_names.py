@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -27,9 +26,7 @@ from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable, plac
 from symphys.problem.references import reference_values
 from symphys.transcription.feedback.sensor_memory import SensorMemory
 from symphys.transcription.formulas.phase_numbers import PhaseNumbers, phase_numbers
-
-Expr = Any
-"""casadi SX or MX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

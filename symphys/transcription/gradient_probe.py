@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import processors
 from symphys.codegen.backends.calls import BufferedFunction
 from symphys.shooting import Evaluator
 from symphys.transcription.objective import Terms
 from symphys.transcription.rollout import Rollout
-
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi MX"""
+from symphys.types import Array, Expr
 
 
 class Probe(Protocol):

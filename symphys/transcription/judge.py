@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isfinite, isnan, nan
 
-import numpy as np
-from numpy.typing import NDArray
-
 from symphys.problem import Problem
 from symphys.transcription.objective import goal_error
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,7 @@ import numpy as np
 from symphys.expression import Formula
 from symphys.maths.smoothing import length
 from symphys.problem import Constraint, Cost, Phase, Problem, Target
-
-Expr = Any
-"""casadi MX"""
+from symphys.types import Expr
 
 
 class Sampled(Protocol):

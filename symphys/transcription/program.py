@@ -25,13 +25,12 @@ from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.objective import Terms, plain_sums, terms
 from symphys.transcription.rollout import Rollout
+from symphys.types import Expr
 
 if TYPE_CHECKING:
     from symphys.dynamics.tracing.guards import Guard, Part
     from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 
-Expr = Any
-"""casadi MX"""
 NOTHING: Mapping[str, Formula] = MappingProxyType({})
 ASIDE = frozenset({"name", "title", "description", "file", "text", "settings", "solvers", "solver_tables"})
 """What no program depends on."""

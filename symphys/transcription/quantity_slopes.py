@@ -10,15 +10,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import Kernel, Program, compile_program, processors
 from symphys.codegen.program.tangent import tangent_name, tangent_program
 from symphys.expression import Formula
 from symphys.transcription.program import NOTHING, rollout_program
 from symphys.transcription.rollout import Rollout
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 TOGETHER = 4
 """Directions in a lane. With one, 25 directions of a cube's toss took 36 rollouts; with 4, 23; with 8, 24."""
 ROWS = 128

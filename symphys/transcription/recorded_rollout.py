@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import Kernel, KernelUnavailable, processors
 from symphys.codegen.backends import PRECISIONS, build_kernel
@@ -19,8 +18,8 @@ from symphys.transcription.formula_names import instant, namespace
 from symphys.transcription.network_rollout import require_small_nets
 from symphys.transcription.program import rollout_program
 from symphys.transcription.rollout import Rollout, symbolic_rollout
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 VALUE = "merit"
 
 

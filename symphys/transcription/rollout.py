@@ -28,13 +28,12 @@ from symphys.transcription.formula_names import (
 from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.objective import plain_sums
 from symphys.transcription.termination import termination_function
+from symphys.types import Expr
 
 if TYPE_CHECKING:  # the physics of a step is imported where it is called: a start from a kept kernel needs none
     pass
 
 T = TypeVar("T")
-Expr = Any
-"""casadi MX"""
 
 
 @dataclass(frozen=True)

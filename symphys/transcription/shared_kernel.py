@@ -12,7 +12,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.backends import Backend, BackendSource, choose
 from symphys.problem import Problem, Variable, VariableSlot
@@ -22,8 +21,8 @@ from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.objective import Terms, terms
 from symphys.transcription.program import rollout_program
 from symphys.transcription.rollout import Rollout, symbolic_rollout
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 KEPT: dict[tuple[object, ...], Backend] = {}
 """The backend of the last problem of a sweep, by all that it is made from."""
 

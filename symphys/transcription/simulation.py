@@ -8,7 +8,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.observation import reading_function
 from symphys.model.joints import Joint
@@ -17,8 +16,7 @@ from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription.formulas.recorded_parts import RolloutArrays
 from symphys.transcription.nan_tracing.steps import first_non_finite
 from symphys.transcription.rollout import Rollout
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

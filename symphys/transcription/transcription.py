@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.backends import Description
 from symphys.problem import DURATION, Problem
@@ -21,11 +20,11 @@ from symphys.transcription.gradient_probe import ExpressionProbe, Probe
 from symphys.transcription.judge import Assessment, assessment
 from symphys.transcription.objective import Terms
 from symphys.transcription.rollout import Rollout
+from symphys.types import Array
 
 if TYPE_CHECKING:
     from symphys.transcription.simulation import Record
 
-Array = NDArray[np.float64]
 Judge = Callable[..., Assessment]
 """(z, smoothing = 0) -> verdict."""
 PRICING_CALLS = 5

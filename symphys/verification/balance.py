@@ -16,14 +16,11 @@ from symphys.maths import rotation
 from symphys.model.state_layout import Layout, input_columns, inputs_size
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout, plain
+from symphys.types import Array
 from symphys.verification.bodies import bodies, parameters
 from symphys.verification.contacts import acting, slip_speeds, touching
 from symphys.verification.joints import floating, joint_work, rotor_energy, uncounted
 from symphys.verification.sensitivity_growth import samples
-
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX"""
 
 MOST_SAMPLES = 400
 MOST_GAINS = 5

@@ -7,13 +7,11 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.motion import inertia_matrix
 from symphys.model.state_layout import input_symbols
 from symphys.transcription import Record, Rollout
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

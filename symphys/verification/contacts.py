@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from symphys.dynamics.observation import slip_function
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout, plain
+from symphys.types import Array
 from symphys.verification.bodies import bodies
 from symphys.verification.refinement import UNSETTLED
-
-Array = NDArray[np.float64]
 
 MOST_SLIDES = 5
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.transcription import Record, Transcription, first_non_finite, first_non_finite_derivative
+from symphys.types import Array
 from symphys.verification import gradient, refinement, smoothing
 from symphys.verification.balance import balance
 from symphys.verification.contacts import contacts, slides
@@ -19,7 +19,6 @@ from symphys.verification.sensitivity_growth import sensitivity_growth
 from symphys.verification.target_conflicts import target_conflicts
 from symphys.verification.tunnelling import tunnelling
 
-Array = NDArray[np.float64]
 Tell = Callable[[str], None]
 
 SIMULATING = "simulating"

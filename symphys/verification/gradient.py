@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.shooting import VariableBlock
 from symphys.transcription import Transcription
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Values = Callable[[Array], Array]
 
 DIFFERENCE_STEPS = (1e-4, 1e-5, 1e-6)

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from symphys.shooting import VariableBlock
 from symphys.transcription import Transcription
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 AT = 1e-9
 """A component lies at a bound within this share of 1 + the bound."""

@@ -7,7 +7,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.joints.warm_start import components
 from symphys.dynamics.observation import readings
@@ -17,10 +16,8 @@ from symphys.model.scalar import is_zero
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
 from symphys.transcription import Record, Rollout
+from symphys.types import Array, Bools
 from symphys.verification.bodies import parameters
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 WORKING = ("motor", "spring", "friction")
 AT_LIMIT = 1e-6
@@ -64,7 +61,7 @@ def rotor_energy(world: World, x: Any) -> Any:
     return total
 
 
-def uncounted(rollout: Rollout, record: Record) -> Mask:
+def uncounted(rollout: Rollout, record: Record) -> Bools:
     """(N,): steps in which a joint may take or store energy otherwise: at a limit, or where one gives way."""
     found = np.full(rollout.steps, any(joint.soft for joint in rollout.world.joints))
     for joint, value, rate in coordinates(rollout, record):
@@ -72,7 +69,7 @@ def uncounted(rollout: Rollout, record: Record) -> Mask:
         for sign, limit in ((-1, joint.limits.lower), (1, joint.limits.upper)):
             if limit is not None:
                 bound = number(rollout, record, limit)
-                there: Mask = np.any(sign * (value - bound) + reach >= 0, axis=1)
+                there: Bools = np.any(sign * (value - bound) + reach >= 0, axis=1)
                 found |= there[:-1] | there[1:]
     return found
 

@@ -9,13 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.transcription import Record, Rollout
 from symphys.verification.bodies import bodies
 from symphys.verification.joints import coordinates
 
-Array = NDArray[np.float64]
 MARGIN = 1.5
 """Places may move by so many times what the faster of a step's two ends would: between them speeds may be larger."""
 

@@ -20,12 +20,9 @@ from symphys.maths import rotation
 from symphys.model.state_layout import GIVEN, Layout
 from symphys.shooting import VariableBlock
 from symphys.transcription import Record, Rollout, Transcription
+from symphys.types import Array
 from symphys.verification.sensitivity_growth import DIRECTIONS
 from symphys.verification.signed_gaps import SurfacePair, surface_pairs
-
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX"""
 
 MOST = 4
 """Pairs of surfaces that are examined: those that come closest, and those that touch first."""

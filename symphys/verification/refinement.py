@@ -8,16 +8,15 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.model.state_layout import Layout
 from symphys.shooting import VariableBlock
 from symphys.trajectory import NotFinite
 from symphys.transcription import Record, Rollout, Transcription, transcribe
+from symphys.types import Array
 from symphys.verification.bodies import Bodies, bodies
 from symphys.verification.joints import floating
-
-Array = NDArray[np.float64]
 
 FINER_DT, FINEST_DT, MORE_SWEEPS, ONE_MORE = "dt / 2", "dt / 4", "sweeps x 2", "sweeps + 1"
 TOLD = {what: f"simulating with {what}" for what in (FINER_DT, FINEST_DT, MORE_SWEEPS)}

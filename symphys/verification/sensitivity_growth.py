@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from symphys.model.state_layout import GIVEN, Layout
 from symphys.transcription import Record, Rollout, Transcription
+from symphys.types import Array
 from symphys.verification.bodies import bodies
-
-Array = NDArray[np.float64]
 
 DIRECTIONS = 4
 MOST_SAMPLES = 200

@@ -5,22 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
-from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.collision import collide
 from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.maths import rotation
 from symphys.model.world import Pair
 from symphys.transcription import Rollout
+from symphys.types import Array, Expr
 from symphys.verification.bodies import parameters
-
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX"""
 
 
 @dataclass(frozen=True, eq=False)

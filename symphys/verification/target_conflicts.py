@@ -18,10 +18,9 @@ from symphys.shooting import ShootingProblem
 from symphys.trajectory import NotFinite
 from symphys.transcription import Record, Rollout, Transcription
 from symphys.transcription.formulas.recorded_parts import part_numbers
+from symphys.types import Array
 from symphys.verification.held_bounds import lies_at
 from symphys.verification.sensitivity_growth import DIRECTIONS
-
-Array = NDArray[np.float64]
 
 MOST_COMPONENTS = 16
 """Components of targets up to which contradictions are looked for."""

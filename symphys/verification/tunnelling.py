@@ -10,14 +10,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.shapes import SolidShape, Surface
 from symphys.transcription import Record, Rollout
+from symphys.types import Array
 from symphys.verification.bodies import bodies
 from symphys.verification.signed_gaps import SurfacePair, surface_pairs
-
-Array = NDArray[np.float64]
 
 FAST = 0.5
 """Of a body's size: what moves by less in a step cannot pass unseen."""

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.identification.interface import FitParameters, ResidualRows, fit_parameters
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Model = Callable[[Array, Array, Array], Array]
 """Of shared (s,), own (o,) and time (n,): what is measured, (n, q), also of complex numbers."""
 TINY = 1e-30

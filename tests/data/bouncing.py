@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def bouncing_height(time: Array, height: float, radius: float, restitution: float, gravity: float = 9.81) -> Array:

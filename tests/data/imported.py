@@ -6,15 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import symphys
 from symphys.importing.findings import Finding
 from symphys.importing.options import ImportOptions
 from symphys.importing.source import Source
 from symphys.importing.tables import tables_of
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Tables = dict[str, Any]
 HEAD = '<mujoco><compiler angle="radian"/>'
 FINE = 1e-4

@@ -7,15 +7,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from symphys import problems
 from symphys.codegen.backends import BEST
 from symphys.problem import load_problem, validate_options
 from symphys.solvers import Outcome, solver
 from symphys.transcription import Transcription, transcribe
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def seeds(count: int) -> pytest.MarkDecorator:

@@ -7,12 +7,12 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from tools.laboratory import Lab, value_and_gradient
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 G = 9.81
 
 

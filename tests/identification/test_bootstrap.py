@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from data.analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, recordings
 
 from symphys.identification import FitOptions, IdentificationError, IdentificationOptions, fit, identify
 from symphys.identification.inference.bootstrap import Bootstrap, bootstrap, refitted
+from symphys.types import Array
 
 
 def many(name: str, seed: int, count: int = 20) -> AnalyticRecordings:

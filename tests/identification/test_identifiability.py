@@ -6,13 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from data.analytic_recordings import TRUTHS, Array, Truth, recordings, slide
+from data.analytic_recordings import TRUTHS, Truth, recordings, slide
 from tools.repeats import few
 
 from symphys.identification import FitOptions, IdentificationOptions, fit_parameters, identify
 from symphys.identification.inference.advice import GENERAL, advice
 from symphys.identification.inference.identifiability import components, echelon, monomial, whole_powers
 from symphys.results.identification import Identification
+from symphys.types import Array
 
 SEEDS = range(20)
 OWN = np.array([[1.0], [1.5], [2.2]])

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.optimize
-from data.analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, recordings
 
 from symphys.identification import FitOptions, FitOutcome, FitStatus, IdentificationOptions, fit_parameters, identify
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
+from symphys.types import Array
 
 
 def bounces(samples: int, seed: int, copies: int = 1) -> AnalyticRecordings:

@@ -10,12 +10,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.optimize
-from data.analytic_recordings import TRUTHS, AnalyticRecordings, Array, recordings
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, recordings
 from tools.repeats import first
 
 from symphys.identification import FitOptions, FitStatus, IdentificationError, fit_parameters, revive_state
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.state import FitState, FitStep
+from symphys.types import Array
 
 TIGHT = FitOptions(tolerance=1e-9, iterations=300, patience=0)
 

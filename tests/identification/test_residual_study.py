@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from data.analytic_recordings import TRUTHS, AnalyticRecordings, Array, Truth, oscillator, recordings
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, Truth, oscillator, recordings
 
 from symphys.identification import IdentificationOptions, fit_parameters, identify
 from symphys.identification.inference.residual_study import explained, ljung_box
 from symphys.results.identification import Identification
+from symphys.types import Array
 
 QUIET = IdentificationOptions(draws=0)
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from data.analytic_recordings import AnalyticRecordings, Array
+from data.analytic_recordings import AnalyticRecordings
 
 from symphys.identification import FitOptions, FitStatus, fit, fit_parameters
+from symphys.types import Array
 
 RNG = np.random.default_rng(5)
 

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from data.analytic_recordings import TRUTHS, AnalyticRecordings, Array, Truth, recordings
+from data.analytic_recordings import TRUTHS, AnalyticRecordings, Truth, recordings
 from tools.repeats import thorough
 
 from symphys.identification import FitOptions, IdentificationOptions, fit, fit_parameters, identify
 from symphys.identification.inference.uncertainty import Uncertainty
+from symphys.types import Array
 
 DRAWS = 100
 UNKNOWN = np.array([False])

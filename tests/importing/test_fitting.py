@@ -15,8 +15,8 @@ from symphys.importing.fitting import Fit, best, draw_fit, fit, fits
 from symphys.importing.fitting.solids import DISTANCES, SURFACES, Placed, directions, quaternion
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Sphere
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 TURN = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
 TURN = TURN * np.sign(np.linalg.det(TURN))
 PLACE = np.array([0.4, -0.2, 0.1])

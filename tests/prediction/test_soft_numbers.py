@@ -10,13 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import symphys
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 HZ, RATIO, G = 5.0, 0.15, 9.81
 OMEGA = 2 * np.pi * HZ

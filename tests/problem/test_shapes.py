@@ -15,8 +15,8 @@ from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from symphys.model.shapes.inertia import specific
 from symphys.problem import Problem
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Load = Callable[..., Problem]
 
 BASE = "[simulation]\nduration = 1.0\ndt = 0.01\n"

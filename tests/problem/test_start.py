@@ -8,7 +8,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from worlds.joint_texts import HINGE, SLIDER, UNIVERSAL, body, joint
 
@@ -16,11 +15,11 @@ from symphys.dynamics.observation.joint_coordinates import Reading, readings
 from symphys.errors import ProblemError
 from symphys.model.state_layout import initial_state
 from symphys.problem import Problem
+from symphys.types import Array
 
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]
 Names = Callable[[ProblemError, str, str], None]
-Array = NDArray[np.float64]
 
 LINKS = body("torso", 1.5) + body("thigh", 0.75) + body("shin", 0.25)
 TIME = "[simulation]\nduration = 1.0\ndt = 0.01\n"

@@ -8,7 +8,6 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tools.repeats import few
 from worlds import joint_texts
 from worlds.joint_texts import SLIDER, UNIVERSAL, joint
@@ -24,7 +23,6 @@ from symphys.transcription.randomization.numbers import QuantitySampler
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]
 Names = Callable[[ProblemError, str, str], None]
-Array = NDArray[np.float64]
 
 TIME = "[simulation]\nduration = 0.2\ndt = 0.01\n"
 

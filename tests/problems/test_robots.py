@@ -8,7 +8,6 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from symphys import problems
 from symphys.dynamics.functions import step_function
@@ -16,8 +15,8 @@ from symphys.dynamics.observation import gap_function, reading_function
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Scheme
 from symphys.problem import Problem, load_problem
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Robot = Callable[..., Problem]
 Simulated = Callable[[str, dict[str, float]], Array]
 ROBOTS = ["arm", "cart_pendulum", "gait_robot", "hopper", "mini_cheetah", "table_robot"]

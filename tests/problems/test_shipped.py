@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from data.shipped import Array, met, shipped, solve, work
+from data.shipped import met, shipped, solve, work
 from numpy.typing import ArrayLike
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
@@ -26,6 +26,7 @@ from symphys.codegen.backends import BEST
 from symphys.solvers import Outcome, Status
 from symphys.trajectory import Trajectory
 from symphys.transcription import Assessment, Transcription
+from symphys.types import Array
 from symphys.verification.refinement import FINER_DT, finer_problem
 
 GRAVITY = 9.81

@@ -16,9 +16,10 @@ from symphys.mpc import Controller, Plant, close_loop, record_of
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.runs.job import solver_options
-from symphys.shooting import Array, ScenarioEvaluator
+from symphys.shooting import ScenarioEvaluator
 from symphys.solvers import SOLVERS, Outcome
 from symphys.transcription import Transcription, transcribe
+from symphys.types import Array
 
 pytestmark = pytest.mark.slow
 

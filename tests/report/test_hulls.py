@@ -13,7 +13,6 @@ import pytest
 from data.walker import SCENE, motion
 from data.yard import QUARTER, area, motion_of, prism
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from tools.page_scripts import NODE, plays_to_the_end, run_script
@@ -28,8 +27,8 @@ from symphys.report.scene.views import SIDE_XZ, TOP, choose_views
 from symphys.results.polytope import Polytope, make_polytope
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Trajectory
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Load = Callable[..., tuple[Trajectory, Scene]]
 UPRIGHT = np.array([1.0, 0, 0, 0])
 STILL = "{ p: [1, 2, 3], q: [1, 0, 0, 0] }"

@@ -16,8 +16,7 @@ from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
 from symphys.solvers.ddp.box_qp import solve_box_qp
 from symphys.solvers.ddp.forward_pass import forward_pass
 from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass

@@ -19,8 +19,9 @@ from tools.repeats import few
 from worlds.toys import PLAIN, Counted, constrained, rosenbrock, solve, target, toy
 from worlds.windy import BEST, Winds, windy
 
-from symphys.shooting import Array, Evaluator, ScenarioSamples, ShootingProblem, Values
+from symphys.shooting import Evaluator, ScenarioSamples, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Outcome, Status
+from symphys.types import Array
 
 Rank = tuple[bool, float, float]
 Spoil = Callable[[Values], Values]

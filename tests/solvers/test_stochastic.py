@@ -11,9 +11,10 @@ import pytest
 from worlds.toys import toy
 from worlds.windy import BEST, Winds, windy
 
-from symphys.shooting import Array, ScenarioSamples, Values
+from symphys.shooting import ScenarioSamples, Values
 from symphys.solvers import SOLVERS, Status, StochasticOptions, TraceRow
 from symphys.solvers.randomized.aggregation import average, centred, evolution, mixed
+from symphys.types import Array
 
 SOLVE = SOLVERS["stochastic"].solve
 

@@ -8,13 +8,11 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.functions import step_function
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Scheme, World
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @lru_cache(64)

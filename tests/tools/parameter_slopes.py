@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.problem import load_problem
 from symphys.transcription import transcribe
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def slopes_of(file: Path, step: float = 0.0) -> tuple[float, Array, Array]:

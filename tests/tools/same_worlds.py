@@ -8,7 +8,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.motion import inertia_matrix
 from symphys.maths import rotation
@@ -17,8 +16,8 @@ from symphys.model.joints import Joint
 from symphys.model.shapes import Plane, Shape, Terrain, surface
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import World, side_name
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 TOLERANCE = 1e-9
 """Of numbers, absolute or by the larger one."""
 

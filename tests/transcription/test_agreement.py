@@ -7,16 +7,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from worlds.features import FEATURES
 from worlds.toys import require
 
 from symphys.problem import problem_of_tables
 from symphys.shooting import StagedProblem
 from symphys.transcription import Transcription, transcribe
-
-Array = NDArray[np.float64]
-
+from symphys.types import Array
 
 HEAVY = {"inertia and centre of mass", "loop of joints", "orientation"}
 """What takes seconds to build."""

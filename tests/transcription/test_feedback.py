@@ -7,15 +7,13 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tools.repeats import few
 
 from symphys.errors import ProblemError
 from symphys.problem import Problem, load_problem
 from symphys.transcription import Transcription, transcribe
+from symphys.types import Array
 from symphys.verification.sensitivity_growth import sensitivity_growth
-
-Array = NDArray[np.float64]
 
 CART = """
 [simulation]

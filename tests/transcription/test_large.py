@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from fakes.emulated import Remote, needs_compiler
-from numpy.typing import NDArray
 from tools.repeats import thorough
 from worlds.monopod import MONOPOD
 
@@ -19,13 +18,13 @@ from symphys.transcription import Transcription, transcribe
 from symphys.transcription.network_rollout import LargeEvaluator, LargeTranscription, net_values, require_small_nets
 from symphys.transcription.network_rollout import evaluator as evaluators
 from symphys.transcription.network_rollout import partition as split
+from symphys.types import Array
 from symphys.verification import examine
 from symphys.verification.gradient import compare_gradient
 from symphys.verification.sensitivity_growth import sensitivity_growth
 
 pytestmark = pytest.mark.slow
 
-Array = NDArray[np.float64]
 
 HOPPING = (
     """

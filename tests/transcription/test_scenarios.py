@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tools.repeats import first
 
 from symphys.dynamics.observation import gap_function
@@ -17,10 +16,10 @@ from symphys.problem import Problem, load_problem
 from symphys.shooting import ScenarioSamples
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.randomization.sampler import Sampler
+from symphys.types import Array
 
 pytestmark = pytest.mark.slow
 
-Array = NDArray[np.float64]
 WALKER = """
 [simulation]
 duration = 0.4

@@ -13,7 +13,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tools.agreement import transcribed
 from tools.laboratory import Lab
 from tools.repeats import few, thorough
@@ -21,8 +20,8 @@ from tools.repeats import few, thorough
 from symphys.model.joints import HINGE, SLIDER, Joint, JointFrame, Limits
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 DT, STEPS = 1 / 16, 16
 STOUT = 1e9
 """[kg m^2]: so much that a body does not turn, since only the instant of the impact is tested."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tools.repeats import few
 from worlds.mixed import mixed
 
@@ -14,8 +13,8 @@ from symphys.maths.rotation import normalised
 from symphys.model.shapes import Box, Capsule, Plane, Sphere, Terrain
 from symphys.model.state_layout import Layout, initial_state, input_sizes
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 INERTIA = (0.02, 0.03, 0.04)
 HILLS = Terrain("hills", lambda x, y: 0.1 * ca.sin(3 * x) * ca.cos(2 * y))
 WORLDS = {

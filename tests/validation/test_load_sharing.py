@@ -8,12 +8,13 @@ import casadi as ca
 import numpy as np
 import pytest
 from tools.laboratory import Lab
-from worlds.blocks import Array, block
+from worlds.blocks import block
 from worlds.plate import Plate
 
 from symphys.dynamics.contact.load_distribution import faces
 from symphys.model.shapes import Box, Plane
 from symphys.model.world import Body, Law, Scheme, make_world
+from symphys.types import Array
 
 HALVES, FRICTION = (0.15, 0.2, 0.1), 0.3
 FEET = [f"b-ground:{k}.force" for k in range(8)]

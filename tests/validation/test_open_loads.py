@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from tools.laboratory import Lab
-from worlds.blocks import Array, block
+from worlds.blocks import block
 from worlds.driven import TABLES
 
 import symphys
@@ -23,6 +23,7 @@ from symphys.dynamics.functions import step_function
 from symphys.model.shapes import Box, Fixture
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Law, Scheme, make_world
+from symphys.types import Array
 
 CRATE = (0.5, 0.5, 0.5)
 CAR = """

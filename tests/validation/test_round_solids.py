@@ -8,7 +8,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tools.repeats import thorough
 from worlds.blocks import turned_by
 
@@ -22,8 +21,8 @@ from symphys.model.shapes import Cylinder as CylinderShape
 from symphys.model.world import Law, World, make_world
 from symphys.problem import Problem
 from symphys.trajectory import Trajectory
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 G, MASS = 9.81, 2.0
 ON_SIDE = (float(np.sqrt(0.5)), float(np.sqrt(0.5)), 0.0, 0.0)
 SLOPE = 0.2

@@ -8,7 +8,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tools.repeats import few, first, thorough
 from worlds.blocks import block, rod, turned_by
 
@@ -16,8 +15,8 @@ from symphys.dynamics.functions import step_function
 from symphys.model.shapes import Box, Fixture
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, make_world
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 HALF, RADIUS, FRICTION, GRAVITY = 0.05, 0.03, 0.2, 9.81
 SEAM = 0.5
 """[m] x at which the second board begins."""

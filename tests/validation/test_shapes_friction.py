@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from tools.laboratory import Lab
 from tools.repeats import first
-from worlds.blocks import Array, among, block, turned_by
+from worlds.blocks import among, block, turned_by
 
 from symphys.model.shapes import Box, Fixture, Plane
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
 G, MU = 9.81, 0.6
 HEADINGS = np.arange(16) * np.pi / 8

@@ -11,12 +11,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from tools.laboratory import Lab, value_and_gradient
 from tools.repeats import few, first
-from worlds.blocks import Array, block, rod, turned_by
+from worlds.blocks import block, rod, turned_by
 from worlds.meetings import matrix
 
 from symphys.model.heightfield import Heightfield
 from symphys.model.shapes import Box, Fixture, Plane, Static, Terrain
 from symphys.model.world import Body, Law, Scheme, make_world
+from symphys.types import Array
 
 G = 9.81
 CORNER = {

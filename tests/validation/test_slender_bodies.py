@@ -8,7 +8,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from tools.repeats import few, first
@@ -19,8 +18,8 @@ from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Plane, Shape
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 THROWN: dict[str, Shape] = {
     "capsule": Capsule(0.02, 0.15),
     "stick": Box((0.01, 0.01, 0.25)),

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
-from tools.laboratory import Array, Lab
+from tools.laboratory import Lab
 from tools.repeats import few
 
 from symphys.dynamics.contact.oscillator import response, spring_law
 from symphys.model.joints import BALL, FIXED, SLIDER, Joint, JointFrame
 from symphys.model.shapes import Box, Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
 HZ, G, RADIUS = 5.0, 9.81, 0.1
 OMEGA = 2 * np.pi * HZ

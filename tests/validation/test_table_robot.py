@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from robot_growth import grown, rollout_of, visited
 from table_robot import starts, table_problem
 
@@ -14,10 +13,10 @@ from symphys.problem import Problem
 from symphys.transcription import Rollout, symbolic_rollout
 from symphys.transcription.program import rollout_program
 from symphys.transcription.simulation import Record, recorder, simulate
+from symphys.types import Array
 
 pytestmark = pytest.mark.slow
 
-Array = NDArray[np.float64]
 STEPS = 50
 
 

@@ -8,13 +8,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from data.textbook import Array, G
+from data.textbook import G
 from scipy.optimize import linprog
 from tools.laboratory import Lab
 from worlds.blocks import turned_by
 
 from symphys.model.shapes import Box, Plane
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
 COUNT = 5
 PART = np.pi / COUNT

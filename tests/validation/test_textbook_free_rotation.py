@@ -8,7 +8,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
-from data.textbook import Array, about_a_point, differences, final, turn
+from data.textbook import about_a_point, differences, final, turn
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 from tools.laboratory import Lab
@@ -17,6 +17,7 @@ from worlds.linkage import momenta
 
 from symphys.maths import rotation
 from symphys.model.world import Body, Scheme, World
+from symphys.types import Array
 
 MOMENTS = (1.0, 2.0, 3.0)
 BODIES = {

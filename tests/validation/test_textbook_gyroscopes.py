@@ -7,13 +7,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from data.textbook import Array, G, about_a_point, differences, final, turn
+from data.textbook import G, about_a_point, differences, final, turn
 from tools.laboratory import Lab
 from tools.repeats import few
 from worlds.blocks import turned_by
 
 from symphys.model.joints import BALL, HINGE, Joint, JointFrame
 from symphys.model.world import Body, Scheme, World
+from symphys.types import Array
 
 MASS, ARM = 0.5, 0.08
 MOMENTS = (8e-4, 8e-4, 5e-4)

@@ -7,13 +7,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from data.textbook import Array, G, differences, final
+from data.textbook import G, differences, final
 from tools.laboratory import Lab
 from tools.repeats import few, first
 from worlds.blocks import turned_by
 
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
 R = 0.05
 

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from data.textbook import Array, G, differences, final
+from data.textbook import G, differences, final
 from tools.laboratory import Lab
 from tools.repeats import first
 from worlds.blocks import among, block, turned_by
@@ -17,6 +17,7 @@ from worlds.linkage import ABOUT_Z
 from symphys.model.joints import HINGE, SLIDER, Joint, JointFrame
 from symphys.model.shapes import Box
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
 R = 0.05
 

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from data.textbook import Array, G, differences, final
+from data.textbook import G, differences, final
 from scipy.integrate import solve_ivp
 from tools.laboratory import Lab
 from tools.repeats import few, first
@@ -17,6 +17,7 @@ from symphys.model.joints import BALL, FIXED, HINGE, SLIDER, Joint, JointFrame, 
 from symphys.model.joints.kind import Kind
 from symphys.model.shapes import Capsule, Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
 
 @pytest.mark.slow

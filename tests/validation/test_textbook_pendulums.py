@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from data.textbook import Array, G
+from data.textbook import G
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from tools.laboratory import Lab
@@ -16,6 +16,7 @@ from worlds.linkage import ABOUT_Y, ABOUT_Z, chain, hanging, rod
 from symphys.model.joints import BALL, HINGE, SLIDER, Joint, JointFrame, Limits, Spring, VelocityMotor
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
 LENGTH = 0.3
 

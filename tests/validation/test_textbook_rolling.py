@@ -8,12 +8,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from data.textbook import Array, G, differences, final
+from data.textbook import G, differences, final
 from tools.laboratory import Lab
 from tools.repeats import few, first
 
 from symphys.model.shapes import Box, Fixture, Plane, Terrain
 from symphys.model.world import Body, Law, Scheme, make_world
+from symphys.types import Array
 
 R = 0.05
 

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from data.textbook import Array, G, differences, final, spinning, turn
+from data.textbook import G, differences, final, spinning, turn
 from scipy.integrate import solve_ivp
 from tools.laboratory import Lab
 from tools.repeats import first, thorough
@@ -16,6 +16,7 @@ from worlds.linkage import energy
 
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, make_world
+from symphys.types import Array
 
 
 @pytest.mark.parametrize("e", [1.0, 0.8])

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.shapes import Box, Capsule, Plane
 from symphys.model.world import Body, Law, World, make_world
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 LYING = (float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0)
 """Turns z to x: a capsule on its side."""
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import symphys
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 DT, NOISE, DURATION = 0.01, 0.002, 3.0
 """[s], [rad], [s]."""
 RATES, ENDS = (50, 80), (3.0, 2.5)

@@ -6,7 +6,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.constraint import ContactConstraint
@@ -18,8 +17,7 @@ from symphys.dynamics.contact.effective_mass import (
 )
 from symphys.dynamics.unknowns import Momentum
 from symphys.model.world import Law
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def terms_of(rng: np.random.Generator, count: int = 2) -> tuple[BodyTerm, ...]:

@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 UP = np.array([0.0, 0.0, 1.0])
 GRAVITY = -9.81 * UP
 

@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.trajectory import Trajectory
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 LEGS = ("fl", "fr", "hl", "hr")
 GAIT = {"trolley": 0.1, "torso": 5.0, "leg": 0.3, "foot": 0.1}
 HOPPER = {"torso": 5.0, "leg": 0.3, "foot": 0.4}

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from symphys.model.joints import HINGE, Joint, JointFrame
 from symphys.model.world import Body, World
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 HALF = float(np.sqrt(0.5))
 ABOUT_Y, ABOUT_Z = (HALF, 0.0, 0.0, HALF), (HALF, 0.0, -HALF, 0.0)
 """Orientations of frames whose x axis is that of the body's y, or z."""

@@ -8,7 +8,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from tools.distances import Solid, distance
 
@@ -17,8 +16,8 @@ from symphys.dynamics.collision.contact_geometry import Displacement
 from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Convex, Cylinder, Ellipsoid, Sphere, Surface
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 WIDTHS = {"sphere": 1, "capsule": 2, "box": 3, "cylinder": 2, "ellipsoid": 3, "convex": 0}
 """How many numbers the size of a shape has."""
 PLACE, MOTION = 7, 19

@@ -9,14 +9,13 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.functions import step_function
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Shape, Sphere, Static, Terrain
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 SMOOTHINGS = (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0)
 QUARTER = np.sqrt(0.5)
 TURNS = np.array(

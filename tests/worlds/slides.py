@@ -7,9 +7,9 @@ from itertools import pairwise
 from math import pi, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
+
 KICK = [4.8767, 1.7477, -0.1312]
 """Where the kick of ``knock`` goes as the time step goes to 0, from 10 ms, 5 ms and 2.5 ms."""
 ROW = [1.6, 0.8, 0.4, 0.2, 0.1]

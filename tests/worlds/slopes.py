@@ -6,9 +6,10 @@ from functools import cache
 
 import casadi as ca
 import numpy as np
-from worlds.meetings import MOTION, PLACE, WIDTHS, Array, arguments, contacts
+from worlds.meetings import MOTION, PLACE, WIDTHS, arguments, contacts
 
 from symphys.model.shapes import Terrain
+from symphys.types import Array
 
 
 @cache

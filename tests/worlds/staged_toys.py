@@ -10,7 +10,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from tools.single_steps import SingleSteps
 
 from symphys.shooting import (
@@ -23,8 +22,8 @@ from symphys.shooting import (
     VariableBlock,
     WithoutResiduals,
 )
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 TOLERANCE = 1e-6
 """Of limits."""
 

@@ -11,18 +11,17 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from symphys.codegen import FunctionCall, KernelUnavailable, MemoryLayout, Program
 from symphys.codegen.backends import BackendSource, choose
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.shooting import Evaluator, ShootingProblem, Values, VariableBlock
 from symphys.solvers import SOLVERS, Outcome, TraceRow, solver
+from symphys.types import Array
 
 PLAIN = [name for name, each in SOLVERS.items() if not each.scenarios and name not in ("ilqr", "multiple_shooting")]
 """The solvers that need neither a scenario nor steps; test_ilqr.py and test_multiple_shooting.py have the others."""
 
-Array = NDArray[np.float64]
 Formula = Callable[[Any, Any], Any]
 """(z, smoothing) -> casadi expression."""
 PENALTY = 100.0

@@ -9,7 +9,8 @@ import casadi as ca
 import numpy as np
 from worlds.toys import toy
 
-from symphys.shooting import Array, ScenarioSamples, ShootingProblem, Values
+from symphys.shooting import ScenarioSamples, ShootingProblem, Values
+from symphys.types import Array
 
 BEST = np.array([0.5, -0.25])
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.backends.interface import Function
-from symphys.shooting import Array
+from symphys.types import Array
 
 
 class BufferedFunction:

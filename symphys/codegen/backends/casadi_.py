@@ -6,7 +6,8 @@ import numpy as np
 
 from symphys.codegen.backends.calls import BufferedFunction
 from symphys.codegen.backends.interface import Backend, BackendSource, Description, ProblemFunctions
-from symphys.shooting import Array, LaterNlp, Nlp, Values
+from symphys.shooting import LaterNlp, Nlp, Values
+from symphys.types import Array
 
 
 class FunctionEvaluator:

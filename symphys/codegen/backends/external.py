@@ -16,7 +16,8 @@ from symphys.codegen.backends.interface import Function
 from symphys.codegen.backends.seeds import Seeds
 from symphys.codegen.toolchain.build import temporary_folder
 from symphys.codegen.toolchain.processes import ELSEWHERE
-from symphys.shooting import Array, Nlp
+from symphys.shooting import Nlp
+from symphys.types import Array
 
 ROOM = "symphys.codegen.backends"
 NAMES = ("nlp", "nlp_gradient", "nlp_jacobian")

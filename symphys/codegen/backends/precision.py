@@ -15,14 +15,13 @@ import warnings
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.program.program import Program
 from symphys.codegen.toolchain.build import double_reference
 from symphys.codegen.toolchain.warm_start import ProgramSource
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 MAX_ERROR = 0.1
 """Largest error of a gradient, as a share of its length, that is not reported."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from symphys.codegen import Kernel
 from symphys.codegen.backends.interface import Function
-from symphys.shooting import Array
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from symphys.codegen.backends.kernels import build_kernel, described
 from symphys.codegen.backends.seeds import Seeds
 from symphys.codegen.runtime.kernel import Outputs
 from symphys.codegen.toolchain.warm_start import ProgramSource
-from symphys.shooting import Array, LaterNlp, Nlp, Values
+from symphys.shooting import LaterNlp, Nlp, Values
+from symphys.types import Array
 
 SEEDED = ("merit", "objective", "residuals", "constraints")
 

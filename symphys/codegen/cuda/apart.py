@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.emit.planned import Plan
-
-Words = NDArray[np.int64]
+from symphys.types import Ints
 
 
 def results_apart(planned: Plan, steps: int) -> list[set[int]]:
     """For each function; all of those of a function without calls."""
-    calls: list[list[Words]] = [[] for _ in planned.functions]
+    calls: list[list[Ints]] = [[] for _ in planned.functions]
     for count, table in planned.tables.values():
         at = 0
         for _ in range(count):
@@ -30,7 +28,7 @@ def results_apart(planned: Plan, steps: int) -> list[set[int]]:
     return found
 
 
-def _meet(a: Words, size: int, b: Words, other: int, steps: int) -> bool:
+def _meet(a: Ints, size: int, b: Ints, other: int, steps: int) -> bool:
     """Whether places, (calls, 2) offsets and strides, have a word in common in any step of any call."""
     offset, stride = (b - a).T
     ends = [offset, offset + stride * (steps - 1)]

@@ -14,15 +14,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.emit.alternatives import ALWAYS, Alternatives, Span, entries_of, of_adjoint, of_call, word_of
 from symphys.codegen.emit.guarding import TABLES as GUARDED
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.program.program import FunctionCall, Program
 from symphys.codegen.runtime.library import TABLES
+from symphys.types import Ints
 
-Words = NDArray[np.int64]
 LOOPED = ("body", "again", "back_body")
 """Phases of every step."""
 CALL = 40
@@ -40,8 +39,8 @@ class Schedule:
         words: that are read and written.
     """
 
-    spans: Words
-    entries: Words
+    spans: Ints
+    entries: Ints
     work: int
     longest: int
     words: int
@@ -53,8 +52,8 @@ class _Call:
 
     entry: list[int]
     cost: int
-    reads: Words
-    writes: Words
+    reads: Ints
+    writes: Ints
     places: tuple[Span, ...]
     alternatives: Alternatives
 
@@ -167,6 +166,6 @@ def _shared(level: Sequence[_Call], warps: int) -> list[list[_Call]]:
     return shares
 
 
-def _words(spans: Sequence[Span]) -> Words:
+def _words(spans: Sequence[Span]) -> Ints:
     """That these have at step 0, one after the other."""
     return np.concatenate([np.zeros(0, np.int64), *(np.arange(span.offset, span.offset + span.size) for span in spans)])

@@ -6,7 +6,6 @@ import ctypes
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.cuda.device import Device
 from symphys.codegen.cuda.schedule import Schedule
@@ -14,8 +13,7 @@ from symphys.codegen.emit.alternatives import LEFT_OUT
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.library import WORD, List, RowSource, data_places, program_fields, strided
-
-Words = NDArray[np.int64]
+from symphys.types import Ints
 
 
 class DevicePhase(ctypes.Structure):
@@ -82,13 +80,13 @@ class Tables:
         self._kept.append(device.put(np.frombuffer(bytes(data), np.uint8)))
         self.address = device.address(self._kept[-1])
 
-    def _put(self, words: Words) -> int:
+    def _put(self, words: Ints) -> int:
         """The address of a copy."""
         self._kept.append(self.device.put(words if words.size else np.zeros(1, np.int64)))
         return self.device.address(self._kept[-1])
 
 
-def interleaved(entries: Words, lanes: int) -> Words:
+def interleaved(entries: Ints, lanes: int) -> Ints:
     """Entries whose offsets and strides count the words of all lanes; those of what is copied count robots' words."""
     found, at = entries.copy(), 0
     while at < len(found):

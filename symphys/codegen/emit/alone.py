@@ -12,14 +12,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.emit.guarding import TABLES
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.shapes import ALL, BESIDE, EACH, TURNS, Access, Shape
 from symphys.codegen.program.program import Program
+from symphys.types import Ints
 
-Words = NDArray[np.int64]
 NONE = -1
 ALIGNED = 8
 """Words to which a place of a team is aligned."""
@@ -53,7 +52,7 @@ def alone(planned: Plan) -> Plan | None:
     return replace(found, signature=hashlib.sha256(repr(differs).encode()).hexdigest())
 
 
-def _entries(count: int, table: Words) -> Iterator[_Entry]:
+def _entries(count: int, table: Ints) -> Iterator[_Entry]:
     words, at = table.tolist(), 0
     for _ in range(count):
         number, length = words[at], words[at + 1]
@@ -67,7 +66,7 @@ class _Layout:
 
     def __init__(self, planned: Plan, program: Program) -> None:
         self._planned, self._program = planned, program
-        self.to: Words = np.arange(program.size + planned.tape)
+        self.to: Ints = np.arange(program.size + planned.tape)
         self._family = np.full(program.size, NONE, np.int64)
         self._lane = np.zeros(program.size, np.int64)
 
@@ -80,10 +79,10 @@ class _Layout:
             size += -(-family.size // ALIGNED) * ALIGNED
         return size, self._tape(again, size)
 
-    def _families(self) -> list[Words]:
+    def _families(self) -> list[Ints]:
         """For each result of each team its words (lanes, size), where all that has to do with them is regular."""
         body, free = self._program.phases[1], self._program.scratch()
-        found: list[Words] = []
+        found: list[Ints] = []
         for first, lanes in self._planned.teams:
             calls = np.arange(first, first + lanes)
             for r in range(int(np.diff(body.outputs.starts[first : first + 2])[0])):
@@ -126,7 +125,7 @@ class _Layout:
         return -(-(at - begin) // ALIGNED) * ALIGNED
 
 
-def _together(entries: Sequence[_Entry], calls: Words, k: int, lanes: int) -> int:
+def _together(entries: Sequence[_Entry], calls: Ints, k: int, lanes: int) -> int:
     """How many entries from the k-th on are a team's calls of one function: all of them, or 1."""
     own = entries[k : k + lanes]
     if len(own) < lanes or {entry.number for entry in own} != {own[0].number}:
@@ -143,7 +142,7 @@ class _Tables:
         self.shapes: list[Shape] = []
         self._numbers: dict[tuple[int, Shape], int] = {}
 
-    def table(self, name: str, entries: Sequence[_Entry]) -> tuple[int, Words]:
+    def table(self, name: str, entries: Sequence[_Entry]) -> tuple[int, Ints]:
         """One table: calls, and their entries."""
         lanes_of = dict(self._planned.teams)
         backward = name == "back_body"

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from symphys.codegen.emit.tables import Table
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.program import FunctionCall, Place, Program
+from symphys.types import Ints
 
-Words = NDArray[np.int64]
 NONE = -1
 TABLES = ("body", "again", "back_body")
 AHEAD = 16
@@ -55,14 +55,14 @@ class Guarding:
     """
 
     first: int
-    rows: dict[str, Words]
+    rows: dict[str, Ints]
     arena: int
 
     def count(self, name: str) -> int:
         """Rows of a kind; of calls without the last."""
         return len(self.rows[name]) // WIDTHS[name] - (name == "calls")
 
-    def calls_of(self, table: str) -> Words:
+    def calls_of(self, table: str) -> Ints:
         """The numbers of the calls that one of ``TABLES`` has, in its order."""
         starts = self.rows["calls"].reshape(-1, WIDTHS["calls"])[:-1, TABLES.index(table)]
         order = np.argsort(starts, kind="stable")
@@ -97,7 +97,7 @@ class _Rows:
         self._program, self._body, self._guards = program, body, guards
         self._chains = _Chains(program.size)
         self._starts = np.full((len(body) + 1, WIDTHS["calls"]), NONE, np.int64)
-        self._reads: Words = np.zeros((0, 2), np.int64)
+        self._reads: Ints = np.zeros((0, 2), np.int64)
         self._writes: list[tuple[int, int]] = []
         self._copies: list[tuple[int, ...]] = []
         self._sections: list[tuple[int, ...]] = []
@@ -125,7 +125,7 @@ class _Rows:
             self._words += len(tables[name].words)
         self._put(np.concatenate(found, axis=1), forward)
 
-    def _read(self, table: Table, chain: Words) -> Iterator[Words]:
+    def _read(self, table: Table, chain: Ints) -> Iterator[Ints]:
         """(3, reads) call, position and chain where entries have a place of a chain."""
         inputs = self._program.phases[1].inputs
         whole = np.where((inputs.stride == 0) & (inputs.size > 0), chain[inputs.offset % max(len(chain), 1)], NONE)
@@ -137,7 +137,7 @@ class _Rows:
                     on = own != NONE
                     yield np.stack([calls[on], at[on] + 2 + 2 * k, own[on]])
 
-    def _put(self, found: Words, forward: int) -> None:
+    def _put(self, found: Ints, forward: int) -> None:
         """Reads by their calls; of each call those of the first ``forward`` first."""
         counts = [np.bincount(each, minlength=len(self._body)) for each in (found[0, :forward], found[0, forward:])]
         ends = np.cumsum(counts[0] + counts[1])
@@ -192,7 +192,7 @@ class _Rows:
             arena=arena + 3 * (6 * sections + 4 * len(self._copies)),
         )
 
-    def _gather_chains(self, rows: Mapping[str, Words], word: Mapping[int, int]) -> None:
+    def _gather_chains(self, rows: Mapping[str, Ints], word: Mapping[int, int]) -> None:
         """Number the chains that begin with calls of one guard one after the other, so that they lie side by side."""
         if not self._writes:
             return

@@ -21,8 +21,8 @@ from symphys.codegen.program.phase_calls import PhaseCalls, grouped, rows_of
 from symphys.codegen.program.program import Function, Place, Program
 from symphys.codegen.program.spans import Spans
 from symphys.codegen.program.teams import teamed
+from symphys.types import Ints
 
-Words = NDArray[np.int64]
 NONE = -1
 TAPE = ("tape", 0)
 FAST_MEMORY = 12 * 2**20
@@ -76,7 +76,7 @@ def with_adjoints(
     return parts, reach
 
 
-def _written(program: Program) -> Words:
+def _written(program: Program) -> Ints:
     places = program.phases[1].outputs
     own = places.stride != 0
     return np.stack([places.offset[own], places.size[own], places.stride[own]], axis=1)
@@ -121,7 +121,7 @@ class PlannedPhase:
         """Of the calls that have active arguments and results, given which words of the memory are active."""
         before = np.concatenate([[0], np.cumsum(active)])
         marks = [_any(before, spans, self.steps) for spans in (self.calls.inputs, self.calls.outputs)]
-        found: list[tuple[int, Words, Function, Mask, Mask]] = []
+        found: list[tuple[int, Ints, Function, Mask, Mask]] = []
         for number, calls in self.calls.by_function():
             reads, gives = marks[0][rows_of(self.calls.inputs, calls)], marks[1][rows_of(self.calls.outputs, calls)]
             for mine in _alike(np.concatenate([reads, gives], axis=1)):
@@ -132,7 +132,7 @@ class PlannedPhase:
             self.kind[calls] = len(self.kinds)
             self.kinds.append(_Kind(function, inputs, outputs, functions.adjoint(function, inputs, outputs)))
 
-    def pushes(self, functions: DistinctFunctions, calls: Words | None = None) -> Table:
+    def pushes(self, functions: DistinctFunctions, calls: Ints | None = None) -> Table:
         """The table of calls; None: of all, without tapes."""
         count, again = len(self.calls.functions), calls is not None
         chosen = np.arange(len(self.calls)) if calls is None else calls
@@ -171,7 +171,7 @@ def _columns(side: str, mask: Sequence[bool]) -> list[tuple[str, int]]:
     return [(side, i) for i, on in enumerate(mask) if on]
 
 
-def _alike(marks: NDArray[np.bool_]) -> list[Words]:
+def _alike(marks: NDArray[np.bool_]) -> list[Ints]:
     """Rows that are equal, in order."""
     bits = np.ascontiguousarray(np.packbits(marks, axis=1))
     if not bits.size:
@@ -180,7 +180,7 @@ def _alike(marks: NDArray[np.bool_]) -> list[Words]:
     return grouped(whose.ravel(), int(whose.max()) + 1)
 
 
-def _any(before: Words, spans: Spans, steps: int) -> NDArray[np.bool_]:
+def _any(before: Ints, spans: Spans, steps: int) -> NDArray[np.bool_]:
     """(places,) whether one of its words is active at any step; ``before`` each word so many are."""
     found: NDArray[np.bool_] = before[spans.offset + spans.size] > before[spans.offset]
     if steps == 1:
@@ -235,6 +235,6 @@ def _put_on_tape(
     return int(own.sum())
 
 
-def _words_of(place: Place) -> Words:
-    found: Words = place.still().words(1)[0]
+def _words_of(place: Place) -> Ints:
+    found: Ints = place.still().words(1)[0]
     return found

@@ -7,17 +7,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.emit.guarding import TABLES, Guarding
+from symphys.types import Ints
 
 if TYPE_CHECKING:
     from symphys.codegen.emit.pieces import Form
     from symphys.codegen.emit.shapes import Shape
     from symphys.codegen.graph.graph import Graph
     from symphys.codegen.program.program import Program
-
-Words = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -39,13 +37,13 @@ class Plan:
     """
 
     functions: tuple[tuple[Graph, Form], ...]
-    tables: dict[str, tuple[int, Words]]
+    tables: dict[str, tuple[int, Ints]]
     tape: int
-    written: Words
+    written: Ints
     guarding: Guarding | None = None
     program: Program | None = None
     teams: tuple[tuple[int, int], ...] = ()
-    callers: Mapping[str, Words] = field(default_factory=dict)
+    callers: Mapping[str, Ints] = field(default_factory=dict)
     shapes: tuple[Shape, ...] = ()
     size: int = 0
     signature: str = ""

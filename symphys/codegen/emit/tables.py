@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.program.phase_calls import PhaseCalls, grouped
-
-Words = NDArray[np.int64]
+from symphys.types import Ints
 
 
 class Recipe(NamedTuple):
@@ -42,24 +40,24 @@ class Table:
         recipes: of the kinds.
     """
 
-    calls: Words
-    starts: Words
-    words: Words
-    rows: Sequence[Words]
+    calls: Ints
+    starts: Ints
+    words: Ints
+    rows: Sequence[Ints]
     recipes: Sequence[Recipe]
 
-    def start_of(self, count: int) -> Words:
+    def start_of(self, count: int) -> Ints:
         """(count,) where the entry of each call of the phase begins; -1: it has none."""
         found = np.full(count, -1, np.int64)
         found[self.calls] = self.starts
         return found
 
-    def filled(self) -> Words:
+    def filled(self) -> Ints:
         """The words; one 0 where there are none, since C knows no empty arrays."""
         return self.words if len(self.words) else np.zeros(1, np.int64)
 
 
-def table_of(phase: PhaseCalls, calls: Words, kinds: Words, recipe: Callable[[int], Recipe], tape: Words) -> Table:
+def table_of(phase: PhaseCalls, calls: Ints, kinds: Ints, recipe: Callable[[int], Recipe], tape: Ints) -> Table:
     """The entries of calls.
 
     Args:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.program.program import FunctionCall, Place, Program
+from symphys.types import Bools
 
-Flags = NDArray[np.bool_]
 Words = slice | NDArray[np.int64]
 """Of a place at all steps: neighbours, or (steps, size)."""
 
@@ -37,10 +37,10 @@ class CallActivity:
     call: FunctionCall
     inputs: list[Words]
     outputs: list[Words]
-    dependence: Sequence[Flags]
+    dependence: Sequence[Bools]
 
     @classmethod
-    def of(cls, call: FunctionCall, steps: int, dependence: Sequence[Flags]) -> Self:
+    def of(cls, call: FunctionCall, steps: int, dependence: Sequence[Bools]) -> Self:
         """Of a call that is made in so many steps."""
         inputs, outputs = ([words_of(place, steps) for place in places] for places in (call.inputs, call.outputs))
         return cls(call, inputs, outputs, dependence)
@@ -64,7 +64,7 @@ class Activity:
         for phase in (epilogue, body, prologue):
             while sum(map(self._backward, reversed(phase))) and phase is body:
                 pass
-        self.active: Flags = self._depends.array & self._useful.array
+        self.active: Bools = self._depends.array & self._useful.array
 
     def _forward(self, reach: CallActivity) -> bool:
         moving = tuple(map(self._depends.any, reach.inputs))
@@ -103,7 +103,7 @@ class _Flags:
 
     def __init__(self, size: int) -> None:
         self._bytes = bytearray(size)
-        self.array: Flags = np.frombuffer(self._bytes, bool)
+        self.array: Bools = np.frombuffer(self._bytes, bool)
 
     def any(self, words: Words) -> bool:
         """Whether one of them is set."""

@@ -10,35 +10,32 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.program.phase_calls import PhaseCalls
 from symphys.codegen.program.spans import Spans, stretches
-
-Flags = NDArray[np.bool_]
-Words = NDArray[np.int64]
+from symphys.types import Bools, Ints
 
 
 @dataclass(frozen=True)
 class Lists:
     """A list of numbers for each number: those from ``starts[i]`` to ``starts[i + 1]`` of ``items``."""
 
-    starts: Words
-    items: Words
+    starts: Ints
+    items: Ints
 
     @classmethod
-    def inverse(cls, keys: Words, count: int) -> Lists:
+    def inverse(cls, keys: Ints, count: int) -> Lists:
         """For each key where it is found."""
         ends = np.cumsum(np.bincount(keys, minlength=count))
         return cls(np.concatenate([[0], ends]), np.argsort(keys, kind="stable"))
 
     @classmethod
-    def of(cls, parts: Sequence[Words]) -> Lists:
+    def of(cls, parts: Sequence[Ints]) -> Lists:
         """Of lists."""
         sizes = np.cumsum([0, *map(len, parts)])
         return cls(sizes, np.concatenate([np.zeros(0, np.int64), *parts]))
 
-    def at(self, keys: Words) -> tuple[Words, Words]:
+    def at(self, keys: Ints) -> tuple[Ints, Ints]:
         """All lists of some numbers, one after the other, and which number each item is of."""
         first = self.starts[keys]
         counts = self.starts[keys + 1] - first
@@ -57,15 +54,15 @@ class KnownCalls:
 
     calls: PhaseCalls
     steps: int
-    dependence: Sequence[Flags]
+    dependence: Sequence[Bools]
 
 
 @dataclass(frozen=True)
 class _Places:
-    offset: Words
-    size: Words
-    stride: Words
-    steps: Words
+    offset: Ints
+    size: Ints
+    stride: Ints
+    steps: Ints
 
     def words(self) -> Lists:
         """The words of each, step after step."""
@@ -115,7 +112,7 @@ class Reach:
         self._word_at = stretches(np.zeros(len(lengths), np.int64), lengths) % np.repeat(self._out.size, lengths)
         self._writers = Lists.inverse(covered.items, size)
 
-    def forwards(self, words: Words) -> Flags:
+    def forwards(self, words: Ints) -> Bools:
         """(size,): which words depend on these, and these."""
         seen, moving = _Seen(self._size), _Seen(len(self.read.offset))
         fresh = seen.fresh(words)
@@ -126,7 +123,7 @@ class Reach:
             fresh = seen.fresh(self._words(self._before_call[calls][which] + found))
         return seen.flags
 
-    def backwards(self, words: Words) -> Flags:
+    def backwards(self, words: Ints) -> Bools:
         """(size,): which words these depend on, and these."""
         seen, useful = _Seen(self._size), _Seen(len(self.read.offset))
         fresh = seen.fresh(words)
@@ -140,7 +137,7 @@ class Reach:
             fresh = seen.fresh(self._place_words.at(places)[0])
         return seen.flags
 
-    def producers(self, read: Words, words: Words, through: Flags, phase: int) -> Flags:
+    def producers(self, read: Ints, words: Ints, through: Bools, phase: int) -> Bools:
         """(calls of a phase,): which of them write what is read.
 
         Args:
@@ -161,7 +158,7 @@ class Reach:
             fresh = self._place_words.at(places.fresh(self.place[inputs]))[0]
         return taken.flags[first:last]
 
-    def _words(self, numbers: Words) -> Words:
+    def _words(self, numbers: Ints) -> Ints:
         """The words of the memory that these words of results are, at all steps."""
         results = np.searchsorted(self._end, numbers, side="right")
         first, stride = self._out.offset[results] + self._within[numbers], self._out.stride[results]
@@ -175,12 +172,12 @@ class _Seen:
     """Which of some numbers have been seen."""
 
     def __init__(self, count: int) -> None:
-        self.flags: Flags = np.zeros(count, bool)
-        self._last: Words = np.zeros(count, np.int64)
+        self.flags: Bools = np.zeros(count, bool)
+        self._last: Ints = np.zeros(count, np.int64)
 
-    def fresh(self, numbers: Words) -> Words:
+    def fresh(self, numbers: Ints) -> Ints:
         """Those not yet seen, each once; they are seen from now on."""
-        found: Words = numbers[~self.flags[numbers]]
+        found: Ints = numbers[~self.flags[numbers]]
         order = np.arange(len(found))
         self._last[found] = order
         found = found[self._last[found] == order]
@@ -188,7 +185,7 @@ class _Seen:
         return found
 
 
-def _together(parts: Sequence[Words], counts: Sequence[int]) -> Words:
+def _together(parts: Sequence[Ints], counts: Sequence[int]) -> Ints:
     """Numbers of things in several lists, as numbers in all of them together."""
     before = np.cumsum([0, *counts]).tolist()
     return np.concatenate([part + start for part, start in zip(parts, before[:-1], strict=True)])
@@ -202,7 +199,7 @@ def _joined(parts: Sequence[tuple[Spans, int]]) -> _Places:
     return _Places(offset, size, stride, steps)
 
 
-def _distinct(places: _Places) -> tuple[_Places, Words]:
+def _distinct(places: _Places) -> tuple[_Places, Ints]:
     """Places, each once, and which of them is whose."""
     strides, kind = np.unique(places.stride, return_inverse=True)
     key = (places.offset * (places.size.max(initial=0) + 1) + places.size) * max(len(strides), 1) + kind

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.codegen.program.program import FunctionCall, Place, Program
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def interpret(program: Program, z: ArrayLike, parameters: ArrayLike = ()) -> dict[str, Array]:

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.program.calls import Function, FunctionCall
 from symphys.codegen.program.spans import Spans
-
-Words = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from symphys.types import Bools, Ints
 
 
 class PhaseCalls:
@@ -38,31 +35,31 @@ class PhaseCalls:
                 if number == len(self.functions):
                     self.functions.append(call.function)
             numbers.append(number)
-        self.number: Words = np.array(numbers, np.int64)
+        self.number: Ints = np.array(numbers, np.int64)
         self.inputs = Spans.of([call.inputs for call in calls])
         self.outputs = Spans.of([call.outputs for call in calls])
-        self.accumulate: Flags = np.array([call.accumulate for call in calls], bool)
+        self.accumulate: Bools = np.array([call.accumulate for call in calls], bool)
 
     def __len__(self) -> int:
         """How many."""
         return len(self.calls)
 
-    def by_function(self) -> Iterator[tuple[int, Words]]:
+    def by_function(self) -> Iterator[tuple[int, Ints]]:
         """The number of each function, and its calls in order."""
         yield from enumerate(grouped(self.number, len(self.functions)))
 
 
-def grouped(numbers: Words, count: int) -> list[Words]:
+def grouped(numbers: Ints, count: int) -> list[Ints]:
     """For each number from 0 to ``count`` where it is found, in order."""
     order = np.argsort(numbers, kind="stable")
     ends = np.cumsum(np.bincount(numbers, minlength=count))
     return np.split(order, ends[:-1]) if count else []
 
 
-def rows_of(spans: Spans, calls: Words) -> Words:
+def rows_of(spans: Spans, calls: Ints) -> Ints:
     """(calls, places): where the places of calls of one function lie among those of all."""
     if not len(calls):
         return np.zeros((0, 0), np.int64)
     count = int(spans.starts[calls[0] + 1] - spans.starts[calls[0]])
-    rows: Words = spans.starts[calls][:, None] + np.arange(count)
+    rows: Ints = spans.starts[calls][:, None] + np.arange(count)
     return rows

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.program.calls import Place
-
-Words = NDArray[np.int64]
+from symphys.types import Ints
 
 
 @dataclass(frozen=True)
@@ -23,11 +21,11 @@ class Spans:
         offset, size, stride: (places,) [words].
     """
 
-    starts: Words
-    call: Words
-    offset: Words
-    size: Words
-    stride: Words
+    starts: Ints
+    call: Ints
+    offset: Ints
+    size: Ints
+    stride: Ints
 
     @classmethod
     def of(cls, places: Sequence[Sequence[Place]]) -> Spans:
@@ -48,7 +46,7 @@ class Spans:
         rows = (each[begin:end] for each in (self.call, self.offset, self.size, self.stride))
         return Spans(self.starts[first : last + 1] - begin, *rows)
 
-    def words(self, steps: int = 1) -> tuple[Words, Words, Words]:
+    def words(self, steps: int = 1) -> tuple[Ints, Ints, Ints]:
         """The words that they cover, of each the call and the step; places with a stride at all steps."""
         count = np.where(self.stride != 0, steps, 1)
         step = stretches(np.zeros(len(count), np.int64), count)
@@ -57,7 +55,7 @@ class Spans:
         return stretches(offset, size), np.repeat(np.repeat(self.call, count), size), np.repeat(step, size)
 
 
-def stretches(first: Words, count: Words) -> Words:
+def stretches(first: Ints, count: Ints) -> Ints:
     """``count`` numbers that follow one another from each ``first``, side by side."""
     ends = np.cumsum(count)
     total = int(ends[-1]) if len(ends) else 0

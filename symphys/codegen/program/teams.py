@@ -12,12 +12,10 @@ from dataclasses import dataclass, replace
 from heapq import heapify, heappop, heappush
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.program.phase_calls import PhaseCalls
 from symphys.codegen.program.program import Program
 
-Words = NDArray[np.int64]
 NONE = -1
 SIZES = (4, 2)
 """Calls in a team."""

@@ -16,11 +16,11 @@ from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.calls import FunctionCall, Place
 from symphys.codegen.program.phase_calls import PhaseCalls, rows_of
 from symphys.codegen.program.spans import Spans
+from symphys.types import Ints
 
 AT_ONCE = 4096
 """Calls that are looked at together: more take memory and save nothing."""
 
-Words = NDArray[np.int64]
 NEVER = np.iinfo(np.int64).max
 
 
@@ -53,7 +53,7 @@ class Verification:
             raise ProgramError(f"{name}: {span(words)} overlap another input or zeroed place")
         self.written[words] = -1
 
-    def inside(self, who: str, words: Words) -> None:
+    def inside(self, who: str, words: Ints) -> None:
         """Refuse words outside the memory."""
         if words.size and (words.min() < 0 or words.max() >= self.program.size):
             raise ProgramError(f"{who}: {span(words)} lie outside the memory of {self.program.size} words")
@@ -108,7 +108,7 @@ class Verification:
         when = phase.start + call + np.where(scratch, 0, phase.period * step)
         return not np.any(written >= when)  # NEVER is later than all
 
-    def cover(self, who: str, place: Place, period: int) -> Words:
+    def cover(self, who: str, place: Place, period: int) -> Ints:
         """The words of a place, all inside the memory."""
         words = (place if period else place.still()).words(self.program.steps)
         self.inside(who, words)
@@ -129,7 +129,7 @@ class Verification:
             self.written[words] = time + period * np.arange(len(words))[:, None]
             self.scratch[words] = period > 0 and place.stride == 0
 
-    def _add(self, who: str, place: Place, words: Words, time: int, period: int) -> None:
+    def _add(self, who: str, place: Place, words: Ints, time: int, period: int) -> None:
         if period and place.stride:
             raise ProgramError(f"{who}: adds to {span(words)} with a stride; write them instead")
         before = self.written[words]
@@ -152,7 +152,7 @@ class Verification:
             late = np.where(scratch, self.written[words] >= time, self.written[words] >= when)
             self._refuse(who, words, late, "before they are complete")
 
-    def _refuse(self, who: str, words: Words, bad: NDArray[np.bool_], why: str) -> None:
+    def _refuse(self, who: str, words: Ints, bad: NDArray[np.bool_], why: str) -> None:
         if bad.any():
             raise ProgramError(f"{who}: reads {span(words[bad])}, {why}")
 
@@ -217,7 +217,7 @@ class _Phase:
             first = k + 1
 
 
-def _words_of(part: Spans, steps: int) -> Words:
+def _words_of(part: Spans, steps: int) -> Ints:
     """How many words each place covers."""
     return part.size * np.where(part.stride != 0, steps, 1)
 
@@ -241,6 +241,6 @@ def _signature(who: str, call: FunctionCall) -> None:
                 raise ProgramError(f"{who}: {what} {i} has {shape.numel()} words, its place {place.size}")
 
 
-def span(words: Words) -> str:
+def span(words: Ints) -> str:
     """Words for a message."""
     return f"words {words.min()} to {words.max()}" if words.size else "no words"

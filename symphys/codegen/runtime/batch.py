@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.program import Place
 from symphys.codegen.runtime.library import INPUTS, RESULTS, BatchData, RowSource
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 CHUNKS = 4
 """Parts for each thread: small enough that one slow processor does not keep the others waiting."""
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 
-from symphys.codegen.runtime.batch import Array
 from symphys.codegen.runtime.library import BatchData, Loaded, Memory
 from symphys.codegen.runtime.widths import Widths
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.nan_location import Bad, first_bad
 from symphys.codegen.program.program import Place, Program
-from symphys.codegen.runtime.batch import Array, RolloutBatch
+from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.runtime.fixed_addresses import Fixed, FixedBatch
 from symphys.codegen.runtime.widths import Widths
 from symphys.codegen.toolchain.compiler import processors
 from symphys.codegen.toolchain.report import BuildReport
+from symphys.types import Array
 
 Outputs = dict[str, NDArray[np.float64]]
 """name -> (batch, size)"""

@@ -24,8 +24,8 @@ from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.compiler import processors
 from symphys.codegen.toolchain.processor import processor
 from symphys.codegen.toolchain.report import BuildReport
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 WORD = ctypes.c_int64
 POINTER = ctypes.c_void_p
 SHARED = "#define ALL(x) ((R)(x) - (V){0})\n"

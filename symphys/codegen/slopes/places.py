@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.emit.alternatives import NONE
 from symphys.codegen.program.program import Place, Program
 from symphys.codegen.slopes.pulls import Pull
+from symphys.types import Ints
 
-Words = NDArray[np.int64]
 Key = tuple[int, int]
 """Offset and size of a place."""
 Guards = tuple[int, int]
@@ -72,7 +71,7 @@ class AdjointPlaces:
     def __init__(self, program: Program, target: Place, backward: Sequence[Pull]) -> None:
         """Hand out the words; ``backward`` in the order in which adjoints are computed."""
         read, written = dict[Key, list[int]](), dict[Key, int]()
-        parts: Words = np.zeros(program.size, np.int64)
+        parts: Ints = np.zeros(program.size, np.int64)
         for i, pull in enumerate(backward):
             for place in pull.marked("inputs"):
                 read.setdefault((place.offset, place.size), []).append(i)
@@ -92,7 +91,7 @@ class AdjointPlaces:
         for offset, size in whole:
             rest[offset : offset + size] = False
         self.size = int(rest.sum())
-        self._word: Words = np.full(program.size, NONE, np.int64)
+        self._word: Ints = np.full(program.size, NONE, np.int64)
         self._word[rest] = np.arange(self.size)
         self.cells, self._of_key = list[Cell](), dict[Key, tuple[int, int]]()
         for i, pull in enumerate(backward):

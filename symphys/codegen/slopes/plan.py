@@ -23,8 +23,7 @@ from symphys.codegen.program.program import FunctionCall, Place, Program
 from symphys.codegen.slopes.merging import merged
 from symphys.codegen.slopes.places import AdjointPlaces, PointPlaces
 from symphys.codegen.slopes.pulls import Pull, Pulls, sparsity
-
-Flags = NDArray[np.bool_]
+from symphys.types import Bools
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class RowBlock:
     """
 
     rows: list[int]
-    taken: Flags
+    taken: Bools
     left: list[tuple[int, int]]
 
 
@@ -187,7 +186,7 @@ def _entry(pull: Pull, places: AdjointPlaces, values: PointPlaces, functions: Di
 
 def row_blocks(
     program: Program, target: Place, backward: Sequence[Pull], lanes: int, functions: DistinctFunctions
-) -> list[tuple[list[int], Flags]]:
+) -> list[tuple[list[int], Bools]]:
     """Rows in blocks, and which of the adjoints each block takes: each row beside those with which it shares most."""
     taken = _taken(program, target, backward, functions)
     work = np.array([pull.work for pull in backward], float)
@@ -202,7 +201,7 @@ def row_blocks(
     return blocks
 
 
-def _taken(program: Program, target: Place, backward: Sequence[Pull], functions: DistinctFunctions) -> Flags:
+def _taken(program: Program, target: Place, backward: Sequence[Pull], functions: DistinctFunctions) -> Bools:
     """(rows, adjoints): which adjoints a seed on each word of the output reaches."""
     useful = np.zeros((target.size, program.size), np.float32)
     useful[:, target.offset : target.offset + target.size] = np.eye(target.size)

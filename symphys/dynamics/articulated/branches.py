@@ -21,9 +21,7 @@ from symphys.dynamics.articulated.schur_complement import (
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.tracing.decorator import traced
 from symphys.model.joints import KinematicTree
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

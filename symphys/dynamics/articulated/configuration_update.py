@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import casadi as ca
 
@@ -26,10 +25,7 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import GeneralizedVelocities, Momentum
 from symphys.maths import rotation
 from symphys.model.joints import KinematicTree
-
-Expr = Any
-"""casadi SX"""
-
+from symphys.types import Expr
 
 CORRECTIONS = 2
 """Each leaves an error smaller by the angle of a step."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
+
 Sparse = dict[int, Expr]
 """Entries of a vector by index; what is not there is zero."""
 ROUNDING = 1e-15

@@ -7,7 +7,6 @@ of change of momenta equal the other forces, and momenta those that velocities s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import casadi as ca
 
@@ -22,9 +21,8 @@ from symphys.dynamics.unknowns import Momentum
 from symphys.maths import rotation
 from symphys.model.joints import Joint, KinematicTree, Link
 from symphys.model.scalar import is_zero
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Wrench = tuple[Expr, Expr]
 """Force [N] and torque [N m] about the centre of mass; also linear and angular acceleration."""
 NOW = ca.SX(0)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
@@ -17,9 +16,7 @@ from symphys.dynamics.joints.joint_frames import errors, joint_frames_on, locked
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.model.joints import Joint, KinematicTree
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

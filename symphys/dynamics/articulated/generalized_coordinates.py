@@ -32,9 +32,7 @@ from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import GeneralizedVelocities, Momentum
 from symphys.model.joints import KinematicTree
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

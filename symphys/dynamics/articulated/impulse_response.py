@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
@@ -14,9 +13,8 @@ from symphys.dynamics.articulated.schur_complement import BranchMatrix, Columns,
 from symphys.dynamics.motion import BodyJacobian
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.rotation import cross_matrix
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Response = tuple[Expr, Expr]
 """The rate of a coordinate by the numbers (1, n), and what a unit impulse along it does to them (n,)."""
 Numbering = tuple[tuple[int, ...], ...]

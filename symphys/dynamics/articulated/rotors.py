@@ -7,7 +7,6 @@ and has a momentum of its own, armature times rate (Featherstone, Rigid Body Dyn
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import casadi as ca
 
@@ -18,9 +17,8 @@ from symphys.dynamics.motion import PredictedMotion
 from symphys.dynamics.tracing.decorator import traced
 from symphys.model.joints import Joint, KinematicTree
 from symphys.model.scalar import is_zero
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Rates = tuple[Expr | None, ...]
 """Of each link (count,); None where no rotor turns with it."""
 

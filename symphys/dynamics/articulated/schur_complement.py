@@ -10,15 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
 from symphys.dynamics.articulated.factorisation import Factorisation, Sparse, factorise
 from symphys.dynamics.tracing.decorator import traced
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Parents = tuple[int | None, ...]
 """For each link of a branch the place of its parent among them; None: the root of the tree."""
 Columns = tuple[Expr, ...]

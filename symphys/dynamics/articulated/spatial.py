@@ -9,7 +9,6 @@ and momenta counted at another, inertias are not symmetric.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import casadi as ca
 
@@ -18,9 +17,8 @@ from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames_on
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.rotation import cross_matrix
 from symphys.model.joints import Joint, PlacedFrames
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Joints = Sequence[Joint | None]
 """The joint of each link; None for a root that floats."""
 

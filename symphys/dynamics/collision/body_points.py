@@ -11,9 +11,8 @@ from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.maths import rotation
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import UPRIGHT, Box, Capsule, SolidShape
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX or a float"""
 Offset = tuple[Expr, Expr, Expr]
 SIGNS = (-1.0, 1.0)
 

@@ -12,9 +12,7 @@ from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, c
 from symphys.dynamics.collision.witness_points import steady
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Box, Capsule
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 PARALLEL = 1e-6
 """Square of the sine of the angle below which edges count as parallel."""

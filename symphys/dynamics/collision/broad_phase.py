@@ -26,9 +26,7 @@ from symphys.model.scalar import is_number
 from symphys.model.shapes import Plane
 from symphys.model.shapes.shape import SolidShape
 from symphys.model.world import Side, World
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 FEWEST = 12
 """Pairs of surfaces from which on looking for those that are far costs less than it saves."""

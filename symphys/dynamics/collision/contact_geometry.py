@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import casadi as ca
 
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,8 @@ from typing import Any
 import casadi as ca
 
 from symphys.model.shapes import SLOTS, Convex
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Point = Sequence[Any]
 LEAN = 0.01
 """[rad] how much the ground is tilted, in thought, for the corners around a face."""

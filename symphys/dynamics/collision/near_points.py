@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import hypot
-from typing import Any
 
 import casadi as ca
 
@@ -22,9 +21,8 @@ from symphys.model.body import Body
 from symphys.model.scalar import is_number, is_zero
 from symphys.model.shapes import Box, Capsule, Plane, Sphere, Surface
 from symphys.model.shapes.shape import SolidShape
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 CORNERS = 4
 """Of a face."""

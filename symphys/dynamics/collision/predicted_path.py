@@ -10,9 +10,7 @@ import casadi as ca
 
 from symphys.maths.inlined import inlined
 from symphys.model.scalar import is_zero
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ from typing import Protocol
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes
-from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
+from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.model.shapes import SolidShape
+from symphys.types import Expr
 
 NEWTON_STEPS = 5
 """Towards the instant of touch: with 3 a tenth of what flies through a thin wall in one step is not seen to hit it."""

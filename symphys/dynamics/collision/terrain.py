@@ -14,11 +14,12 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact, Expr
+from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.predicted_path import STAYS, PredictedPath, at_rest
 from symphys.dynamics.collision.signed_distance import InField
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.model.shapes import Terrain
+from symphys.types import Expr
 
 FOOT_STEPS = 3
 """Newton steps towards the foot of a perpendicular."""

@@ -10,9 +10,7 @@ import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, ContactGeometry
 from symphys.maths.smoothing import TINY_SQUARE
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 TOUCH = 1e-12
 """[m] gap up to which surfaces count as touching."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
@@ -11,9 +10,7 @@ from symphys.dynamics.collision.contact_geometry import Contact, Displacement, F
 from symphys.dynamics.collision.predicted_path import Parabola
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.maths.smoothing import length
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,7 @@ from symphys.dynamics.collision.contact_geometry import Contact, Frame
 from symphys.dynamics.motion import PredictedMotion, apply
 from symphys.dynamics.unknowns import GeneralizedVelocities, Momentum
 from symphys.maths.rotation import cross_matrix
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 Motions = tuple[PredictedMotion, ...]
 """The motions of the bodies that a constraint acts on: of the first, or of both."""

@@ -26,9 +26,7 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Linearisation
 from symphys.maths.smoothing import length, onto_disc, positive, positive_slope
 from symphys.model.world import Law
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 NEVER, ALWAYS = ca.SX(0), ca.SX(1)
 UNREACHED = -1e6

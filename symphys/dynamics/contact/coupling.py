@@ -13,9 +13,7 @@ from symphys.maths.smoothing import length
 from symphys.model.body import Body
 from symphys.model.scalar import is_zero
 from symphys.model.world import Law, Pair, World
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 STRONG = 2.0
 """Bound of mu W_nt / W_nn, which few contacts of a body reach, up to which projections in turn are taken.

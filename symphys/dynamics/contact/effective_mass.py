@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import casadi as ca
 
@@ -11,9 +10,7 @@ from symphys.dynamics.contact.body_term import BodyTerm, apply_impulse, slip, st
 from symphys.dynamics.motion import apply
 from symphys.maths.rotation import cross_matrix
 from symphys.maths.smoothing import TINY_SQUARE
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 HELD = 1e-9
 """Of a body's own mobility: what it keeps in directions in which joints do not let it move.

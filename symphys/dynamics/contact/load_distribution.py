@@ -21,9 +21,7 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import PlacedConstraint
 from symphys.model.shapes import Plane, Terrain
 from symphys.model.world import Pair, World
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 DETERMINED = 3
 """Points whose loads follow from the resultant."""

@@ -51,9 +51,8 @@ from symphys.dynamics.unknowns import (
 )
 from symphys.maths.smoothing import clip
 from symphys.model.world import World
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 State = Any
 """``Velocities`` of a carrier, or its displacement."""
 States = tuple[State, ...]

@@ -22,14 +22,11 @@ implicit Euler, which damps what a step cannot resolve.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
 from symphys.maths.smoothing import clip
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 MAX_ANGLE = 2.5
 """[rad] Largest w d for which the exact solution is computed: less than half a turn."""

@@ -8,7 +8,6 @@ u rebound speed, chi in [0, 1]: 1 where the rebound leaves the step, 0 where it 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
@@ -31,9 +30,7 @@ from symphys.dynamics.motion import apply
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import clip, positive
 from symphys.model.world import Law
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 MARGIN = 1e-4
 """Width of chi's rise, as a share of the reference acceleration: a rebound that barely leaves is part rest."""

@@ -16,9 +16,7 @@ from symphys.dynamics.collision.time_of_impact import TOUCH
 from symphys.dynamics.contact.oscillator import LEAST_B, response, spring_law
 from symphys.maths.smoothing import clip
 from symphys.model.world import Law
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 NEWTON_STEPS = 4
 """Newton steps towards the instant at which surfaces part."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
@@ -18,9 +17,7 @@ from symphys.maths.smoothing import either
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Sphere
 from symphys.model.world import Law, Pair, World
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

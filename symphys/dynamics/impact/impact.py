@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
@@ -30,9 +29,7 @@ from symphys.dynamics.unknowns import Iterate, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.maths.smoothing import either, positive
 from symphys.model.world import Law
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 TOGETHER = 1e-9
 """Of dt: impacts that are no further apart are one."""

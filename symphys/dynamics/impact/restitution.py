@@ -33,9 +33,7 @@ from symphys.dynamics.unknowns import (
 )
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.world import World
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 def eccentric_bodies(world: World) -> set[int]:

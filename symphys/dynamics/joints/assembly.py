@@ -35,9 +35,8 @@ from symphys.dynamics.unknowns import AllVelocities, Momenta, PlacedConstraint, 
 from symphys.model.joints import Joint, JointCoupling, carriers, kinematic_trees, tree_joints
 from symphys.model.state_layout import COUPLED
 from symphys.model.world import World
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 LIMITS = ("lower", "upper")
 
 

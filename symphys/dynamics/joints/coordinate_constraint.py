@@ -18,9 +18,7 @@ from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, appl
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import COMPLIANCE, GeneralizedVelocities, Linearisation
 from symphys.maths.smoothing import at_least, at_most, positive_slope
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

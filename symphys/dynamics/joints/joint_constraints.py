@@ -26,9 +26,7 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Momentum
 from symphys.maths.smoothing import at_least, at_most, clip
 from symphys.model.joints import AffineMotor, Joint, JointCoupling, Servo, Spring, TorqueMotor, VelocityMotor
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 NEVER = ca.SX(0)
 REDUNDANT = 1e-6

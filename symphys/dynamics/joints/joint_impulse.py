@@ -9,9 +9,7 @@ import casadi as ca
 
 from symphys.dynamics.contact import body_term
 from symphys.dynamics.contact.body_term import BodyTerm
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,7 @@ from symphys.dynamics.articulated.factorisation import factorise
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
 from symphys.dynamics.unknowns import COMPLIANCE, Linearisation
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
@@ -15,9 +14,8 @@ from symphys.dynamics.joints.locked_directions import LockConstraint
 from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import repeat, traced
 from symphys.dynamics.unknowns import GeneralizedVelocities, PlacedConstraint
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Displacements = tuple[Displacement, ...]
 TreeDisplacement = Displacement | GeneralizedVelocities | None
 """Of a body; of a tree along its coordinates, at its root; None for other bodies of a tree."""

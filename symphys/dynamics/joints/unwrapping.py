@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import casadi as ca
 
@@ -12,9 +11,7 @@ from symphys.dynamics.joints.assembly import JointPath
 from symphys.dynamics.joints.joint_frames import JointFrames, free
 from symphys.dynamics.position_correction import Corrected
 from symphys.dynamics.tracing.decorator import traced
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 
 def unwrapped_angles(context: StepContext, paths: Sequence[JointPath], closed: Corrected, duration: Expr) -> State:

@@ -23,9 +23,8 @@ from symphys.dynamics.unknowns import AllVelocities, Momenta, Momentum, PlacedCo
 from symphys.model.joints import Joint, JointCoupling, kinematic_trees, tree_joints
 from symphys.model.state_layout import COUPLED
 from symphys.model.world import World
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Struck = Mapping[frozenset[int], Expr]
 """Of bodies that hang together: 1 if one of their contacts is an impact."""
 Total = list[tuple[Expr, Expr]]

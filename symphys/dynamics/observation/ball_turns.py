@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import casadi as ca
 
 from symphys.maths import rotation
 from symphys.model.joints import Joint
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX, MX or DM"""
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 """Of the world."""
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import casadi as ca
 
 from symphys.maths.rotation import matrix
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX, MX or DM"""
 BODY_QUANTITIES = ("gyro", "contact_force")
 
 

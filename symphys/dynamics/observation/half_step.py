@@ -17,9 +17,7 @@ from symphys.maths import rotation
 from symphys.model.joints.motor import AffineMotor, TorqueMotor, given_torque
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 def half_step_function(

@@ -12,9 +12,8 @@ from symphys.dynamics.joints.joint_frames import JointFrames, errors, free, join
 from symphys.model.joints import Coordinate, Joint, PlacedFrames
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX, MX or DM"""
 Motion = tuple[Expr, Expr]
 """(3,) velocity [m/s], (3,) angular velocity [rad/s], world frame."""
 

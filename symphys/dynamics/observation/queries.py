@@ -18,9 +18,7 @@ from symphys.dynamics.tracing.decorator import traced, tracing
 from symphys.model.shapes import Surface
 from symphys.model.state_layout import Layout
 from symphys.model.world import Scheme, World
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 def gap_function(world: World, parameters: Sequence[Any] | None = None) -> ca.Function:

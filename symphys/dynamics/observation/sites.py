@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import casadi as ca
 
 from symphys.maths import rotation
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX, MX or DM"""
 FIELDS = ("position", "orientation", "velocity")
 
 

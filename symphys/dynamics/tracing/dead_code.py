@@ -8,9 +8,8 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Words = int
 """Places in a slot, as bits."""
 

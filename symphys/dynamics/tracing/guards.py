@@ -18,9 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 MANY = 80
 """Arguments of a call that is not looked into: it puts together what many bodies or pairs have."""
 Known = int

@@ -11,9 +11,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.tracing.decorator import traced
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

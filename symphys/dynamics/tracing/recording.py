@@ -15,10 +15,9 @@ import casadi as ca
 
 from symphys.dynamics.tracing.pytree import TracedMatrix, dismantle, outline, rebuild, slots_of
 from symphys.dynamics.tracing.trace import Tracer
+from symphys.types import Expr
 
 T = TypeVar("T")
-Expr = Any
-"""casadi SX"""
 
 
 class TracedVector(NamedTuple):

@@ -13,9 +13,8 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.tracing.pytree import Code, Knot, Leaf, TracedMatrix, field_names, outline, rebuild
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Structure = tuple[int, tuple[int, ...]]
 """The number of a tree's structure, and the slots that its entries lie in, in order."""
 MOST_KEPT = 300_000

@@ -37,10 +37,9 @@ from symphys.dynamics.tracing.pytree import (
 )
 from symphys.dynamics.tracing.structure import Blueprint, Numbers, Structures
 from symphys.maths.verbatim import verbatim
+from symphys.types import Expr
 
 T = TypeVar("T")
-Expr = Any
-"""casadi SX"""
 
 
 @dataclass(frozen=True)

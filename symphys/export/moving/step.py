@@ -16,13 +16,12 @@ from collections.abc import Iterator, Mapping
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.motion import inertia_matrix
 from symphys.export.mjcf_bodies import StartState, links_of
 from symphys.model.joints import AffineMotor, Joint, Servo, VelocityMotor
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Inertias = Mapping[tuple[str, int], float]
 """[kg m^2] or [kg] of each coordinate, by its joint and number there; of joints in trees only."""
 STIFFEST, SOFTEST = 0.01, 0.1

@@ -20,7 +20,8 @@ import numpy as np
 
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.square_root import EPS, eliminate, pseudo_root, stacked, triangle
-from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals, Rows
+from symphys.identification.interface import FitParameters, RecordedResiduals, Rows
+from symphys.types import Array, Bools, Ints
 
 Weighting = Callable[[Array], Array]
 """Of residuals (m,): (m,) weights of the rows of the Jacobian in a square matrix."""

@@ -15,7 +15,8 @@ from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.start_values import begin_with_effect
 from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
 from symphys.identification.inference.uncertainty import Uncertainty, uncertainty
-from symphys.identification.interface import Array, Ints, RecordedResiduals, Rows
+from symphys.identification.interface import RecordedResiduals, Rows
+from symphys.types import Array, Ints
 
 ROUNDS = 20
 """Turns of fit and noise at most."""

@@ -12,7 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from symphys.identification.interface import Array, Bools, Ints, RecordedResiduals, ResidualRows, Rows
+from symphys.identification.interface import RecordedResiduals, ResidualRows, Rows
+from symphys.types import Array, Bools, Ints
 
 Selection = Callable[[ResidualRows], Bools]
 """Of the m rows of a recording: (m,) which count."""

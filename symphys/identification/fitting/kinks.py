@@ -19,7 +19,7 @@ import scipy.optimize
 
 from symphys.identification.fitting.arrow import ArrowSystem
 from symphys.identification.fitting.remaining import DeterminedArrow
-from symphys.identification.interface import Array, Bools, Ints
+from symphys.types import Array, Bools, Ints
 
 MOST = 200
 """Sides of single recordings that have a part in a step: those that differ most."""

@@ -24,7 +24,8 @@ from symphys.identification.fitting.arrow import ArrowSystem, assemble, costs
 from symphys.identification.fitting.kinks import KinkedModel
 from symphys.identification.fitting.remaining import DeterminedArrow, number_units
 from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
-from symphys.identification.interface import Array, Bools, FitParameters, IdentificationError, Ints, RecordedResiduals
+from symphys.identification.interface import FitParameters, IdentificationError, RecordedResiduals
+from symphys.types import Array, Bools, Ints
 
 LOOSEST = 1 / 3
 """lambda falls at most to this share after a step that went as foreseen."""

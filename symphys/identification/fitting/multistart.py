@@ -18,8 +18,9 @@ import numpy as np
 
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.state import FitOptions, FitOutcome, begin
-from symphys.identification.interface import Array, FitParameters, IdentificationError, Ints, RecordedResiduals
+from symphys.identification.interface import FitParameters, IdentificationError, RecordedResiduals
 from symphys.results.identification.parts import GlobalSearch
+from symphys.types import Array, Ints
 
 FAR = 0.5
 """Candidates are other starts if they are farther than this, in scales."""

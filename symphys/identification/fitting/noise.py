@@ -13,7 +13,8 @@ import numpy as np
 
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.inference.uncertainty import Information
-from symphys.identification.interface import Array, Ints, RecordedResiduals, ResidualRows, Rows
+from symphys.identification.interface import RecordedResiduals, ResidualRows, Rows
+from symphys.types import Array, Ints
 
 LEAST = 1e-12
 """A factor on the guess of a noise is at least so large: recordings that are met exactly have none."""

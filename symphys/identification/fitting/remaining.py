@@ -15,7 +15,8 @@ import numpy as np
 
 from symphys.identification.fitting.arrow import ArrowSystem
 from symphys.identification.fitting.square_root import stacked, triangle
-from symphys.identification.interface import Array, Bools, FitParameters, Ints
+from symphys.identification.interface import FitParameters
+from symphys.types import Array, Bools, Ints
 
 VAGUE = 10.0
 """Standard error of a direction by the size of its numbers, above which it is vague."""

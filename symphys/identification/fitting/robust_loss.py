@@ -17,7 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.identification.interface import Array, IdentificationError
+from symphys.identification.interface import IdentificationError
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

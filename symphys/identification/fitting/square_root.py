@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symphys.identification.interface import Array, Bools
+from symphys.types import Array, Bools
 
 EPS = float(np.finfo(float).eps)
 ROUNDING = 1e-13

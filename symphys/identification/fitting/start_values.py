@@ -14,7 +14,8 @@ import numpy as np
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.remaining import VAGUE
 from symphys.identification.fitting.state import FitOptions, FitState, FitStatus, begin
-from symphys.identification.interface import Array, FitParameters, Ints, RecordedResiduals
+from symphys.identification.interface import FitParameters, RecordedResiduals
+from symphys.types import Array, Ints
 
 FACTORS = (0.01, 0.03, 0.1, 0.3, 0.5, 2.0, 4.0, 10.0)
 """Of a guess other than 0."""

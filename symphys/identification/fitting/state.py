@@ -13,7 +13,8 @@ import numpy as np
 
 from symphys.identification.fitting.arrow import ArrowSystem
 from symphys.identification.fitting.robust_loss import RobustLoss
-from symphys.identification.interface import Array, IdentificationError, RecordedResiduals
+from symphys.identification.interface import IdentificationError, RecordedResiduals
+from symphys.types import Array
 
 NUMBERS: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("damping", "growth", "stiffest", "mark", "horizon"), float),

@@ -21,7 +21,8 @@ from symphys.identification.fitting.arrow import ArrowSystem
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.state import FitOptions, FitState, begin
 from symphys.identification.inference.uncertainty import LEVEL, Information
-from symphys.identification.interface import Array, IdentificationError, Ints, RecordedResiduals
+from symphys.identification.interface import IdentificationError, RecordedResiduals
+from symphys.types import Array, Ints
 
 FEWEST = 5
 """Recordings that a bootstrap needs."""

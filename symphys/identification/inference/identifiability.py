@@ -18,8 +18,9 @@ from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.square_root import ROUNDING, eliminate, triangle
 from symphys.identification.inference.advice import advice
 from symphys.identification.inference.uncertainty import Information
-from symphys.identification.interface import Array, Ints, RecordedResiduals, Rows
+from symphys.identification.interface import RecordedResiduals, Rows
 from symphys.results.identification.parts import OpenDirection
+from symphys.types import Array, Ints
 
 WIDE = 1.0
 """Standard error of a direction, in units of the numbers, above which it is called open."""

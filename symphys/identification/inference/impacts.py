@@ -8,7 +8,8 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from symphys.identification.interface import Array, Ints, RecordedResiduals, ResidualRows, Rows
+from symphys.identification.interface import RecordedResiduals, ResidualRows, Rows
+from symphys.types import Array, Ints
 
 
 @runtime_checkable

@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.stats
 
-from symphys.identification.interface import Array, Bools, Ints, RecordedResiduals, ResidualRows
+from symphys.identification.interface import RecordedResiduals, ResidualRows
 from symphys.results.identification.parts import PredictionErrors, QuantityResiduals
+from symphys.types import Array, Bools, Ints
 
 COLUMNS = ("quantity", "component", "time", "noise", "impact")
 LAGS = 10

@@ -35,7 +35,8 @@ from symphys.identification.fitting.square_root import (
     stacked,
     triangle,
 )
-from symphys.identification.interface import Array, Bools, FitParameters, Ints, RecordedResiduals, Rows
+from symphys.identification.interface import FitParameters, RecordedResiduals, Rows
+from symphys.types import Array, Bools, Ints
 
 LEVEL = 0.95
 SUSPICIOUS = 1e-8

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.errors import SymphysError
 from symphys.importing.fitting.mesh import Mesh
@@ -15,7 +15,6 @@ from symphys.importing.fitting.solids import Placed, union_distance
 from symphys.model.shapes import Shape
 from symphys.suggest import hint, quote
 
-Array = NDArray[np.float64]
 SEVERAL = {"spheres": ("sphere", (2, 4, 8)), "capsules": ("capsule", (2, 3, 4))}
 """What more than one shape may be, and how many are tried."""
 KINDS = (*WIDTHS, *SEVERAL)

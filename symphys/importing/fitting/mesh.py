@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from symphys.types import Array, Ints
 
 SAMPLES = 40_000
 """Points on the surface."""

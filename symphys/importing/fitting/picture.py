@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.files import write_bytes
 from symphys.importing.fitting.fit import Fit, checked
 from symphys.maths import rotation
 from symphys.model.shapes import Shape
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 SIDES = ((0, 2), (1, 2), (0, 1))
 """The axes to the right and up in each view."""
 MOST_FACES = 8000

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.importing.fitting.mesh import Mesh
 from symphys.importing.fitting.solids import Placed, union_distance
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 POINTS = 320
 """Of the outer surface, that a search looks at; half as many outside, a quarter inside."""
 MOST_STEPS = 20

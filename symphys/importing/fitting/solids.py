@@ -6,11 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 FOOT_STEPS = 8
 """Newton steps towards the foot of a perpendicular on an ellipsoid."""
 SPREAD = 1500

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.importing.compiled import Inertial, JointMotor
 from symphys.importing.findings import Finding
@@ -15,8 +14,8 @@ from symphys.importing.reading.folders import Folders
 from symphys.importing.reading.meshes import take_out, unreadable
 from symphys.importing.reading.urdf_text import Mimic
 from symphys.importing.wording import counted, listed
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 LEAST = 1e-14
 """[kg], [kg m^2] MuJoCo refuses moving bodies with less."""
 LARGEST = 1e12

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from symphys.importing.tables.reading import HINGE, SLIDE, Array, ModelReading, is_upright, numbers, quaternion
+from symphys.importing.tables.reading import HINGE, SLIDE, ModelReading, is_upright, numbers, quaternion
+from symphys.types import Array
 
 MEET = 1e-6
 """[m], [rad]: how far apart the sides of a loop may be at the reference pose."""

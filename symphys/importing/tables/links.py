@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from symphys.importing.source import Inertial
-from symphys.importing.tables.reading import FREE, Array, ModelReading, WeldedLink, is_upright, numbers, quaternion
+from symphys.importing.tables.reading import FREE, ModelReading, WeldedLink, is_upright, numbers, quaternion
+from symphys.types import Array
 
 LIGHT, THICK = 1e-6, 0.1
 """Of a floating body without mass: its share of the model's mass, and its radius of gyration [m]."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from symphys.errors import SymphysError
 from symphys.importing.hulls import hull_points
-from symphys.importing.tables.reading import Array, ModelReading, numbers
+from symphys.importing.tables.reading import ModelReading, numbers
+from symphys.types import Array
 
 MOST_POINTS = 64
 """Of the hull of a mesh."""

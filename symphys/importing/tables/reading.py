@@ -10,14 +10,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.importing.findings import Finding, Kind
 from symphys.importing.options import ImportOptions
 from symphys.importing.source import JointMotor
 from symphys.importing.tables.names import Names
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 FREE, BALL, SLIDE, HINGE = range(4)
 """MuJoCo's types of joints."""
 DIGITS = 15

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from symphys.importing.tables.reading import HINGE, SLIDE, Array, ModelReading, WeldedLink, is_upright, numbers
+from symphys.importing.tables.reading import HINGE, SLIDE, ModelReading, WeldedLink, is_upright, numbers
+from symphys.types import Array
 
 MEET = 1e-6
 """[m]: an accelerometer that is farther from the centre of mass is approximated."""

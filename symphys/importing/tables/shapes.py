@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from symphys.importing.tables.meshes import Meshes
-from symphys.importing.tables.reading import Array, ModelReading, WeldedLink, is_upright, numbers, quaternion
+from symphys.importing.tables.reading import ModelReading, WeldedLink, is_upright, numbers, quaternion
 from symphys.importing.tables.terrain import terrain
+from symphys.types import Array
 
 PLANE, TERRAIN, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)
 """MuJoCo's types of geoms."""

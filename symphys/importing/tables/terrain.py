@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from symphys.importing.tables.reading import Array, ModelReading, numbers
+from symphys.importing.tables.reading import ModelReading, numbers
 from symphys.model.heightfield import Heightfield
+from symphys.types import Array
 
 MOST_HEIGHTS = 1024
 """That a terrain may have: each is in every contact with it, in every step."""

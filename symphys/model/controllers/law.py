@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Protocol
 
-Expr = Any
-"""casadi SX or MX"""
+from symphys.types import Expr
 
 
 class ControlLaw(Protocol):

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import casadi as ca
 
 from symphys.model.controllers.linear import rows_times
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX or MX"""
 Activation = Literal["tanh", "relu", "linear"]
 ACTIVATIONS: tuple[Activation, ...] = ("tanh", "relu", "linear")
 

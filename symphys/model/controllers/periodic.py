@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
-Expr = Any
-"""casadi SX or MX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.maths import rotation
 from symphys.model.joints.joint import JointFrame
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Vector = Sequence[float] | Array
 WORLD = "world"
 """What joints call that which stands still."""

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.model.joints.frames import WORLD, Pose, check_meeting, placed_joint_frames, pose
@@ -15,8 +14,7 @@ from symphys.model.joints.kind import Kind
 from symphys.model.joints.specs import JointSpec, MovingJoint
 from symphys.model.joints.start import State, moved_to_start, spanning_tree, unmoved
 from symphys.suggest import hint, quote
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

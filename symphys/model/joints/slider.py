@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import casadi as ca
 
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 def position(placed: PlacedFrames) -> Expr:

@@ -11,7 +11,6 @@ from math import inf, isfinite
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.joints.ball import BALL
 from symphys.model.joints.fixed import FIXED
@@ -23,8 +22,8 @@ from symphys.model.joints.motor import Motor
 from symphys.model.joints.slider import SLIDER
 from symphys.model.joints.universal import UNIVERSAL
 from symphys.model.scalar import Scalar
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Vector = Sequence[float] | Array
 """three of them"""
 

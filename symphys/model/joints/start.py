@@ -5,20 +5,17 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.maths import rotation
 from symphys.model.joints.frames import WORLD
 from symphys.model.joints.joint import JointFrame
 from symphys.model.joints.kind import Kind, PlacedFrames
+from symphys.types import Array, Expr
 
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi MX or DM"""
 State = dict[str, Array]
 """By names such as ``ball.position``."""
 Tree = Mapping[str, Mapping[str, str]]

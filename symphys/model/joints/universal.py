@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import casadi as ca
 
 from symphys.maths.smoothing import angle_of
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
-
-Expr = Any
-"""casadi SX, MX or DM"""
+from symphys.types import Expr
 
 
 def swing(placed: PlacedFrames) -> Expr:

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.shapes.shape import FLATTEST
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from symphys.types import Array, Ints
 
 COPLANAR = 1e-6
 """Faces whose planes agree to this, by the size of the hull, are one."""

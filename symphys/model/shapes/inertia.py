@@ -7,13 +7,12 @@ from math import hypot
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.maths import rotation
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes.shape import UPRIGHT, SolidShape
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Tensor = list[list[Scalar]]
 """(3, 3)"""
 NOISE = 1e-14

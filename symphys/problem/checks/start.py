@@ -7,7 +7,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.joints.frames import MEET, WORLD
 from symphys.problem.checks.start_values import Start
@@ -17,8 +16,8 @@ from symphys.problem.parametric.starts import begin
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity
 from symphys.problem.reading.faults import Faults
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 OVERLAP = 1e-3
 """Deepest overlap at the start [m]; more would be pushed out in the first steps, which is never meant."""
 

@@ -13,7 +13,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.kept import structure
 from symphys.dynamics.observation import (
@@ -29,8 +28,8 @@ from symphys.model.state_layout import GIVEN, Layout, initial_state
 from symphys.model.world import World
 from symphys.problem.parametric.parts import DISTRIBUTION
 from symphys.problem.parametric.world import ParametricWorld
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 MOST_KEPT = 8
 """How many structures of worlds are kept at once."""
 

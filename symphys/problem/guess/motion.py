@@ -8,12 +8,10 @@ from functools import cache
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.maths import rotation
 from symphys.problem.guess.names import ORIENTATION
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

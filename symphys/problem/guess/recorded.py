@@ -6,15 +6,14 @@ from collections.abc import Mapping
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.observation import joint_turn
 from symphys.model.joints import Joint
 from symphys.model.world import World
 from symphys.problem.guess.motion import GuessedMotion
 from symphys.problem.guess.names import RATES, ball_joints, guessable
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 SPEEDS = {"velocity", "rate", *RATES.values()}
 """Fields of quantities that are rates."""
 

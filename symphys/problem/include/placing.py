@@ -8,7 +8,6 @@ from math import hypot
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.joints.frames import WORLD
 from symphys.model.orientation import turned
@@ -19,8 +18,6 @@ from symphys.problem.schema.include import IncludeTable
 from symphys.problem.schema.joints import JointTable, SiteTable
 from symphys.problem.schema.physics import BlockTable, BodyTable, PlaneTable, TerrainTable
 from symphys.problem.tables.shapes import read_orientation
-
-Array = NDArray[np.float64]
 
 
 def placed(document: Document, merged: MergedFiles, faults: Faults) -> Document:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Any
 
 import casadi as ca
 
@@ -11,9 +10,8 @@ from symphys.maths import rotation
 from symphys.model.joints.frames import WORLD
 from symphys.model.joints.start import spanning_tree
 from symphys.problem.parametric.world import ParametricWorld
+from symphys.types import Expr
 
-Expr = Any
-"""casadi MX or DM"""
 State = Mapping[str, Expr]
 
 

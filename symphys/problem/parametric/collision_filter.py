@@ -12,13 +12,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.shapes import SURFACES, points_of_kinds
 from symphys.problem.parametric.parts import PairRule, ParametricBody, Part
-
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from symphys.types import Bools, Ints
 
 KINDS = tuple(SURFACES.values())
 """All kinds of surfaces."""
@@ -129,7 +126,7 @@ class CollisionFilter:
                 met = np.flatnonzero(self._lets(c) & self._let(c) & self._collide(c))
                 yield c, met[met >= c]
 
-    def _lets(self, c: int) -> Mask:
+    def _lets(self, c: int) -> Bools:
         """Which classes ``c`` lists in collides_with."""
         named = self.classes[c].part.collides_with
         if named is None:
@@ -139,14 +136,14 @@ class CollisionFilter:
             mask[self._named.get(name, [])] = True
         return mask
 
-    def _let(self, c: int) -> Mask:
+    def _let(self, c: int) -> Bools:
         """Which classes list ``c`` in collides_with."""
         mask = self._free.copy()
         for name in own_names(self.classes[c].part):
             mask[self._wanted.get(name, [])] = True
         return mask
 
-    def _collide(self, c: int) -> Mask:
+    def _collide(self, c: int) -> Bools:
         """With which classes the [[pair]] tables let ``c`` collide; those that name more surfaces hold."""
         mask = np.ones(len(self.classes), bool)
         own = own_names(self.classes[c].part)
@@ -180,7 +177,7 @@ class CollisionFilter:
         return gather((name, c) for c, each in enumerate(self.classes) for name in each.part.collides_with or ())
 
     @cached_property
-    def _free(self) -> Mask:
+    def _free(self) -> Bools:
         return np.array([each.part.collides_with is None for each in self.classes])
 
 

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from symphys.model.joints.start import moved_to_start, spanning_tree, unmoved
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.reading.faults import Faults
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def forward_kinematics(

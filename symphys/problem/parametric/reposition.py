@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import reduce
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -23,9 +22,8 @@ from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.parts import CENTRE
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults
+from symphys.types import Expr
 
-Expr = Any
-"""casadi MX or DM"""
 State = Mapping[str, Expr]
 
 

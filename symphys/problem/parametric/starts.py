@@ -10,9 +10,8 @@ from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.reposition import around
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults, Place
+from symphys.types import Expr
 
-Expr = Any
-"""casadi MX or DM"""
 State = Mapping[str, Expr]
 
 

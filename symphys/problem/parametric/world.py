@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.body import Body
 from symphys.model.joints import Joint
@@ -35,8 +34,8 @@ from symphys.problem.parametric.parts import (
     less,
     stated,
 )
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 CONTACT = "contact"
 """What the law of [contact] is called among parameters."""
 

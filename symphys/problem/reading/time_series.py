@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.archives import ArchiveError, read_arrays
 from symphys.errors import ProblemError
@@ -18,8 +17,8 @@ from symphys.problem.reading.range_of_numbers import LARGEST, TOO_LARGE
 from symphys.problem.reading.source import read_source
 from symphys.problem.schema.checks import IDENTIFIER
 from symphys.suggest import quote
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 TIME = "time"
 LEAST_ROWS, MOST_ROWS = 2, 1000
 """Each row is looked at in every evaluation of a formula."""

@@ -6,11 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.suggest import hint, quote
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class RecordingFault(ValueError):

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.maths import rotation
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.schema.recording import CONVERSIONS, ColumnsTable
 from symphys.suggest import quote
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Key = tuple[str | int, ...]
 PLACED = "position"
 """The field of quantities that a frame turns and shifts; points of space."""

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.suggest import quote
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 CHUNK = 1 << 23
 """Bytes."""
 LONGEST_LINE = 1 << 20

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.recordings.columns import RecordingFault
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 TOO_LARGE = 30.0
 """Lengths that exceed what the world has by this factor are in another unit."""
 NEAR = 3.0

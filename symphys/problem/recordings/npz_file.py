@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from symphys.archives import ArchiveError, read_arrays
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.suggest import quote
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 MOST_BYTES = 2**29
 """[bytes] Largest memory of the arrays of one recording: some 67 million numbers."""
 

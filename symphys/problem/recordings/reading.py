@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.state_layout import input_sizes
 from symphys.model.world import World
@@ -27,8 +26,8 @@ from symphys.problem.schema import Document
 from symphys.problem.schema.recording import RecordingTable
 from symphys.problem.tables.shapes import read_orientation
 from symphys.problem.units import formula_units
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 MOST_STEPS = 100_000
 """Of a duration that comes from recordings: times in milliseconds, or since 1970, are not simulated by mistake."""
 

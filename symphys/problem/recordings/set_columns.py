@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
@@ -16,8 +15,7 @@ from symphys.problem.recordings.starts import Starts
 from symphys.problem.recordings.types import RecordedInput
 from symphys.problem.schema.recording import ColumnsTable, InputTable, RecordingTable, leaves
 from symphys.suggest import hint, quote
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

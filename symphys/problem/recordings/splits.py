@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.suggest import hint, quote
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 MOST = 100_000
 """Recordings of one table."""
 

@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.joints.frames import WORLD
 from symphys.model.joints.joint import UNWRAPPED
 from symphys.model.joints.start import moved_to_start, moved_to_zero, placed_frames, spanning_tree
 from symphys.problem.parametric.carried import follow
 from symphys.problem.parametric.joints import ParametricJoint
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 State = dict[str, Array]
 FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 

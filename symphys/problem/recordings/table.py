@@ -9,7 +9,6 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.expression import Formula, FormulaError, parse
 from symphys.expression.units import unit_of
@@ -40,8 +39,8 @@ from symphys.problem.recordings.starts import Starts
 from symphys.problem.recordings.times import check_ends, read_times, time_column
 from symphys.problem.recordings.types import Measured, Recording
 from symphys.problem.schema.recording import ColumnsTable, MeasuredTable, RecordingTable
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 SMALLEST = 1e-30
 """Of a noise: squares of what is divided by it are numbers."""
 

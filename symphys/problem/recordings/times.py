@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.recordings.types import Recording
 from symphys.problem.schema.recording import RecordingTable
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 TIME = "time"
 LEAST = 2
 """Samples of a recording."""

@@ -6,11 +6,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.expression import Formula
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass(frozen=True, eq=False)

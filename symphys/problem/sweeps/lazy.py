@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from symphys.problem.model import Array, Simulation
+from symphys.problem.model import Simulation
 from symphys.problem.parametric.parts import DISTRIBUTION
 from symphys.problem.problem import Problem
 from symphys.problem.reader import ProblemReader
 from symphys.problem.recordings.kept import without_places
+from symphys.types import Array
 
 KEPT = (
     "name",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.shapes import Shape
 from symphys.model.shapes.inertia import centring, off_centre
@@ -15,8 +14,7 @@ from symphys.problem.parametric.parts import COMBINE, ParametricBody
 from symphys.problem.reading.faults import Faults
 from symphys.problem.schema.physics import BodyTable, MemberTable, SurfaceTable
 from symphys.problem.tables.shapes import read_orientation, read_shape
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def read_body(index: int, table: BodyTable, faults: Faults) -> ParametricBody:

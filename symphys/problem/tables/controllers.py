@@ -8,7 +8,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.archives import ArchiveError, OtherShape, read_array
 from symphys.expression import Formula, FormulaError, parse
@@ -20,8 +19,8 @@ from symphys.problem.quantities import Quantity, SlotError, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.control import ControllerTable, NetTable, SensorTable
 from symphys.suggest import hint, quote
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 KINDS = {
     "linear": "linear = {}",
     "periodic": "periodic = { frequency = 1.5 }",

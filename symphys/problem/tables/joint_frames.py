@@ -6,14 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.joints import JointFrame
 from symphys.model.joints.frames import Pose, check_meeting, placed_joint_frames, pose, single_axis, two_axes
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.joints import JointTable
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 def read_joint_frames(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.gimbal import Screw, locks
 from symphys.model.joints import (
@@ -29,8 +28,8 @@ from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.joints import JointTable, MotorTable, SpringTable
 from symphys.problem.tables.joint_frames import read_joint_frames
 from symphys.suggest import hint, quote
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 EXAMPLES = {
     "ball": "ball = {}",
     "hinge": "hinge = { axis = [0, 1, 0] }",

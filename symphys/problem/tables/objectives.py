@@ -10,7 +10,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.expression import Formula, FormulaError, parse
 from symphys.expression.units import unit_of
@@ -20,8 +19,8 @@ from symphys.problem.schema import Document
 from symphys.problem.schema.checks import OF_PHASE
 from symphys.problem.schema.objectives import ConstraintTable, CostTable, OutputTable, TargetTable
 from symphys.problem.tables.simulation import check_moment, find_phase
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 NO_PHASES: Mapping[str, Phase] = MappingProxyType({})
 
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.joints.frames import WORLD
 from symphys.model.joints.start import spanning_tree
@@ -28,8 +27,8 @@ from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.scenarios import DiscretisationTable, ScenarioTable
 from symphys.problem.tables.simulation import check_steps
 from symphys.suggest import hint, quote
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Taken = dict[tuple[str, int], str]
 """What sets each component of each quantity, in words."""
 KINDS = ("sets", "robot", "simulation")

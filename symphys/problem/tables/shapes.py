@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.model.orientation import roll_pitch_yaw, unit_quaternion
 from symphys.model.shapes import SHAPES, UPRIGHT, Shape, Sphere
@@ -14,8 +13,8 @@ from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.value_texts import listed
 from symphys.problem.schema.shapes import EXAMPLES, PartTable, ShapeTable, SolidTable
 from symphys.problem.schema.types import RollPitchYaw
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 KINDS = tuple(SHAPES)
 COMPOUND = "{ parts = [{ box = { size = [1, 2, 3] }, centre = [0.5, 0, 0] }, ...] }"
 

@@ -15,9 +15,8 @@ from symphys.problem.quantities import SCALES, Quantity, SlotError, extremes, li
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.objectives import VariableTable
 from symphys.problem.schema.types import NestedList
+from symphys.types import Array, Bools
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 WEIGHTS = 0.1
 CLOCK = 0.01
 """[s]: offsets of clocks."""
@@ -177,7 +176,7 @@ class VariableReader:
             if name == "orientation" and len(slot.components) == 4 and not np.any(variable.guess):
                 self.add("guess", "a quaternion must not be zero; [1, 0, 0, 0] is no rotation")
 
-    def where(self, mask: Mask) -> str:
+    def where(self, mask: Bools) -> str:
         """Which component, if there are several."""
         k = int(np.argmax(mask))
         component = f" in component {k % self.count}" if self.count > 1 else ""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from symphys.report.figures.style import thin
-from symphys.trajectory import Array
+from symphys.types import Array
 
 POINTS = 240
 """Samples of a line at most about: a panel is some 300 pixels wide."""

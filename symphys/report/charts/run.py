@@ -13,7 +13,8 @@ from symphys.report.figures.variables import MOST_PANELS, component_colours, com
 from symphys.report.figures.verification import MOST_TOUCHES, energy_lines, known_growth, touches
 from symphys.results.result import VariableRecord, smoothed
 from symphys.results.run import Run
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 COLUMNS = 3
 

@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from symphys.report.figures import style
 from symphys.report.figures.data import Column, DataFigure, keep
 from symphys.results.discovery import Study, sample
-from symphys.trajectory import Array
+from symphys.types import Array
 
 MOST_CHECKS = 16
 MOST_DOTS = 200

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 from symphys.report.figures import style
 from symphys.report.figures.data import TIME, DataFigure, keep
 from symphys.results.closed_loop import ClosedLoopRecord
-from symphys.trajectory import Array
+from symphys.types import Array
 
 MOST_PANELS = 6
 BINS = 60

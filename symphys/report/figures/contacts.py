@@ -15,7 +15,8 @@ from symphys.report.figures import style
 from symphys.report.figures.data import TIME, DataFigure, keep
 from symphys.report.scene.views import centres
 from symphys.results.scene import Scene, Solid
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 MOST_PAIRS = 6
 NORMAL, TANGENTIAL, WHOLE, GAP = style.BODIES[0], style.ORANGE, style.GREEN, style.GREY

@@ -16,7 +16,7 @@ from symphys.results.discovery import Study
 from symphys.results.result import StageRecord, smoothed
 from symphys.results.run import Run
 from symphys.results.trace import OUTPUT
-from symphys.trajectory import Array
+from symphys.types import Array
 
 GRID = 300
 MOST_POINTS = 400

@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from symphys.trajectory import Array
+from symphys.types import Array
 
 Column = Array | Sequence[str] | Sequence[float]
 """Numbers, or words."""

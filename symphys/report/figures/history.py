@@ -18,7 +18,7 @@ from symphys.report.figures.data import DataFigure, keep
 from symphys.results.result import StageRecord, smoothed
 from symphys.results.run import Run
 from symphys.results.trace import OUTPUT
-from symphys.trajectory import Array
+from symphys.types import Array
 
 NARROWEST = 0.09
 """A stage that takes less of the axis has no room for its name."""

@@ -9,7 +9,7 @@ from symphys.report.figures import style
 from symphys.report.figures.data import TIME, DataFigure, keep
 from symphys.results.identification import HISTORY, Identification
 from symphys.results.identification.replays import RecordingReplay
-from symphys.trajectory import Array
+from symphys.types import Array
 
 MOST_NAMES = 30
 """Numbers of which a figure shows correlations and intervals."""

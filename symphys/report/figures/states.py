@@ -11,7 +11,8 @@ from matplotlib.lines import Line2D
 from symphys.report.figures import style
 from symphys.report.figures.data import TIME, DataFigure, keep, vector
 from symphys.report.scene.views import NAMES
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 MOST_BODIES = 5
 Quantity = tuple[str, str, Array, Array]

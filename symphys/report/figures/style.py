@@ -22,7 +22,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocato
 from symphys import files
 from symphys.findings import writing
 from symphys.report.figures.data import DataFigure, table
-from symphys.trajectory import Array
+from symphys.types import Array
 
 WIDTH = 10.0
 """[in] of every figure"""

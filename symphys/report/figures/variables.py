@@ -12,7 +12,7 @@ from symphys.report.figures import style
 from symphys.report.figures.data import DataFigure, keep
 from symphys.results.result import VariableRecord
 from symphys.results.run import Run
-from symphys.trajectory import Array
+from symphys.types import Array
 
 MOST_PANELS = 8
 VECTORS = ("position", "velocity", "angular_velocity", "force", "torque", "gravity")

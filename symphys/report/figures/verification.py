@@ -12,7 +12,8 @@ from symphys.findings.numerics import reach
 from symphys.findings.writing import show
 from symphys.report.figures import style
 from symphys.report.figures.data import TIME, DataFigure, keep
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 HEIGHT = 2.3
 LEAST_RANGE = 100.0

@@ -23,7 +23,8 @@ from symphys.results.result import CheckRecord, Result, VariableRecord
 from symphys.results.run import Run
 from symphys.results.scene import Scene
 from symphys.results.trace import OUTPUT
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 FOOTER = tag("footer", "Made by symphys from the files of the run folder; make it again with “symphys report”.")
 LIGHT = join(

@@ -13,10 +13,11 @@ from symphys.report.figures.contacts import labels, pair_of
 from symphys.report.figures.data import DataFigure, keep
 from symphys.report.robots.branches import colours, linked
 from symphys.results.scene import Scene
-from symphys.trajectory import Array, Mask, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array, Bools
 
 
-def spans(holds: Mask) -> list[tuple[int, int]]:
+def spans(holds: Bools) -> list[tuple[int, int]]:
     """(start, stop) of every run of True in a mask (N,): it holds in the steps from start to stop - 1."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
     return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
@@ -31,7 +32,7 @@ class Stance:
     """When a body stands: ``stands`` (N,), whether it does in each step."""
 
     body: int
-    stands: Mask
+    stands: Bools
 
     @property
     def duty(self) -> float:

@@ -18,7 +18,8 @@ from symphys.report.robots.branches import branches, colours
 from symphys.report.robots.gait import spans
 from symphys.report.robots.joint_use import Channel, channels
 from symphys.results.scene import Scene
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 BEYOND = "#e9edf0"
 FULL = style.VERMILION

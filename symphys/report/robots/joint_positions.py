@@ -13,7 +13,8 @@ from symphys.report.robots.branches import linked
 from symphys.report.scene.views import View, centres, turn
 from symphys.results.scene import Scene
 from symphys.results.scene_joints import SceneJoint
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
 """Which axes of a joint are drawn: (side, axis of that side's frame)."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from symphys.results.scene import Scene
 from symphys.results.scene_joints import SceneJoint
-from symphys.trajectory import Array, Mask, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array, Bools
 
 FULL = 1 - 1e-3
 """A motor is saturated from this share of its largest torque on."""
@@ -66,9 +67,9 @@ class Channel:
         return np.nan if self.joint.motor is None else self.joint.motor.torque
 
     @property
-    def saturated(self) -> Mask:
+    def saturated(self) -> Bools:
         """(N,): whether its motor gives the most that it can."""
-        found: Mask = (np.abs(self.torque) >= FULL * self.bound) & (self.bound > 0)
+        found: Bools = (np.abs(self.torque) >= FULL * self.bound) & (self.bound > 0)
         return found
 
     @property

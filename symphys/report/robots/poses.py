@@ -17,7 +17,8 @@ from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
 from symphys.report.scene.views import View, centres, corners, reach, turn
 from symphys.results.scene import Scene, Solid
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 APART = 0.75
 """Poses in one picture are apart by this share of the robot's length at least."""

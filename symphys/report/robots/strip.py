@@ -20,7 +20,8 @@ from symphys.report.scene.ground import draw_ground
 from symphys.report.scene.panel import ViewPanel, include
 from symphys.report.scene.views import NAMES, View, choose_views
 from symphys.results.scene import Scene
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 LEFT, RIGHT, BOTTOM, TOP, GAP, BETWEEN = 0.72, 0.1, 0.42, 0.3, 0.1, 0.18
 """[in] margins, and gaps between columns and rows"""

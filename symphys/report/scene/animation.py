@@ -15,7 +15,8 @@ from symphys.report.scene.ghosts import MEASURED
 from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, reach, solids_of
 from symphys.results.polytope import Polytope
 from symphys.results.scene import Scene, SceneTerrain, Solid
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 NUMBERS = 60_000
 """How many numbers a page carries at most for one motion, about 400 kB."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from symphys.results.identification.replays import RecordingReplay
 from symphys.results.scene import Scene, SceneBody
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 MEASURED = " measured"
 """Ends the name of what was measured."""

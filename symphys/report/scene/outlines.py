@@ -7,7 +7,7 @@ import numpy as np
 from symphys.report.scene.views import turn
 from symphys.results.polytope import flat_hull
 from symphys.results.scene import Solid
-from symphys.trajectory import Array
+from symphys.types import Array
 
 ROUND = 16
 """Straight pieces of a half circle."""

@@ -11,7 +11,8 @@ from symphys.report.figures import style
 from symphys.report.figures.data import DataFigure
 from symphys.report.scene.views import NAMES, View, corners, reach
 from symphys.results.scene import UPRIGHT, Scene, SceneFixture, ScenePlane, SceneTerrain
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 LEFT, RIGHT, BOTTOM, TOP, GAP = 0.62, 0.15, 0.5, 0.5, 0.62
 """[in] margins of the figure and between its panels"""

@@ -15,7 +15,8 @@ from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
 from symphys.report.scene.views import View, centres, corners, half_axes, reach, solids_of, turn
 from symphys.results.scene import Scene, Solid
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 MOST_LABELLED = 3
 SHAPES = 220

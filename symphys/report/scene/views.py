@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from symphys.results.scene import Scene, Solid
-from symphys.trajectory import Array, Trajectory
+from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 NAMES = "xyz"
 STILL = 1e-3

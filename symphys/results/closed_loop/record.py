@@ -20,7 +20,7 @@ from symphys import files
 from symphys import json_values as values
 from symphys.results.archives import read_archive
 from symphys.results.text_files import ReportError, read_table
-from symphys.trajectory import Array
+from symphys.types import Array
 
 MPC, PLANS = "mpc.json", "mpc.npz"
 FORMAT = 1

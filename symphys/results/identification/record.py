@@ -17,7 +17,6 @@ import numpy as np
 
 from symphys import files
 from symphys import json_values as values
-from symphys.json_values import Array
 from symphys.results.archives import read_archive
 from symphys.results.identification.parts import (
     GlobalSearch,
@@ -27,6 +26,7 @@ from symphys.results.identification.parts import (
     QuantityResiduals,
 )
 from symphys.results.text_files import ReportError, read_table
+from symphys.types import Array
 
 IDENTIFICATION, ARRAYS = "identification.json", "identification.npz"
 FORMAT = 1

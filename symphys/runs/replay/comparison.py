@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.trajectory import Trajectory
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 COUNTED = {"residual": "N s", "crowded": "", "ambiguous": "", "paradox": ""}
 """Fields of a motion that no body, joint or contact has, and their units."""
 

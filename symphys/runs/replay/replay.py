@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys import json_values as values
 from symphys.errors import SymphysError
@@ -28,8 +27,8 @@ from symphys.runs.provenance import machine, versions
 from symphys.runs.replay.comparison import QuantityDifference, compare_motions, compare_numbers
 from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription import Assessment, Transcription, transcribe
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 BUILDING, ROLLING = "building the problem", "rolling it out"
 PARTS = {BUILDING: 8.0, ROLLING: 2.0}
 """What ``replay`` announces, and about how the time is shared."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import casadi as ca
 
@@ -13,9 +13,7 @@ from symphys.model.controllers.net import Activation, Layer, activated
 from symphys.model.state_layout import input_columns
 from symphys.problem import FeedbackController
 from symphys.transcription.rollout import Rollout
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 
 class Places(Protocol):

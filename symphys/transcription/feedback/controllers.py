@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 
@@ -14,9 +13,7 @@ from symphys.problem import FeedbackController, Problem, Sensor
 from symphys.transcription.feedback.force_laws import force_function
 from symphys.transcription.feedback.sensor_memory import SensorMemory
 from symphys.transcription.formula_names import Parameters, instant, namespace
-
-Expr = Any
-"""casadi SX or MX"""
+from symphys.types import Expr
 
 
 class Control:

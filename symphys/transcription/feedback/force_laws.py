@@ -10,7 +10,6 @@ linear in velocities, and drag that grows with them takes speed in every step.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import casadi as ca
 
@@ -20,9 +19,8 @@ from symphys.model.world import World
 from symphys.problem import ForceLaw, Problem
 from symphys.transcription.feedback.sensor_memory import SensorMemory
 from symphys.transcription.formula_names import Instant, Parameters, instant, namespace
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 LEAST_PIVOT = 0.5
 """Laws that push the stronger the faster a body goes grow by at most its inverse within a step."""
 QUARTER = 0.25

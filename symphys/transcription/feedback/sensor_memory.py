@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 
@@ -13,9 +12,7 @@ from symphys.dynamics.observation import accelerometer_bodies
 from symphys.model.state_layout import Layout, input_columns, input_sizes
 from symphys.model.world import World
 from symphys.problem import ALIVE, Constraint, Cost, Output, Problem, Target
-
-Expr = Any
-"""casadi SX or MX"""
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

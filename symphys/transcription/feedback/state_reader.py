@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.dynamics.observation import reading_function
 from symphys.errors import SymphysError
@@ -15,8 +15,8 @@ from symphys.maths import rotation
 from symphys.model.state_layout import Layout
 from symphys.suggest import hint, quote
 from symphys.transcription.staged.tangent import Tangent
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 UNIT = 1e-3
 """How far the length of a measured quaternion may be from 1."""
 

@@ -7,14 +7,12 @@ compiler two thirds of its time. The order of the sums is that of casadi's, so t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import casadi as ca
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 LONG = 512
 """Samples with fewer numbers are left to one function."""
 CHUNK = 64

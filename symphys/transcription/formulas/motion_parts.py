@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import casadi as ca
 
 from symphys.expression import Formula, MotionPart
 from symphys.transcription.objective import Sampled
-
-Expr = Any
-"""casadi MX"""
+from symphys.types import Expr
 
 
 def part_arguments(samples: Sampled, formula: Formula) -> list[Expr]:

@@ -10,18 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import casadi as ca
-import numpy as np
-from numpy.typing import NDArray
 
 from symphys.problem import Problem
 from symphys.problem.parametric.by_phase import lagged
+from symphys.types import Array, Expr
 
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX, MX or DM"""
 QUARTER = 0.25
 """Of a step: so far from its ends it is asked which step a number belongs to, so that rounding does not matter."""
 

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from math import isfinite
 
 import casadi as ca
-import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 WORDS = {
     ca.OP_ADD: "{} + {}",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout, input_columns
@@ -18,8 +17,8 @@ from symphys.transcription.formulas.recorded_parts import (
 )
 from symphys.transcription.nan_tracing.operations import NonFiniteOperation, non_finite_operation
 from symphys.transcription.rollout import Rollout
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Asked = Cost | Target | Constraint | Output
 Columns = Sequence[str]
 """A name for each element of a vector."""

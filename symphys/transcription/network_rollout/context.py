@@ -24,8 +24,7 @@ from symphys.transcription.network_rollout.step_program import (
 )
 from symphys.transcription.network_rollout.virtual_machine import VirtualMachineStep
 from symphys.transcription.rollout import Rollout
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class BatchStep(Protocol):

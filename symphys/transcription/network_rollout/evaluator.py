@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.cuda import Device
 from symphys.shooting import Values, WithoutResiduals
@@ -21,8 +20,8 @@ from symphys.transcription.network_rollout.forward_backward import (
 )
 from symphys.transcription.network_rollout.layers import Layers
 from symphys.transcription.network_rollout.net_values import KEPT_NUMBERS
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 LEAST_ROBOTS = 8
 """In a thread: what fills the lanes of a kernel."""
 

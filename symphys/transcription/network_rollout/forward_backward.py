@@ -14,14 +14,12 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.backends.calls import row_by_row
 from symphys.transcription.network_rollout.context import BatchStep, RolloutContext
 from symphys.transcription.network_rollout.layers import Layers
 from symphys.transcription.network_rollout.net_values import NetValues, values_of
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from symphys.transcription.network_rollout.layers import Layers
 
-Array = NDArray[np.float64]
 SEGMENT_COLUMNS = 1024
 """Robots times steps of a segment: few enough that values are still in the cache for the gradient of the weights."""
 KEPT_NUMBERS = 2**27

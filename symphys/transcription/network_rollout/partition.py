@@ -14,8 +14,8 @@ from symphys.model.controllers import Net
 from symphys.problem import Constraint, Cost, FeedbackController, Output, Problem, Target
 from symphys.transcription.formula_names import input_names, spans
 from symphys.transcription.rollout import Rollout, symbolic_rollout
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 MOST_WEIGHTS = 4096
 """Of a net that is computed within the compiled step, where every lane holds weights of its own."""

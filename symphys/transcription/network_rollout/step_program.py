@@ -12,7 +12,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.expression import Formula
@@ -23,10 +22,8 @@ from symphys.transcription.gradient_probe import combined
 from symphys.transcription.objective import plain_sums, terms
 from symphys.transcription.program import dense, step_calls
 from symphys.transcription.rollout import Rollout
+from symphys.types import Expr
 
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi MX"""
 RESULTS = ("after", "sensed", "asked", "inputs")
 
 

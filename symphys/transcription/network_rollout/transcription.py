@@ -9,7 +9,6 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, Description, described
@@ -26,8 +25,8 @@ from symphys.transcription.network_rollout.forward_backward import ForwardPass, 
 from symphys.transcription.objective import limits
 from symphys.transcription.simulation import Record, simulate
 from symphys.transcription.transcription import Transcription, gradient_prices
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 PLAIN = ("casadi", "c")
 REALS = {"double": np.float64, "single": np.float32}
 STEPPING = {BEST: "simd", "simd": "simd", "simd32": "simd", "cuda": "cuda", "cuda32": "cuda"}

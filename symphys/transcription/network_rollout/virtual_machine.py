@@ -7,12 +7,10 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.transcription.network_rollout.step_program import RESULTS, RolloutObjectives, sense_function
 from symphys.transcription.rollout import Rollout
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class VirtualMachineStep:

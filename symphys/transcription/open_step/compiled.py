@@ -29,8 +29,7 @@ from symphys.transcription.open_step.program import (
 )
 from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import Rollout, symbolic_rollout
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class StepStart(NamedTuple):

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.errors import Issue, ProblemError, SymphysError
 from symphys.model.controllers import Net
@@ -17,8 +16,7 @@ from symphys.model.world import World
 from symphys.problem import FeedbackController, Problem, Variable
 from symphys.suggest import hint, quote
 from symphys.transcription.formula_names import input_names
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 @dataclass(frozen=True)

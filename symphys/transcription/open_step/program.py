@@ -8,7 +8,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.expression import Formula
@@ -17,10 +16,8 @@ from symphys.problem import Cost, Problem, Target
 from symphys.transcription.feedback.controller_calls import control_calls
 from symphys.transcription.program import dense, step_calls
 from symphys.transcription.rollout import Rollout
+from symphys.types import Array, Expr
 
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX or MX"""
 Value = Callable[[Formula, int], Expr]
 """The value of a formula at the start (0) or at the end (1) of the step."""
 RESULTS = ("after", "sensed", "running", "moments")

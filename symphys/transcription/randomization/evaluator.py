@@ -7,15 +7,13 @@ from dataclasses import replace
 from math import exp, inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import Kernel
 from symphys.codegen.backends.simd import common, probed
 from symphys.codegen.runtime.kernel import Outputs
 from symphys.shooting import ScenarioSamples, Values, WithoutResiduals
 from symphys.transcription.randomization.sampler import Sampler
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class KernelScenarioEvaluator:

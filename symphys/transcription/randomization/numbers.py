@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.problem import Problem, RandomizedQuantity, Variable, VariableSlot
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 LEAST = 0.05
 """Of a factor, however wide the draws are made."""
 

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.observation import gap_function
 from symphys.model.joints.start import placed_frames, spanning_tree, subtree
@@ -14,11 +13,11 @@ from symphys.model.state_layout import GIVEN, initial_state
 from symphys.problem import Problem, RandomizedPose, VariableSlot
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.transcription.randomization.numbers import hidden
+from symphys.types import Array
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
 State = dict[str, Array]
 """By name, (count, k) each."""
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.problem import Problem
 from symphys.transcription.randomization.numbers import QuantitySampler
 from symphys.transcription.randomization.poses import PoseSampler
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class Sampler:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.shooting import Expansion
 from symphys.transcription.staged.stage_terms import StageTerm
 from symphys.transcription.staged.term_slopes import Block, Blocks
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from symphys.types import Array, Ints
 
 
 class ExpansionSums:
@@ -20,7 +17,7 @@ class ExpansionSums:
     control knots that are named together with what happens at other steps, it is left out.
     """
 
-    def __init__(self, sizes: tuple[int, int, int, int], of_constants: Array, knots: tuple[Indices, Indices]) -> None:
+    def __init__(self, sizes: tuple[int, int, int, int], of_constants: Array, knots: tuple[Ints, Ints]) -> None:
         """Zeros.
 
         Args:
@@ -80,7 +77,7 @@ class ExpansionSums:
             self.value, self.x, self.xx, self.u, self.uu, self.ux, self.uy, self.s, self.ss, self.sx, self.su
         )
 
-    def knots_of(self, block: Block) -> tuple[Array, Indices]:
+    def knots_of(self, block: Block) -> tuple[Array, Ints]:
         """(T, r, k) the slopes by knots among constants, and their places (k, 2)."""
         which, places = self.knots
         _, mine, theirs = np.intersect1d(block.columns, which, return_indices=True)
@@ -97,7 +94,7 @@ class ExpansionSums:
                 self.su[step][:, columns] += np.sum(by_s.transpose(0, 2, 1) @ (mine * scaled), axis=0)
 
 
-def _add(total: Array, ticks: Indices, rows: Block, columns: Block) -> None:
+def _add(total: Array, ticks: Ints, rows: Block, columns: Block) -> None:
     """Add rows' columns, tick by tick, to total (N, a, b)."""
     if len(rows.columns) and len(columns.columns):
         products = rows.slopes.transpose(0, 2, 1) @ columns.slopes

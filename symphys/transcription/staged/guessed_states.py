@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.observation import joint_quantities, joint_turn
 from symphys.model.state_layout import Layout
@@ -15,12 +14,10 @@ from symphys.problem.guess.motion import is_orientation, turn_between
 from symphys.problem.guess.names import ball_joints, guessable, rate_of
 from symphys.transcription.staged.columns import ByColumns
 from symphys.transcription.staged.staged_problem import RolloutStages
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from symphys.types import Array, Ints
 
 
-def guessed_states(stages: RolloutStages, guess: GuessedMotion, z: Array, ticks: Indices, smoothing: float) -> Array:
+def guessed_states(stages: RolloutStages, guess: GuessedMotion, z: Array, ticks: Ints, smoothing: float) -> Array:
     """(M, nx) at the ticks (M,), each at least 1.
 
     What is named, and its rate, is moved along the tangent, so that joints stay closed; all else is that of the rollout

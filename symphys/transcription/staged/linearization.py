@@ -7,7 +7,7 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.codegen.backends import BEST
 from symphys.shooting import Linearized, StagedMotion
@@ -15,9 +15,8 @@ from symphys.transcription.formula_names import spans
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.linearized_step import LinearizedStep, Slopes
 from symphys.transcription.staged.tangent import Tangent
+from symphys.types import Array, Ints
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 ROUNDING = 1e-13
 """Of the slopes of the first state: what is smaller is on its tangent."""
 
@@ -106,7 +105,7 @@ class Linearization:
         return np.array(ca.DM(function(x, p)))
 
 
-def statics_of(rollout: Rollout) -> Indices:
+def statics_of(rollout: Rollout) -> Ints:
     """The entries of z that are no knots of a control."""
     variables = rollout.problem.variables
     found = [range(*span) for v, span in zip(variables, spans(variables), strict=True) if v.kind != "control"]

@@ -22,8 +22,8 @@ from symphys.transcription.staged.step_program import (
     step_program,
 )
 from symphys.transcription.staged.tangent import Tangent
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 Slopes = tuple[Array, Array, Array]
 """(N, n, n), (N, n, m) and (N, n, np): the next state's tangent by the state's, by inputs and by parameters."""
 FEW = 16

@@ -11,21 +11,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.expression import Formula, MotionPart, parse
 from symphys.problem import Problem
 from symphys.suggest import quote
 from symphys.transcription.rollout import Rollout
-
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX"""
+from symphys.types import Array, Expr
 
 
 @dataclass(frozen=True)

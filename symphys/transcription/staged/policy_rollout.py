@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.codegen import (
     FunctionCall,
@@ -33,8 +33,7 @@ from symphys.transcription.feedback.controller_calls import control_calls
 from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.linearized_step import LinearizedStep
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 
 class RunningCosts(Protocol):

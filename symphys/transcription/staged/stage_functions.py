@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import (
     FunctionCall,
@@ -23,11 +22,8 @@ from symphys.codegen import (
 )
 from symphys.codegen.backends import PRECISIONS
 from symphys.transcription.staged.columns import ByColumns
+from symphys.types import Array, Expr, Ints
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Expr = Any
-"""casadi SX"""
 COMPILED = 30_000
 """Operations of a horizon from which a compiler is worth its second: casadi's machine does as many in 0.2 ms."""
 
@@ -46,7 +42,7 @@ class StepRows(NamedTuple):
     after: Array
     u: Array
     constants: Array
-    ticks: Indices
+    ticks: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +115,7 @@ class StageFunctions:
             results.append([whole[:, slice(*next(parts))] for _ in range(each.function.n_out())])
         return results
 
-    def _entries(self, name: str) -> Indices:
+    def _entries(self, name: str) -> Ints:
         return np.array([i for source, each in self._segments if source == name for i in each], np.int64)
 
     def _table(self, rows: StepRows) -> Array:

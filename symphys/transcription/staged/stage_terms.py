@@ -13,7 +13,6 @@ from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.expression import Formula, parse
 from symphys.problem import Constraint, Cost, Problem, Target
@@ -21,11 +20,8 @@ from symphys.transcription.formula_names import spans
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.motion_sums import MotionSums
 from symphys.transcription.staged.tangent import Tangent
+from symphys.types import Expr, Ints
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Expr = Any
-"""casadi SX"""
 Kind = Literal["cost", "squares", "limit", "sum"]
 
 
@@ -48,7 +44,7 @@ class StageTerm:
     name: str
     kind: Kind
     weight: float
-    steps: Indices
+    steps: Ints
     after: bool
     value: Expr
     key: tuple[object, ...]
@@ -60,7 +56,7 @@ class StageTerm:
         return int(self.value.shape[0])
 
     @property
-    def states(self) -> Indices:
+    def states(self) -> Ints:
         """(T,) numbers of the states that it looks at."""
         return self.steps + 1 if self.after else self.steps
 
@@ -160,7 +156,7 @@ class StageSymbols:
         return ca.vertcat(x, ca.SX(len(self.sums.sums), self.parameter_size)), first
 
 
-def named_entries(problem: Problem) -> Indices:
+def named_entries(problem: Problem) -> Ints:
     """The entries of z whose variables some formula names."""
     names = frozenset[str]().union(*(each.formula.needed for each in _tables(problem)))
     found = [

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen.backends import BEST
 from symphys.problem import Constraint
@@ -20,9 +19,7 @@ from symphys.transcription.staged.stage_functions import StepRows
 from symphys.transcription.staged.stage_terms import StageTerm
 from symphys.transcription.staged.term_groups import TermGroups
 from symphys.transcription.staged.term_slopes import Blocks, TermSlopes
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from symphys.types import Array, Ints
 
 
 class SlopedTerm(NamedTuple):
@@ -315,7 +312,7 @@ class _Entries:
     def __init__(self) -> None:
         self.rows, self.columns, self.values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
 
-    def add(self, rows: Indices, columns: Indices, values: Array) -> None:
+    def add(self, rows: Ints, columns: Ints, values: Array) -> None:
         """Blocks (T, r, c) at rows (T, r) and columns (T or 1, 1, c)."""
         self.rows.append(np.broadcast_to(rows[:, :, None], values.shape).ravel())
         self.columns.append(np.broadcast_to(columns, values.shape).ravel())
@@ -329,7 +326,7 @@ class _Entries:
         return csr_array((np.concatenate(self.values), places), shape=(rows, columns))
 
 
-def _input_weights(rollout: Rollout, named: Indices, statics: Indices) -> tuple[Any, tuple[Indices, Indices]]:
+def _input_weights(rollout: Rollout, named: Ints, statics: Ints) -> tuple[Any, tuple[Ints, Ints]]:
     """(N * m, len(z)) scipy.sparse: u = weights @ z; which of ``named`` are knots, and the step and input of each.
 
     The inputs of a step are those of the rollout, then the named knots that begin to act there.

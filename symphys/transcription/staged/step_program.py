@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.transcription.decision_variables import start_of
@@ -17,10 +15,7 @@ from symphys.transcription.feedback.controller_calls import control_calls
 from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout, call
 from symphys.transcription.staged.tangent import Tangent
-
-Indices = NDArray[np.int64]
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +41,7 @@ class StepArguments:
         return rollout.memory.size, self.tangent.size, rollout.controls, int(rollout.p.shape[0])
 
     @cached_property
-    def varied(self) -> Indices:
+    def varied(self) -> Ints:
         """The entries of p by which it is differentiated: those that z sets."""
         if not self.parameters:
             return np.zeros(0, np.int64)

@@ -13,11 +13,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symphys.dynamics.context import make_context
 from symphys.dynamics.joints.joint_frames import joint_frames_at
@@ -30,10 +29,8 @@ from symphys.model.state_layout import BODY_FIELDS, Layout
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.columns import ByColumns
 from symphys.transcription.staged.tree_chart import Moving, Pose, TreeChart
+from symphys.types import Array, Expr
 
-Array = NDArray[np.float64]
-Expr = Any
-"""casadi SX"""
 Parts = Mapping[str, Expr]
 """Of a state, by the names of ``Layout``."""
 POSES, VELOCITIES, REACTIONS = BODY_FIELDS[:2], BODY_FIELDS[2:4], BODY_FIELDS[4:]

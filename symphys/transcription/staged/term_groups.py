@@ -7,15 +7,14 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.stage_functions import ReadingFunction, StageFunctions, StepRows, reading
 from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm, motion_sums, stage_terms
 from symphys.transcription.staged.tangent import Tangent
 from symphys.transcription.staged.term_slopes import TermSlopes, raw_slopes, term_slopes
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 MOTIONS = 8
 """Whose values are asked for at once, as a line search does with its step lengths."""
 

@@ -9,22 +9,17 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.transcription.staged.stage_functions import ReadingFunction, reading
 from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Expr = Any
-"""casadi SX"""
+from symphys.types import Array, Expr, Ints
 
 
 class Block(NamedTuple):
     """Slopes (T, r, c) by some entries ``columns`` (c,) of an argument."""
 
     slopes: Array
-    columns: Indices
+    columns: Ints
 
 
 class Blocks(NamedTuple):
@@ -48,9 +43,9 @@ class Pattern:
     """Where the nonzeros of a matrix go: into dense blocks of its columns that have any."""
 
     shape: tuple[int, int]
-    rows: Indices
-    places: Indices
-    columns: Indices
+    rows: Ints
+    places: Ints
+    columns: Ints
 
     @staticmethod
     def of(matrix: Expr) -> Pattern:
@@ -85,7 +80,7 @@ class TermSlopes:
     curved: Pattern | None
     parts: tuple[slice, ...]
     bases: tuple[Pattern, ...]
-    acting: tuple[Indices, ...]
+    acting: tuple[Ints, ...]
 
     def values(self, found: Sequence[Array]) -> tuple[Array, Blocks]:
         """(T, r) values and their slopes."""
@@ -147,7 +142,7 @@ def raw_slopes(symbols: StageSymbols, term: StageTerm) -> ReadingFunction:
     return reading([ca.vec(each.T) for each in slopes], symbols.arguments, term.after)
 
 
-def square_roots(second: Array, components: Sequence[Indices]) -> Array:
+def square_roots(second: Array, components: Sequence[Ints]) -> Array:
     """(T, a, a) rows whose squares sum to the positive part of symmetric matrices (T, a, a), component by component."""
     rows = np.zeros_like(second)
     for each in components:
@@ -162,7 +157,7 @@ def square_roots(second: Array, components: Sequence[Indices]) -> Array:
     return rows
 
 
-def _components(pattern: Pattern) -> list[Indices]:
+def _components(pattern: Pattern) -> list[Ints]:
     """Which entries a second derivative ties together."""
     size = pattern.shape[0]
     from scipy.sparse import csr_array  # late: most solvers take no problem step by step
@@ -173,7 +168,7 @@ def _components(pattern: Pattern) -> list[Indices]:
     return [np.flatnonzero(labels == i) for i in range(count)]
 
 
-def _second(value: Expr, arguments: Sequence[Expr]) -> tuple[Expr | None, tuple[Indices, ...]]:
+def _second(value: Expr, arguments: Sequence[Expr]) -> tuple[Expr | None, tuple[Ints, ...]]:
     """The second derivative of a number by the entries in which it is not linear, and which these are."""
     slopes = [ca.sparsify(ca.jacobian(value, each)) for each in arguments]
     used = [np.unique(np.array(each.sparsity().get_triplet()[1], np.int64)) for each in slopes]

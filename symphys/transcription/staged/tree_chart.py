@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
@@ -18,9 +17,8 @@ from symphys.dynamics.articulated.forward_kinematics import HERE, JointStart, fi
 from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames_at
 from symphys.maths import rotation
 from symphys.model.joints import Joint, JointFrame, KinematicTree, Link
+from symphys.types import Expr
 
-Expr = Any
-"""casadi SX"""
 Pose = tuple[Expr, Expr]
 """Position (3,) and orientation (4,)."""
 Moving = tuple[Expr, Expr]

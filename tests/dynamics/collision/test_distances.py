@@ -10,10 +10,11 @@ import pytest
 from scipy.optimize import minimize
 from tools.distances import distance
 from tools.repeats import few
-from worlds.meetings import PLACE, STILL, Array, Thing, met, moved_to, random_thing, rule, shifted
+from worlds.meetings import PLACE, STILL, Thing, met, moved_to, random_thing, rule, shifted
 
 from symphys.dynamics.collision.pairs.box_box import RIM
 from symphys.model.shapes import POINTS, SHAPES, Plane, Terrain
+from symphys.types import Array
 
 KINDS = ("sphere", "capsule", "box")
 PAIRS = [(a, b) for a in KINDS for b in KINDS]

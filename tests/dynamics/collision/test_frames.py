@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from tools.distances import Solid, distance
 from tools.repeats import few
-from worlds.meetings import Array, Thing, flying, later, met, moved_to, random_thing, rule
+from worlds.meetings import Thing, flying, later, met, moved_to, random_thing, rule
 from worlds.slopes import compared, some_way
+
+from symphys.types import Array
 
 KINDS = ("sphere", "capsule", "box")
 PAIRS = [(a, b) for a in KINDS for b in KINDS]

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, nnls
 from tools.repeats import few
-from worlds.meetings import PLACE, STILL, Array, Thing, course, flying, later, matrix, met, random_thing, rule, shifted
+from worlds.meetings import PLACE, STILL, Thing, course, flying, later, matrix, met, random_thing, rule, shifted
 from worlds.meetings import shape as make
 from worlds.slopes import compared, some_way
 
 from symphys.dynamics.collision import collide
 from symphys.dynamics.collision.predicted_path import at_rest
 from symphys.model.shapes import Convex, Cylinder, Ellipsoid, Plane, Terrain
+from symphys.types import Array
 
 KINDS = ("cylinder", "ellipsoid", "convex")
 ROUND = [("sphere", "cylinder"), ("sphere", "ellipsoid"), ("sphere", "convex")]

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from tools.distances import distance
 from tools.repeats import few, first, thorough
-from worlds.meetings import STILL, Array, Meet, Thing, flying, met, moved_to, random_thing, rule, shifted
+from worlds.meetings import STILL, Meet, Thing, flying, met, moved_to, random_thing, rule, shifted
 
 from symphys.model.shapes import Plane, Terrain
+from symphys.types import Array
 
 KINDS = ("sphere", "capsule", "box")
 PAIRS = [(a, b) for a in KINDS for b in KINDS]

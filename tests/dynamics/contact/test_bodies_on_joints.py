@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from tools.laboratory import Lab
-from worlds.linkage import ABOUT_Y, Array
+from worlds.linkage import ABOUT_Y
 
 from symphys.model.joints import HINGE, Joint, JointFrame
 from symphys.model.shapes import Capsule, Plane
 from symphys.model.world import Body, Scheme, World, make_world
+from symphys.types import Array
 
 PIVOT, ARM, RATE = 0.75, 0.25, 0.4
 

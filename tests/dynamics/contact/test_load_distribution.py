@@ -7,7 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from worlds.contacts import Array, contact_of, numbers
+from worlds.contacts import contact_of, numbers
 
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.constraint import ZERO
@@ -16,6 +16,7 @@ from symphys.dynamics.context import make_context
 from symphys.dynamics.unknowns import PlacedConstraint
 from symphys.model.shapes import Box, Plane
 from symphys.model.world import Body, Law, Scheme, make_world
+from symphys.types import Array
 
 CORNERS = np.array([(x, y) for x in (-0.3, 0.3) for y in (-0.2, 0.2)])
 

@@ -11,11 +11,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tools.laboratory import Lab
 from tools.repeats import thorough
-from worlds.linkage import Array, momenta
+from worlds.linkage import momenta
 
 from symphys.dynamics.observation.joint_coordinates import reading_function
 from symphys.model.joints import KINDS, Joint, JointFrame
 from symphys.model.world import Body, Scheme, World
+from symphys.types import Array
 
 ROOTS = (None, *KINDS)
 TURN = tuple(Rotation.from_euler("xyz", [0.4, -0.7, 0.9]).as_quat(scalar_first=True))

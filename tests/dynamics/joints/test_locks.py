@@ -10,10 +10,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tools.laboratory import Lab
 from tools.repeats import few
-from worlds.linkage import ABOUT_Y, Array, chain, energy, hanging, momenta, rod, separations
+from worlds.linkage import ABOUT_Y, chain, energy, hanging, momenta, rod, separations
 
 from symphys.model.joints import KINDS, Joint, JointFrame, Servo
 from symphys.model.world import Body, Scheme, World
+from symphys.types import Array
 
 G = 9.81
 DOF = {"ball": 3, "fixed": 0, "hinge": 1, "slider": 1, "universal": 2}

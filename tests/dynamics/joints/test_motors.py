@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tools.laboratory import Lab, central_difference, value_and_gradient
 from tools.repeats import few
-from worlds.linkage import ABOUT_Y, ABOUT_Z, Array, chain, hanging, momenta, separations
+from worlds.linkage import ABOUT_Y, ABOUT_Z, chain, hanging, momenta, separations
 
 from symphys.model.joints import (
     FIXED,
@@ -27,6 +27,7 @@ from symphys.model.joints import (
 )
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, World, make_world
+from symphys.types import Array
 
 INERTIA = 1.0 * 0.5**2 / 3
 """Of a rod of 1 kg and 0.5 m about its end [kg m^2]."""

@@ -8,11 +8,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from symphys.model.controllers import ControlLaw, Linear, Net, Periodic
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 RNG = np.random.default_rng(4)
 
 

@@ -8,13 +8,12 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from tools.repeats import few
 
 from symphys.model.heightfield import Heightfield
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 SPACING, ORIGIN = (0.5, 0.25), (1.0, -2.0)
 HEIGHTS = np.random.default_rng(3).standard_normal((5, 7))
 

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from symphys.problem.recordings import csv_file
 from symphys.problem.recordings.columns import RecordingFault
 from symphys.problem.recordings.csv_file import MISSING, read_csv
+from symphys.types import Array
 
-Array = NDArray[np.float64]
 CELLS = st.one_of(st.floats(allow_infinity=False, width=64), st.integers(-(10**6), 10**6).map(float))
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tools.repeats import few
 
 from symphys.errors import SymphysError
@@ -21,8 +20,7 @@ from symphys.transcription import Transcription, transcribe
 from symphys.transcription.staged import stage_functions
 from symphys.transcription.staged.tangent import Tangent
 from symphys.transcription.staged.term_groups import TermGroups
-
-Array = NDArray[np.float64]
+from symphys.types import Array
 
 CART = """
 [simulation]

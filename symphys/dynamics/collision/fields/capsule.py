@@ -10,10 +10,11 @@ from __future__ import annotations
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes, ends, placed
-from symphys.dynamics.collision.contact_geometry import Contact, Expr
+from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import Field, ball_in_field
 from symphys.model.shapes import Capsule, SolidShape
+from symphys.types import Expr
 
 HALVINGS = 8
 """Of the capsule's length, before the last steps."""

@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.dynamics.collision.body_points import axes
-from symphys.dynamics.collision.contact_geometry import Contact, Expr
+from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Convex, Sphere
+from symphys.types import Expr
 
 NEXT = ((0, 1), (1, 2), (2, 0))
 """The edges of a triangle."""

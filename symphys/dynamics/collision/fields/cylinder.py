@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact, Expr
+from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.fields.capsule import capsule_in_field
 from symphys.dynamics.collision.pairs.sphere_sphere import direction, distance
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Capsule, Cylinder, Sphere
+from symphys.types import Expr
 
 NO_LENGTH = 2e-12
 """[m] from the axis at which a point counts that is nearer to it, so that it has a direction."""

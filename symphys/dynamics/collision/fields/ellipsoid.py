@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact, Expr
+from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.fields.capsule import capsule_in_field
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.maths.smoothing import TINY_SQUARE, length
 from symphys.model.shapes import Capsule, Ellipsoid, Sphere
+from symphys.types import Expr
 
 FOOT_STEPS = 5
 """Newton steps towards the foot of a perpendicular."""

@@ -14,7 +14,6 @@ was on both bodies for the rest of the step.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import casadi as ca
 
@@ -23,9 +22,7 @@ from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.witness_points import Witness, contact_of
 from symphys.model.shapes import Box
-
-Expr = Any
-"""casadi SX"""
+from symphys.types import Expr
 
 RIM = 0.001
 """Of a face's size: how far beyond its rim a corner still counts, as a point of the rim. So no candidate comes and

@@ -9,13 +9,14 @@ from __future__ import annotations
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes, ends
-from symphys.dynamics.collision.contact_geometry import Contact, Expr, flipped
+from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.pairs.sphere_capsule import ball_at_capsule
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, chosen
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.dynamics.collision.witness_points import Witness, contact_of, steady
 from symphys.maths.smoothing import length
 from symphys.model.shapes import Capsule
+from symphys.types import Expr
 
 PARALLEL = 1e-6
 """Square of the sine of the angle below which axes count as parallel."""

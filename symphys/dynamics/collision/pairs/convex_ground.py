@@ -10,12 +10,13 @@ from collections.abc import Callable
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes, placed
-from symphys.dynamics.collision.contact_geometry import Contact, Expr
+from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.half_space import ball_on_plane
 from symphys.dynamics.collision.hull_slots import OverGround, Point, slot_points
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.terrain import Paraboloid, ball_on_terrain, surface_of
 from symphys.model.shapes import Convex, Plane, Terrain
+from symphys.types import Expr
 
 
 def convex_plane(shape: Convex, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:

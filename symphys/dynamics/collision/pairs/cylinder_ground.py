@@ -13,7 +13,7 @@ from math import cos, pi, sin
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import SIGNS, Offset, axes, placed
-from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
+from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
 from symphys.dynamics.collision.half_space import ball_on_plane
 from symphys.dynamics.collision.pairs.ellipsoid_ground import turned_back
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
@@ -21,6 +21,7 @@ from symphys.dynamics.collision.terrain import ball_on_terrain, surface_of, upwa
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.maths.smoothing import length
 from symphys.model.shapes import Cylinder, Plane, Terrain
+from symphys.types import Expr
 
 LEVEL = 1e-6
 """Sine of the angle between a face and the ground below which they count as parallel."""

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes
-from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
+from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.terrain import CONVEX, Paraboloid, determinant, nearest, solved, surface_of, upwards
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.maths.smoothing import length
 from symphys.model.shapes import Ellipsoid, Plane, Terrain
+from symphys.types import Expr
 
 TOUCH_STEPS = 4
 """Newton steps towards the place where the ellipsoid and bent ground are parallel."""

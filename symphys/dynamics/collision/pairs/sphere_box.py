@@ -12,11 +12,12 @@ import casadi as ca
 
 from symphys.dynamics.collision.body_points import Offset, axes
 from symphys.dynamics.collision.box_geometry import FLUSH, leans_little
-from symphys.dynamics.collision.contact_geometry import Contact, Expr
+from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Box, Sphere
+from symphys.types import Expr
 
 TINY = 1e-9
 """[m] Smallest approach to a face in a step by which a ball counts as coming over its rim."""

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes
-from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
+from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
 from symphys.dynamics.collision.pairs.sphere_sphere import direction, distance
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.signed_distance import NEWTON_STEPS
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.model.shapes import Capsule, Sphere
+from symphys.types import Expr
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Expr, Frame
+from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import NEWTON_STEPS, TINY_RATE, falls, no_later
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Sphere
+from symphys.types import Expr
 
 TINY_LENGTH = 1e-12
 """[m] added along z to a line of centres shorter than half of it, so that coincident spheres have a normal."""
