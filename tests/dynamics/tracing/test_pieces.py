@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import casadi as ca
@@ -62,14 +63,14 @@ def builds(monkeypatch: pytest.MonkeyPatch) -> list[object]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["balls", "box"])
 def test_a_step_of_pieces_that_were_there_is_that_built_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    world, made = world_of(name), list[ca.Function]()
-    for alone in (False, True):
-        for make, scheme in [(step_function, SCHEME), (report_function, SCHEME), *((step_function, o) for o in OTHERS)]:
-            if alone or not made:
-                monkeypatch.setattr(trace, "_PIECES", trace.Pieces())
-            made.append(make(world, scheme, INPUTS))
-    for together, alone_ in zip(made[: len(made) // 2], made[len(made) // 2 :], strict=True):
-        same(together, alone_, world)
+    world, asked = (
+        world_of(name),
+        [(step_function, SCHEME), (report_function, SCHEME), *product([step_function], OTHERS)],
+    )
+    together = [make(world, scheme, INPUTS) for make, scheme in asked]
+    for (make, scheme), step in zip(asked, together, strict=True):
+        monkeypatch.setattr(trace, "_PIECES", trace.Pieces())
+        same(step, make(world, scheme, INPUTS), world)
 
 
 @pytest.mark.slow
