@@ -114,7 +114,7 @@ class Rollout:
 
     @cached_property
     def termination(self) -> ca.Function | None:
-        """See ``freeze_function``; None where nothing falls."""
+        """See ``termination_function``; None where nothing falls."""
         problem = self.problem
         if problem.termination is None:
             return None

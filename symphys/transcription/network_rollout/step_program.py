@@ -1,7 +1,7 @@
 """One step as a program: from (x, inputs, p, time) to the next state, what is sensed there, and formulas along the way.
 
-Everything that a problem asks of a rollout is made of these: ``Stages`` collects the formulas, ``Aims`` puts their
-values together.
+Everything that a problem asks of a rollout is made of these: ``FormulaSamples`` collects the formulas,
+``RolloutObjectives`` puts their values together.
 """
 
 from __future__ import annotations
