@@ -68,7 +68,7 @@ def test_mujoco_on_the_same_scene() -> None:
     assert np.median(errors[1]) < np.median(errors[0])
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_ablation_tells_the_tricks_apart() -> None:
     whole, without = (ablation.dropped_ball(Scheme(time_of_impact=t)) for t in (True, False))
     assert max(whole) < 1e-9 < 1e-2 < min(without)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import ast
 import builtins
-import io
 import re
-import tokenize
-from collections.abc import Iterator
+from dataclasses import dataclass
 
 from house.test_source import ROOT, project_files
 
@@ -16,35 +14,38 @@ NAMED = re.compile(r"(?=\w*[a-z])(?:[A-Z]\w*[a-z]\w*|[a-z]\w*_\w+)")
 FOREIGN = {"DiagonalDecoding": "a class of pycma", "knee_joint": "an example of a name"}
 
 
-def docstrings(source: str) -> Iterator[tuple[int, int, str]]:
-    """First and last line, and text, of every string that is a statement."""
-    for node in ast.walk(ast.parse(source)):
+@dataclass(frozen=True)
+class Source:
+    """The docstrings of a file, with their first lines, and all words that are in none of them."""
+
+    docstrings: tuple[tuple[int, str], ...]
+    words: frozenset[str]
+
+
+def read(text: str) -> Source:
+    """A docstring is any string that is a statement."""
+    lines, found = text.splitlines(), list[tuple[int, str]]()
+    for node in ast.walk(ast.parse(text)):
         match node:
-            case ast.Expr(value=ast.Constant(value=str(text))):
-                yield node.lineno, node.end_lineno or node.lineno, text
-
-
-def words_of(source: str) -> Iterator[str]:
-    """Of code and of texts in it, docstrings and comments apart."""
-    lines = {line for first, last, _ in docstrings(source) for line in range(first, last + 1)}
-    for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type != tokenize.COMMENT and token.start[0] not in lines:
-            yield from re.findall(r"\w+", token.string)
+            case ast.Expr(value=ast.Constant(value=str(string)), lineno=first, end_lineno=int(last)):
+                found.append((first, string))
+                lines[first - 1 : last] = [""] * (last - first + 1)
+    return Source(tuple(found), frozenset(re.findall(r"\w+", "\n".join(lines))))
 
 
 def test_names_in_docstrings_exist() -> None:
     paths = [path for path in project_files() if path.relative_to(ROOT).parts[0] in ("symphys", "solvers", "problems")]
     texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in paths}
+    sources = {path: read(text) for path, text in texts.items() if path.suffix == ".py"}
     known = set(dir(builtins)) | FOREIGN.keys()
     for path, text in texts.items():
         known |= {*path.relative_to(ROOT).parts, path.stem}
-        known |= set(words_of(text) if path.suffix == ".py" else re.findall(r"\w+", text))
+        known |= sources[path].words if path in sources else set(re.findall(r"\w+", text))
     stale = [
-        f"{path.relative_to(ROOT)}:{first}: {name}"
-        for path, text in texts.items()
-        if path.suffix == ".py"
-        for first, _, doc in docstrings(text)
-        for code in re.findall(r"``([^`]+)``", doc)
+        f"{path.relative_to(ROOT)}:{line}: {name}"
+        for path, source in sources.items()
+        for line, docstring in source.docstrings
+        for code in re.findall(r"``([^`]+)``", docstring)
         for name in re.findall(r"[A-Za-z_]\w+", code)
         if NAMED.fullmatch(name) and name not in known
     ]

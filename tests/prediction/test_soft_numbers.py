@@ -109,7 +109,9 @@ def estimates(folder: Path, text: str, dt: float) -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", [pytest.param(BALL, id="ball"), pytest.param(RAIL, id="on a rail")])
+@pytest.mark.parametrize(
+    "text", [pytest.param(BALL, id="ball"), pytest.param(RAIL, id="on a rail", marks=pytest.mark.thorough)]
+)
 def test_frequency_and_ratio_lie_within_their_intervals_at_any_step(tmp_path: Path, text: str) -> None:
     found = [estimates(tmp_path, text, dt) for dt in (0.001, 0.003, 0.01)]
     for value, lower, upper in found[0]:

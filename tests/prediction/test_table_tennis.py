@@ -67,7 +67,7 @@ def test_all_four_are_found_from_shots_of_different_spin() -> None:
     assert found.own[:, 3:] == pytest.approx(np.array([spin for _, spin in SHOTS]), abs=3 * SPIN_NOISE)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_flights_without_spin_leave_the_lift_open() -> None:
     """Before the first bounce; the drag is found all the same."""
     problem = recorded(PLAIN, START, [THROWN], ["drag_C", "lift_C"], until=0.24)

@@ -15,13 +15,13 @@ from symphys.shooting import StagedProblem
 from symphys.transcription import Transcription, transcribe
 from symphys.types import Array
 
-HEAVY = {"inertia and centre of mass", "loop of joints", "orientation"}
+HEAVY = {"loop of joints", "orientation"}
 """What takes seconds to build."""
 COMPILED = {"impacts with friction", "smoothed contact", "references"}
 """What is compiled in every run of the tests; kernels of the others in those of ``make test-all``."""
 
 
-LONGEST = {"load on two boards"}
+LONGEST = {"load on two boards", "inertia and centre of mass"}
 """What takes half a minute; ``soft joint`` has the longest compile."""
 
 

@@ -49,7 +49,7 @@ def test_rollouts_have_their_own_lengths(rollout: Rollout) -> None:
     assert whole[1][0, 0] == pytest.approx(z[1, 2], abs=1e-15), "the first sample is the start"
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_what_is_watched_has_values_beside_the_others(rollout: Rollout) -> None:
     z, lasts = decision(rollout, 2), [30, 7]
     made = QuantitySlopes(rollout, {"height": FORMULAS["height"]}, threads=1, watched={"pose": FORMULAS["pose"]})

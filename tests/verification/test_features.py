@@ -94,7 +94,21 @@ MORE: dict[str, Tables] = {
 }
 
 
-@few("name", [*PHASES, *(pytest.param(name, marks=pytest.mark.slow) for name in MORE | FEATURES)], 1)
+LONGEST = {"load on two boards"}
+"""Examined with ``make thorough``: its steps take half a minute to build."""
+
+
+@few(
+    "name",
+    [
+        *PHASES,
+        *(
+            pytest.param(name, marks=pytest.mark.thorough if name in LONGEST else pytest.mark.slow)
+            for name in MORE | FEATURES
+        ),
+    ],
+    1,
+)
 def test_every_examination_ends_with_numbers(name: str) -> None:
     tables = (PHASES | MORE | FEATURES)[name]
     made = transcribe(problem_of_tables(tables), backend="casadi")

@@ -112,7 +112,7 @@ def objective_arguments(context: RolloutContext, motion: ForwardPass, b: int) ->
 
 
 class BackwardPass:
-    """A pass backwards along a ``ForwardPass``: the gradient of the sum over robots of what ``slopes`` are the slopes of."""
+    """Backwards along a ``ForwardPass``: the gradient of the sum over robots of what ``slopes`` are the slopes of."""
 
     def __init__(
         self,

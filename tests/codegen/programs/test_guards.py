@@ -69,7 +69,7 @@ def test_most_calls_of_a_heap_are_guarded(heap_program: Program, request: pytest
     assert (guarding.count("sections") > 0) == ("soft" not in request.node.name)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_plain_c_leaves_out_the_same(tmp_path: Path, cache: Cache) -> None:
     program = program_of("spheres")
     program = replace(program, outputs={"merit": program.outputs["merit"]})

@@ -29,7 +29,7 @@ def robot() -> Program:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "rows"), [("chain", 9), ("chain", 1), ("robot", 1), thorough("robot", 9)])
+@pytest.mark.parametrize(("name", "rows"), [("chain", 9), ("chain", 1), thorough("robot", 1), thorough("robot", 9)])
 def test_values_and_gradients_do_not_depend_on_the_level(
     name: str, rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
