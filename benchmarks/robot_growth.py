@@ -16,7 +16,7 @@ from table_robot import table_problem
 from symphys.codegen import Kernel, compile_program
 from symphys.model.state_layout import Layout
 from symphys.transcription import symbolic_rollout
-from symphys.transcription.network_rollout.step_program import RolloutObjectives, start_function, step_program
+from symphys.transcription.network_rollout.objectives import RolloutObjectives, start_function
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 
@@ -42,9 +42,8 @@ def rollout_of(toi: bool, cuts: int, stride: float) -> tuple[Rollout, Kernel]:
     problem = table_problem([], STEPS, stride=stride, toi=toi)
     simulation = replace(problem.simulation, cuts=cuts)
     rollout = symbolic_rollout(replace(problem, simulation=simulation))
-    return rollout, compile_program(
-        step_program(rollout, RolloutObjectives(rollout), [], False), seeded=["after"], threads=1
-    )
+    program = RolloutObjectives(rollout).stage(rollout, []).program(exact=False)
+    return rollout, compile_program(program, seeded=["after"], threads=1)
 
 
 def grown(rollout: Rollout, kernel: Kernel) -> Array:

@@ -2,57 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen import Kernel
-from symphys.codegen.backends import build_kernel
 from symphys.problem import Problem
+from symphys.transcription.network_rollout.objectives import RolloutObjectives, start_function
 from symphys.transcription.network_rollout.partition import Partition, partition
-from symphys.transcription.network_rollout.step_program import (
-    RESULTS,
-    RolloutObjectives,
-    sense_function,
-    start_function,
-    step_program,
-)
-from symphys.transcription.network_rollout.virtual_machine import VirtualMachineStep
 from symphys.transcription.rollout import Rollout
-from symphys.types import Array
-
-
-class BatchStep(Protocol):
-    """Computes one step of many robots.
-
-    Attributes:
-        seeded: names of the results, in their order.
-        sizes: of each.
-    """
-
-    seeded: tuple[str, ...]
-    sizes: Mapping[str, int]
-
-    def forward(self, rows: Array, smoothing: Sequence[float]) -> Mapping[str, Array]:
-        """(B, m) -> results by name, each (B, size)."""
-
-    def gradient(self, rows: Array, seeds: Array, smoothing: Sequence[float]) -> tuple[Any, Array]:
-        """(B, m), (B, all sizes) -> something, and the slopes (B, m) of seeds . results."""
-
-
-class KernelStep:
-    """The same by a kernel; see ``Stage``."""
-
-    def __init__(self, kernel: Kernel) -> None:
-        """Of a ``step_program``."""
-        self.kernel, self.seeded = kernel, kernel.seeded
-        self.sizes: Mapping[str, int] = {name: kernel.program.outputs[name].size for name in kernel.seeded}
-        self.forward, self.gradient = kernel.forward, kernel.gradient
+from symphys.transcription.stage import BatchStep, KernelStep, Stage, sense_function
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,15 +53,18 @@ class RolloutContext:
         return sense_function(self.rollout, self.sensors)
 
     @cached_property
+    def stage(self) -> Stage:
+        """One step."""
+        return self.objectives.stage(self.rollout, self.sensors)
+
+    @cached_property
     def plain(self) -> BatchStep:
         """The step on casadi's virtual machine."""
-        return VirtualMachineStep(self.rollout, self.objectives, self.sensors)
+        return self.stage.interpreted()
 
-    def compiled(self, exact: bool, backend: str) -> Kernel:
+    def compiled(self, exact: bool, backend: str) -> KernelStep:
         """The step as a kernel of a backend, of one thread; KernelUnavailable if that cannot be."""
-        program = step_program(self.rollout, self.objectives, self.sensors, exact)
-        seeded = [name for name in RESULTS if name in program.outputs]
-        return build_kernel(backend, program, seeded, threads=1)
+        return self.stage.compiled(exact, backend, threads=1)
 
 
 def make_context(problem: Problem) -> RolloutContext:

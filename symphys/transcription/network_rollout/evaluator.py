@@ -11,7 +11,7 @@ import numpy as np
 
 from symphys.codegen.cuda import Device
 from symphys.shooting import Values, WithoutResiduals
-from symphys.transcription.network_rollout.context import BatchStep, RolloutContext
+from symphys.transcription.network_rollout.context import RolloutContext
 from symphys.transcription.network_rollout.forward_backward import (
     BackwardPass,
     ForwardPass,
@@ -20,6 +20,7 @@ from symphys.transcription.network_rollout.forward_backward import (
 )
 from symphys.transcription.network_rollout.layers import Layers
 from symphys.transcription.network_rollout.net_values import KEPT_NUMBERS
+from symphys.transcription.stage import BatchStep
 from symphys.types import Array
 
 LEAST_ROBOTS = 8

@@ -16,9 +16,10 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen.backends.calls import row_by_row
-from symphys.transcription.network_rollout.context import BatchStep, RolloutContext
+from symphys.transcription.network_rollout.context import RolloutContext
 from symphys.transcription.network_rollout.layers import Layers
 from symphys.transcription.network_rollout.net_values import NetValues, values_of
+from symphys.transcription.stage import BatchStep
 from symphys.types import Array
 
 
@@ -193,7 +194,7 @@ class BackwardPass:
         """One step back: adjoints of the state, of the inputs, and zeros for what is sensed before it."""
         parts = {"after": x, "sensed": sensed, "asked": self.asked[k]}
         parts["inputs"] = self.at_u.get(k, np.zeros_like(self.motion.u[0]))
-        seeds = np.concatenate([parts[name] for name in self.batch_step.seeded], axis=1)
+        seeds = np.concatenate([parts[name] for name in self.batch_step.sizes], axis=1)
         _, slopes = self.batch_step.gradient(self.motion.rows[k], seeds, self.smoothing)
         sizes = [self.motion.x.shape[2], self.motion.given.shape[2], self.motion.p.shape[1], 2, self.motion.z.shape[1]]
         before, given, p, _, z = np.split(slopes, np.cumsum(sizes)[:-1], axis=1)
@@ -218,7 +219,7 @@ def back(
     sense, x = context.sense.reverse(count), ends.T
     blank = {name: np.zeros((count, size)) for name, size in batch_step.sizes.items()}
     for k in reversed(range(len(motion.u))):
-        seeds = np.concatenate([(blank | {"after": x})[name] for name in batch_step.seeded], axis=1)
+        seeds = np.concatenate([(blank | {"after": x})[name] for name in batch_step.sizes], axis=1)
         _, slopes = batch_step.gradient(np.tile(motion.rows[k, :1], (count, 1)), seeds, [smoothing])
         given, sensed = slopes[:, nx : nx + nu], np.zeros((count, motion.sensed.shape[2]))
         for net, columns, place in zip(nets, context.columns, context.partition.places, strict=True):

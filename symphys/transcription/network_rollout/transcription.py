@@ -19,7 +19,7 @@ from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.gradient_probe import Probe
 from symphys.transcription.judge import Assessment, assessment
-from symphys.transcription.network_rollout.context import KernelStep, RolloutContext, make_context
+from symphys.transcription.network_rollout.context import RolloutContext, make_context
 from symphys.transcription.network_rollout.evaluator import LargeEvaluator, LargeProbe
 from symphys.transcription.network_rollout.forward_backward import ForwardPass, back, objective_arguments
 from symphys.transcription.objective import limits
@@ -124,15 +124,16 @@ def _evaluator(context: RolloutContext, exact: bool, backend: str, threads: int)
     if backend in PLAIN:
         return LargeEvaluator(context, context.plain, threads), Description("casadi", threads=threads)
     try:
-        kernel = context.compiled(exact, STEPPING[backend])
+        step = context.compiled(exact, STEPPING[backend])
     except (KernelUnavailable, ProgramError) as error:
         note = f"casadi's virtual machine evaluates, which is slower: {error}"
         return LargeEvaluator(context, context.plain, threads), Description("casadi", threads=threads, note=note)
-    precision, device = PRECISIONS[backend], kernel.device if isinstance(kernel, DeviceKernel) else None
+    kernel, precision = step.kernel, PRECISIONS[backend]
+    device = kernel.device if isinstance(kernel, DeviceKernel) else None
     shared, nets = threads if device is None else 1, "nets by matrix products"
     if precision == "single":
         nets += " in single precision, steps in double"
     if device is not None and (lack := device.lacks()):
         device, nets = None, f"{nets}, which the processor computes: {lack}"
     description = replace(described(kernel, perf_counter() - began, precision, nets), threads=shared)
-    return LargeEvaluator(context, KernelStep(kernel), shared, REALS[precision], device), description
+    return LargeEvaluator(context, step, shared, REALS[precision], device), description

@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
-from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
+from symphys.codegen import KernelUnavailable, ProgramError, processors
+from symphys.codegen.backends import BEST, PRECISIONS
 from symphys.codegen.backends.calls import row_by_row
 from symphys.codegen.backends.precision import warn
 from symphys.problem import ALIVE, Problem
 from symphys.transcription.decision_variables import start_of
-from symphys.transcription.open_step.opening import Opening, opened
-from symphys.transcription.open_step.program import (
-    RESULTS,
-    VirtualMachineOpenStep,
+from symphys.transcription.open_step.costs import (
     body_columns,
     looks_at_variables,
     moments,
-    open_program,
-    sense_function,
+    observe_function,
+    open_stage,
 )
+from symphys.transcription.open_step.opening import Opening, opened
 from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import Rollout, symbolic_rollout
+from symphys.transcription.stage import BatchStep
 from symphys.types import Array
 
 
@@ -49,19 +48,6 @@ class StepResult(NamedTuple):
     state: Array
     observation: Array
     cost: Array
-
-
-class Evaluated(Protocol):
-    """What computes rows: a kernel, or casadi's virtual machine."""
-
-    doubt: str
-    """See ``Kernel.doubt``."""
-
-    def forward(self, rows: Array, parameters: Sequence[float]) -> Mapping[str, Array]:
-        """(B, m) -> results by name."""
-
-    def gradient(self, rows: Array, seeds: Array, parameters: Sequence[float]) -> tuple[Any, Array]:
-        """(B, m), (B, all sizes) -> something, and the slopes (B, m) of seeds . results."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +76,7 @@ class CompiledStep:
     _place: Array
     _rollout: Rollout
     _sampler: Sampler | None
-    _evaluated: Evaluated
+    _evaluated: BatchStep
 
     @property
     def state_size(self) -> int:
@@ -208,7 +194,7 @@ class CompiledStep:
             "running": costs[:, None],
             "moments": np.where(self._now(states), costs[:, None], 0.0),
         }
-        whole = np.concatenate([seeds[name] for name in RESULTS], axis=1)
+        whole = np.concatenate([seeds[name] for name in self._evaluated.sizes], axis=1)
         _, slopes = self._evaluated.gradient(rows, np.ascontiguousarray(whole), (self.smoothing,))
         warn(self.problem.name, self._evaluated.doubt)
         x, u, p, now, then, z = np.split(slopes, np.cumsum([nx, nu, np_, 1, 1]), axis=1)
@@ -293,7 +279,7 @@ class CompiledStep:
         rollout = self._rollout
         start = start_of(rollout.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
         x0 = rollout.memory.start(start.x0)
-        sensed = sense_function(rollout, self._opening.sensors)(x0, start.p, 0.0)
+        sensed = observe_function(rollout, self._opening.sensors)(x0, start.p, 0.0)
         results = [x0, ca.vec(start.u), start.p, sensed]
         return ca.Function("start", [rollout.z], [ca.densify(result) for result in results]).expand()
 
@@ -329,18 +315,17 @@ def compile_open_step(
     )
 
 
-def evaluated_by(rollout: Rollout, opening: Opening, exact: bool, backend: str, threads: int) -> tuple[Evaluated, str]:
+def evaluated_by(rollout: Rollout, opening: Opening, exact: bool, backend: str, threads: int) -> tuple[BatchStep, str]:
     """What computes the step, and that in words; casadi's virtual machine where there can be no kernel."""
-    note = ""
+    note, stage = "", open_stage(rollout, opening.sensors)
     if backend in PRECISIONS:
         try:
-            program = open_program(rollout, opening.sensors, exact)
-            seeded = [name for name in RESULTS if name in program.outputs]
-            kernel: Kernel = build_kernel(backend, program, seeded, threads)
-            return kernel, f"{kernel.report.precision} precision, lanes {kernel.report.lanes}, threads {kernel.threads}"
+            step = stage.compiled(exact, backend, threads)
+            report = step.kernel.report
+            return step, f"{report.precision} precision, lanes {report.lanes}, threads {step.kernel.threads}"
         except (KernelUnavailable, ProgramError) as error:
             note = f"; {error}"
-    return VirtualMachineOpenStep(rollout, opening.sensors), f"casadi's virtual machine{note}"
+    return stage.interpreted(), f"casadi's virtual machine{note}"
 
 
 def matrix(name: str, value: ArrayLike, columns: int) -> Array:
