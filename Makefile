@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --editable
 QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-rest test-all test-loaded test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports bench-idto bench-tosses profiles gallery clean
+.PHONY: help demo demo-walk test test-quick test-rest test-all test-loaded test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports bench-idto bench-tosses bench-compare profiles gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /make \1\t/p' Makefile
@@ -141,6 +141,9 @@ bench-tosses: $(VENV)/.benching  ## recorded tosses of a cube and an elbow again
 	$(BIN)/python benchmarks/identify_speed.py $(DATA)
 	$(BIN)/python benchmarks/tosses.py $(DATA)
 	$(BIN)/python benchmarks/tosses.py $(DATA) --study flights,ablations,splits,limits --evaluations 200
+
+bench-compare: $(VENV)/.developing  ## this version against another, in turns: speed, start, memory, numbers; OLD=COMMIT, half an hour
+	$(BIN)/python benchmarks/versions.py $(OLD)
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
 	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --solver gradient,least_squares,ipopt,cma --out build/gallery

@@ -137,7 +137,7 @@ def version(commit: str) -> tuple[Path, str]:
             git("worktree", "add", "--detach", str(tree), commit)
     farm = FARMS / f"farm-{commit or 'here'}" / "symphys"
     farm.mkdir(parents=True, exist_ok=True)
-    for path in (*(tree / "symphys").iterdir(), tree / "solvers", tree / "problems"):
+    for path in (*(tree / "symphys").iterdir(), tree / "solvers", tree / "problems", tree / "benchmarks"):
         link = farm / path.name
         if not link.is_symlink() and path.name != "__pycache__":
             link.symlink_to(path)
@@ -179,6 +179,7 @@ def main() -> None:
     given = parser.parse_args()
     if given.measure:
         make, name = MEASUREMENTS[given.measure]
+        sys.path[0] = str(Path(os.environ["PYTHONPATH"]) / "symphys" / "benchmarks")  # worlds of the same version
         print(json.dumps(make(name)))
         return
     (old, before), (new, now) = version(given.commit), version("")

@@ -40,6 +40,7 @@ DRAWING = (
     "results",
     "suggest.py",
     "trajectory.py",
+    "types.py",
     "verbs.py",
     "version.py",
 )
