@@ -16,18 +16,18 @@ demo: $(VENV)/.installed  ## solve the ball throw with four solvers and write th
 demo-walk: $(VENV)/.installed  ## a quadruped learns to walk, in some two minutes; Ctrl-C stops it, and the same command goes on
 	$(BIN)/symphys solve quadruped_walk --unexamined --out reports/walk
 
-test: $(VENV)/.developing  ## run the tests; ARGS=tests/runs passes options to pytest
+test: $(VENV)/.testing  ## run the tests; ARGS=tests/runs passes options to pytest
 	$(BIN)/pytest -n auto --dist loadfile $(ARGS)
 
-test-quick: $(VENV)/.developing  ## run the tests that tell most in a minute: the house, problem files, the step, solvers
+test-quick: $(VENV)/.testing  ## run the tests that tell most in a minute: the house, problem files, the step, solvers
 	$(BIN)/pytest -n auto --dist loadfile $(QUICK) $(ARGS)
 
 test-rest: $(VENV)/.developing  ## run what test leaves out: whole solves, pages of the documents, laws once more
 	$(BIN)/pytest -n auto --dist worksteal -m "slow and not thorough" $(ARGS)
 
-test-all: test test-rest  ## run all tests but those of thorough
+test-all: $(VENV)/.developing test test-rest  ## run all tests but those of thorough
 
-test-loaded: $(VENV)/.developing  ## run the tests beside four busy loops, which end with them, and with a random PYTHONHASHSEED
+test-loaded: $(VENV)/.testing  ## run the tests beside four busy loops, which end with them, and with a random PYTHONHASHSEED
 	@for loop in 1 2 3 4; do (while kill -0 $$$$; do :; done) > /dev/null 2>&1 & done; \
 	export PYTHONHASHSEED=$$($(BIN)/python -c 'import random; print(random.randrange(2**32))'); \
 	echo "PYTHONHASHSEED=$$PYTHONHASHSEED"; $(BIN)/pytest -n auto --dist loadfile $(ARGS)
@@ -167,8 +167,11 @@ $(VENV)/.installed: setup.cfg pyproject.toml | $(BIN)/python
 $(VENV)/.benching: $(VENV)/.installed
 	$(INSTALL) '.[bench]' && mkdir -p build && touch $@
 
+$(VENV)/.testing: setup.cfg pyproject.toml | $(BIN)/python
+	$(INSTALL) '.[test]' --no-compile && touch $(VENV)/.installed $@
+
 $(VENV)/.developing: setup.cfg pyproject.toml | $(BIN)/python
-	$(INSTALL) '.[dev]' --no-compile && touch $(VENV)/.installed $@
+	$(INSTALL) '.[dev]' --no-compile && touch $(VENV)/.installed $(VENV)/.testing $@
 
 $(VENV)/.documenting: $(VENV)/.installed
 	$(INSTALL) '.[docs]' && touch $@
