@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --editable
-QUICK := $(addprefix tests/,house model expression findings problem solvers dynamics)
+QUICK := $(addprefix tests/,house model expression findings problem solvers/test_toys.py solvers/test_nothing_lost.py dynamics)
 
 .PHONY: help demo demo-walk test test-quick test-rest test-all test-loaded test-pipelines thorough lint typecheck docs docs-links reference bench bench-contact bench-robots bench-mpc bench-table1 bench-gpu bench-walk bench-lessons stress bench-pipelines bench-runs bench-gaits bench-imports bench-idto bench-tosses bench-compare profiles gallery clean
 
