@@ -2,7 +2,8 @@
 
 ``python benchmarks/versions.py COMMIT`` compares the working tree with a commit. Each measurement is a process of its
 own, with the code of this file; versions take turns, so that other work on the machine is in both. Printed is the
-median over the turns of new / old, with its bar where there is one. ``--out FILE`` keeps the seconds as JSON, with the
+median over the turns of new / old, with its bar where there is one. Where kernels are the same files, to the byte, what
+runs them differs by noise alone. ``--out FILE`` keeps the seconds as JSON, with the
 machine and both commits.
 """
 
@@ -198,6 +199,10 @@ def main() -> None:
             bar = next((bar for start, bar in BARS.items() if key.startswith(start)), np.inf)
             verdict = "" if ratio <= bar else f"  beyond {bar:.3f}"
             print(f"{name:28} {key:14} {min(one):12.6g} {min(other):12.6g} {ratio:8.3f}{verdict}", flush=True)
+    one, other = ({path.name for path in (farm / "kernels").glob("*.so")} for farm in (old, new))
+    print(
+        f"\nkernels: {len(one & other)} the same, {len(one - other)} of the old version alone, {len(other - one)} new"
+    )
     if given.out:
         given.out.write_text(json.dumps(kept, indent=1), encoding="utf-8")
 
