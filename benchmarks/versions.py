@@ -199,10 +199,8 @@ def main() -> None:
             bar = next((bar for start, bar in BARS.items() if key.startswith(start)), np.inf)
             verdict = "" if ratio <= bar else f"  beyond {bar:.3f}"
             print(f"{name:28} {key:14} {min(one):12.6g} {min(other):12.6g} {ratio:8.3f}{verdict}", flush=True)
-    one, other = ({path.name for path in (farm / "kernels").glob("*.so")} for farm in (old, new))
-    print(
-        f"\nkernels: {len(one & other)} the same, {len(one - other)} of the old version alone, {len(other - one)} new"
-    )
+    built, rebuilt = ({path.name for path in (farm / "kernels").glob("*.so")} for farm in (old, new))
+    print(f"\nkernels: {len(built & rebuilt)} the same, {len(built - rebuilt)} old, {len(rebuilt - built)} new")
     if given.out:
         given.out.write_text(json.dumps(kept, indent=1), encoding="utf-8")
 
