@@ -539,7 +539,7 @@ TABLE = [
     *rows("free_kick", "least_squares", quick="least_squares", law=curls_into_the_corner, polish=True),
     *rows("hopper_gait", "ipopt", "ipopt", law=closes_the_gait, finer=1, seeds=2),
     *rows("hopper_jump", "gradient", "gradient", of=3, law=jumps_half_a_metre),
-    *rows("hopper_jump", "gradient", "gradient", of=3, wanted=2, law=jumps_half_a_metre),
+    *rows("hopper_jump", "gradient", "gradient", of=5, wanted=2, law=jumps_half_a_metre),
     *rows("ice_and_asphalt", "least_squares ilqr", "ilqr", law=stops_on_asphalt),
     *rows("juggle", {"gradient": 60, "least_squares": 6, "ipopt": 30, "cma": 1500}, law=brings_bat_and_ball_back,
           seeds=2, backend="casadi"),
