@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -29,9 +29,6 @@ from symphys.transcription.formulas.motion_parts import part_arguments
 from symphys.transcription.objective import plain_sums
 from symphys.transcription.termination import termination_function
 from symphys.types import Expr
-
-if TYPE_CHECKING:  # the physics of a step is imported where it is called: a start from a kept kernel needs none
-    pass
 
 T = TypeVar("T")
 
