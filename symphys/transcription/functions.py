@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.transcription.objective import Terms, terms
+from symphys.transcription.objective import Terms, rollout_terms
 from symphys.transcription.rollout import Rollout
 
 
@@ -21,7 +21,7 @@ class ExpressionFunctions:
     @cached_property
     def terms(self) -> Terms:
         """All that is asked of the rollout, as expressions."""
-        return terms(self._rollout) if self._asked is None else self._asked
+        return rollout_terms(self._rollout) if self._asked is None else self._asked
 
     @property
     def _merit(self) -> Any:

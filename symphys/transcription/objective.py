@@ -1,46 +1,99 @@
-"""Costs, targets and constraints along a rollout: the objective, its residuals, and the errors it is judged by."""
+"""Costs, targets and constraints along a rollout: the objective, its residuals, and the errors it is judged by.
+
+``terms`` formulates them once, of the symbols of ``FormulaSamples``. Casadi's virtual machine puts expressions of a
+rollout in their place, a kernel the places of its vector, and rollouts with large nets put arrays there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from symphys.expression import Formula
+from symphys.expression import Formula, MotionPart
 from symphys.maths.smoothing import length
 from symphys.problem import Constraint, Cost, Phase, Problem, Target
+from symphys.transcription.rollout import Rollout
 from symphys.types import Expr
 
+LONG = 512
+"""Numbers of a sum from which it may stand outside the function of all terms."""
+Series = tuple[Formula, int]
+"""A formula at the starts (0) or ends (1) of all steps."""
+Total = tuple[tuple[Series, ...], float | None]
+"""Series, and the scale of the squares that are added up too; None: there are none."""
+Sums = Callable[[float | None], tuple[Expr, Expr | None]]
 
-class Sampled(Protocol):
-    """A rollout that can be asked for the values of formulas along it; see ``Rollout``."""
+
+class FormulaSamples:
+    """What a problem may ask of a rollout, as symbols (MX) in whose place an evaluator puts its own values.
+
+    Attributes:
+        z: (n,) decision vector.
+        p: (np,) parameters.
+        moments: states (nx,) and inputs (nu,) by the numbers of the state and of the step, in the order of requests.
+        series: (m, N) values of a formula at the starts (0) or ends (1) of all steps, likewise.
+        totals: (m,) or (m + 1,) sums over whole series, see ``Total``; there are none unless they are ``separate``.
+    """
+
+    def __init__(self, rollout: Rollout, separate: bool = False) -> None:
+        """Nothing is asked for yet.
+
+        Args:
+            rollout: of the problem.
+            separate: whether long sums are symbols too, so that they need not be part of one function.
+        """
+        self.rollout, self.problem, self.steps, self._separate = rollout, rollout.problem, rollout.steps, separate
+        self.z, self.p = ca.MX.sym("z", rollout.z.shape[0]), ca.MX.sym("p", rollout.p.shape[0])
+        self.interval = rollout.parameters.step_length(self.problem.simulation, self.p)
+        self.moments: dict[tuple[int, int], tuple[Expr, Expr]] = {}
+        self.series: dict[Series, Expr] = {}
+        self.totals: dict[Total, Expr] = {}
 
     @property
-    def problem(self) -> Problem:
-        """What is rolled out."""
-
-    @property
-    def steps(self) -> int:
-        """N."""
-
-    @property
-    def interval(self) -> Expr:
-        """[s] the time step: a number, or an expression of z where a variable sets the duration."""
+    def symbols(self) -> list[Expr]:
+        """All of them: z, p, moments, series and totals."""
+        moments = [symbol for pair in self.moments.values() for symbol in pair]
+        return [self.z, self.p, *moments, *self.series.values(), *self.totals.values()]
 
     def at(self, formula: Formula, when: str | float) -> Expr:
-        """(m,) at the end or at a time."""
+        """Return the value (m,) of a formula at the end or at the step nearest to a time; inputs are that step's."""
+        k = self.rollout.tick(when)
+        key = k, min(k, self.steps - 1)
+        if key not in self.moments:
+            x0, given = self.rollout.x0, self.rollout.given
+            self.moments[key] = ca.MX.sym("x", x0.shape[0]), ca.MX.sym("u", given.shape[0])
+        x, u = self.moments[key]
+        parts = [ca.vertcat(*(self._part(part) for part in formula.parts))] if formula.parts else []
+        return self.rollout.compiled(formula)(x, u, self.p, k * self.interval, self.z, *parts)
 
-    def after_steps(self, formula: Formula) -> Expr:
-        """(m, N) at the end of every step."""
+    def _part(self, part: MotionPart) -> Expr:
+        """What a formula takes of the whole motion (m,); integrals by the rule of running costs."""
+        if part.kind in ("start", "end"):
+            return self.at(part.formula, 0.0 if part.kind == "start" else "end")
+        average = _mean(ca.horzcat(*map(self.values, self.over_steps(part.formula))))
+        return average if part.kind == "average" else self.interval * self.steps * average
 
-    def over_steps(self, formula: Formula) -> Expr:
-        """(m, N or 2N) samples whose mean is the time average."""
+    def over_steps(self, formula: Formula) -> tuple[Series, ...]:
+        """Return the series whose mean is the time average; two for what moves (trapezoid)."""
+        return tuple((formula, shift) for shift in ((0, 1) if self.rollout.moves(formula) else (0,)))
 
-    def sums(self, samples: Expr, scale: Any = None) -> tuple[Expr, Expr]:
-        """(m,) the sum of the columns; the sum of the squares of scale times each number, None without a scale."""
+    def values(self, series: Series) -> Expr:
+        """Return the values (m, N) of a series."""
+        size = int(self.rollout.compiled(series[0]).size1_out(0))
+        return self.series.setdefault(series, ca.MX.sym("series", size, self.steps))
+
+    def sums(self, series: tuple[Series, ...], scale: float | None) -> tuple[Expr, Expr | None]:
+        """Return the sum (m,) of the columns, and with a scale the sum of the squares of scale times each number."""
+        samples = ca.horzcat(*map(self.values, series))
+        if not self._separate or samples.numel() < LONG:
+            return plain_sums(samples, scale)
+        rows = int(samples.shape[0])
+        total = self.totals.setdefault((series, scale), ca.MX.sym("total", rows + (scale is not None)))
+        return total[:rows], None if scale is None else total[rows]
 
 
 @dataclass(frozen=True)
@@ -72,12 +125,24 @@ class Terms:
     means: Expr
 
 
-def terms(rollout: Sampled) -> Terms:
-    """The terms of the rollout's problem."""
-    problem = rollout.problem
-    costs = [_cost(rollout, cost) for cost in problem.costs]
-    targets = [(target, rollout.at(target.formula, target.at)) for target in problem.targets]
-    limits = [_Limit(rollout, constraint) for constraint in problem.constraints]
+def rollout_terms(rollout: Rollout) -> Terms:
+    """Return the terms of a rollout as expressions of its z and smoothing."""
+    samples = FormulaSamples(rollout)
+    asked = terms(samples)
+    moments = [part for k, step in samples.moments for part in (rollout.x[:, k], rollout.u[:, step])]
+    series = [rollout.sampled(*each) for each in samples.series]
+    parts = {name: part for name, part in vars(asked).items() if isinstance(part, ca.MX)}
+    function = ca.Function("terms", samples.symbols, list(parts.values()))
+    found = function.call([rollout.z, rollout.p, *moments, *series], True, False)
+    return replace(asked, **dict(zip(parts, found, strict=True)))
+
+
+def terms(samples: FormulaSamples) -> Terms:
+    """Return the terms of a problem as expressions of the symbols of its samples."""
+    problem = samples.problem
+    costs = [_cost(samples, cost) for cost in problem.costs]
+    targets = [(target, samples.at(target.formula, target.at)) for target in problem.targets]
+    limits = [_Limit(samples, constraint) for constraint in problem.constraints]
     residuals = [np.sqrt(target.weight) * value for target, value in targets]
     objective = sum((cost.value for cost in costs), ca.MX(0)) + sum(
         (ca.sumsqr(residual) for residual in residuals), ca.MX(0)
@@ -98,7 +163,7 @@ def terms(rollout: Sampled) -> Terms:
         lower=np.concatenate([limit.lower for limit in limits] or [np.zeros(0)]),
         upper=np.concatenate([limit.upper for limit in limits] or [np.zeros(0)]),
         names=tuple(limit.name for limit in limits for _ in range(limit.lower.size)),
-        outputs=_stack([rollout.at(output.formula, output.at) for output in problem.outputs]),
+        outputs=_stack([samples.at(output.formula, output.at) for output in problem.outputs]),
         means=_stack(
             [cost.mean for cost in costs] + [value for _, value in targets] + [limit.mean for limit in limits]
         ),
@@ -149,8 +214,8 @@ def _stack(parts: list[Expr]) -> Expr:
     return ca.vertcat(ca.MX(0, 1), *(ca.vec(part) for part in parts))
 
 
-def plain_sums(samples: Expr, scale: Any = None) -> tuple[Expr, Expr]:
-    """See ``Sampled.sums``."""
+def plain_sums(samples: Expr, scale: Any = None) -> tuple[Expr, Expr | None]:
+    """Return the sum of the columns, and that of the squares of scale times each number."""
     return ca.sum2(samples), None if scale is None else ca.sumsqr(scale * ca.vec(samples))
 
 
@@ -160,7 +225,7 @@ def _mean(samples: Expr) -> Expr:
 
 
 def within(samples: Expr, phase: Phase | None, steps: int) -> tuple[Expr, int]:
-    """The columns of a phase, of N or 2N as ``Sampled.over_steps`` gives them, and how many steps it has."""
+    """Return the columns of a phase, of one series (N) or two (2N), and how many steps the phase has."""
     if phase is None:
         return samples, steps
     first, last = phase.ticks(steps)
@@ -176,18 +241,24 @@ class _Cost(NamedTuple):
     mean: Expr
 
 
-def _cost(rollout: Sampled, cost: Cost) -> _Cost:
-    if cost.at == "always":
-        samples, steps = within(rollout.over_steps(cost.formula), cost.during, rollout.steps)
-        weight = cost.weight * rollout.interval * steps / samples.shape[1]
-    else:
-        samples, weight = rollout.at(cost.formula, cost.at), cost.weight
+def _cost(samples: FormulaSamples, cost: Cost) -> _Cost:
+    if cost.at != "always":
+        return _weighed(cost, samples.at(cost.formula, cost.at), cost.weight)
+    series = samples.over_steps(cost.formula)
+    values, steps = within(ca.horzcat(*map(samples.values, series)), cost.during, samples.steps)
+    weight = cost.weight * samples.interval * steps / values.shape[1]
+    whole = cost.during is None and not (cost.squares and samples.problem.free_duration)
+    return _weighed(cost, values, weight, (lambda scale: samples.sums(series, scale)) if whole else None)
+
+
+def _weighed(cost: Cost, values: Expr, weight: Any, sums: Sums | None = None) -> _Cost:
+    """A cost of values (m, samples); ``sums``: of a scale, where it is not one function that adds them up."""
     scale = ca.sqrt(weight) if cost.squares else None
-    total, squares = rollout.sums(samples, scale)
-    mean = total / samples.shape[1]
+    total, squares = plain_sums(values, scale) if sums is None else sums(scale)
+    mean = total / values.shape[1]
     if scale is None:
         return _Cost(weight * total, None, mean)
-    return _Cost(squares, scale * ca.vec(samples), mean)
+    return _Cost(squares, scale * ca.vec(values), mean)
 
 
 def _miss(target: Target, value: Expr) -> Expr:
@@ -197,19 +268,19 @@ def _miss(target: Target, value: Expr) -> Expr:
 class _Limit:
     """One constraint: its values and their mean, bounds, penalty residuals and error."""
 
-    def __init__(self, rollout: Sampled, constraint: Constraint) -> None:
+    def __init__(self, samples: FormulaSamples, constraint: Constraint) -> None:
         always = constraint.at == "always"
         if always:
-            values, _ = within(rollout.after_steps(constraint.formula), constraint.during, rollout.steps)
+            values, _ = within(samples.values((constraint.formula, 1)), constraint.during, samples.steps)
         else:
-            values = rollout.at(constraint.formula, constraint.at)
+            values = samples.at(constraint.formula, constraint.at)
         count = values.shape[1]
         self.name = constraint.name
         self.value, self.mean = ca.vec(values), _mean(values)
         size = values.shape[0]
         self.lower, self.upper = _bounds(constraint, size, count)
         violation = self._violation()
-        self.penalty = ca.sqrt(constraint.penalty * (rollout.interval if always else 1.0)) * violation
+        self.penalty = ca.sqrt(constraint.penalty * (samples.interval if always else 1.0)) * violation
         total: Expr = ca.sum1(violation)
         self.error = ca.if_else(total >= 0, ca.mmax(violation), total) / constraint.tolerance  # mmax hides a NaN
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -20,10 +20,9 @@ from symphys.problem import ALIVE, Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import Places, control_calls
 from symphys.transcription.formula_names import spans
-from symphys.transcription.formulas.long_sums import LONG, sums_in_calls
-from symphys.transcription.formulas.motion_parts import part_arguments
+from symphys.transcription.formulas.long_sums import sums_in_calls
 from symphys.transcription.gradient_probe import combined
-from symphys.transcription.objective import Terms, plain_sums, terms
+from symphys.transcription.objective import FormulaSamples, Series, Terms, terms
 from symphys.transcription.rollout import Rollout
 from symphys.types import Expr
 
@@ -36,11 +35,8 @@ ASIDE = frozenset({"name", "title", "description", "file", "text", "settings", "
 """What no program depends on."""
 
 
-class ProgramSamples:
-    """A rollout's values where a problem asks for them, as symbols (MX), and the calls that compute them.
-
-    Stands in for ``Rollout`` where costs, targets and constraints are put together; see its methods.
-    """
+class RolloutPlaces:
+    """Where a program keeps a rollout; see ``controller_calls.Places``."""
 
     def __init__(self, rollout: Rollout, by_step: Sequence[str] = ()) -> None:
         """Places for z, smoothing, times, parameters, inputs and states; ``by_step`` as in ``rollout_program``."""
@@ -55,76 +51,18 @@ class ProgramSamples:
         self.u = self.given if rollout.feedback is None else self.layout.series(nu, self.steps)
         self.x = self.layout.series(nx, self.steps + 1)
         self.time = self.layout.series(1, self.steps + 1)
-        self.calls: list[FunctionCall] = []
-        self.sum_calls: list[FunctionCall] = []
-        self.symbols: dict[Place, Expr] = {}
-        self._series_of: dict[int, tuple[Expr, list[Place]]] = {}
 
-    @property
-    def interval(self) -> Expr:
-        """[s]: see ``Rollout.interval``."""
-        if not self.problem.free_duration:
-            return self.rollout.dt
-        return self.rollout.parameters.step_length(self.problem.simulation, self.symbol(self.p))
-
-    def symbol(self, place: Place) -> Expr:
-        """The symbol that stands for a still place."""
-        if place not in self.symbols:
-            self.symbols[place] = ca.MX.sym(f"at{place.offset}", place.size)
-        return self.symbols[place]
-
-    def at(self, formula: Formula, when: str | float) -> Expr:
-        """(m,): see ``Rollout.at``."""
-        k = self.steps if isinstance(when, str) else self.rollout.tick(when)
-        x, u = self.x.later(k).still(), self.u.later(min(k, self.steps - 1)).still()
-        p, z = self.symbol(self.p), self.symbol(self.z)
-        parts = part_arguments(self, formula)
-        return self.rollout.compiled(formula)(self.symbol(x), self.symbol(u), p, k * self.interval, z, *parts)
-
-    def after_steps(self, formula: Formula) -> Expr:
-        """(m, N): see ``Rollout.after_steps``."""
-        return self._series(formula, 1)
-
-    def over_steps(self, formula: Formula) -> Expr:
-        """(m, N or 2N): see ``Rollout.over_steps``."""
-        before = self._series(formula, 0)
-        if not self.rollout.moves(formula):
-            return before
-        after = self.after_steps(formula)
-        return self._known(ca.horzcat(before, after), [*self._places(before), *self._places(after)])
-
-    def sums(self, samples: Expr, scale: Any = None) -> tuple[Expr, Expr]:
-        """See ``Sampled.sums``; of many samples in calls."""
-        places, fixed = self._places(samples), scale is None or not isinstance(scale, ca.MX)
-        if not places or samples.numel() < LONG or not fixed:
-            return plain_sums(samples, scale)
-        rows = int(samples.shape[0])
-        calls, total = sums_in_calls(self.layout, places, rows, None if scale is None else float(scale))
-        self.sum_calls += calls
-        symbol = self.symbol(total)
-        return symbol[:rows], None if scale is None else symbol[rows]
-
-    def recorded(self, formula: Formula, shift: int = 1) -> Place:
-        """The formula's values of all steps, one after the other: at their starts (0) or at their ends (1)."""
-        function = self.rollout.compiled(formula)
-        size = int(function.size1_out(0))
-        out = self.layout.series(size, self.steps)
+    def recorded(self, formula: Formula, shift: int) -> FunctionCall:
+        """A call of each step for the value of a formula at its start (0) or end (1); results lie one after another."""
+        function = dense(self.rollout.compiled(formula))
+        out = self.layout.series(int(function.size1_out(0)), self.steps)
         places = (self.x.later(shift), self.u, self.p, self.time.later(shift), self.z)
-        self.calls.append(FunctionCall(dense(function), places, (out,)))
-        return Place(out.offset, size * self.steps)
+        return FunctionCall(function, places, (out,))
 
-    def _series(self, formula: Formula, shift: int) -> Expr:
-        whole = self.recorded(formula, shift)
-        return self._known(ca.reshape(self.symbol(whole), whole.size // self.steps, self.steps), [whole])
-
-    def _known(self, samples: Expr, places: list[Place]) -> Expr:
-        """The samples, of which it is known from now on where they lie."""
-        self._series_of[samples.__hash__()] = samples, places
-        return samples
-
-    def _places(self, samples: Expr) -> list[Place]:
-        """Where samples lie, one series after the other; nothing if that is not known."""
-        return self._series_of.get(samples.__hash__(), (None, []))[1]
+    def whole(self, call: FunctionCall) -> Place:
+        """All results of a call of each step, one after the other."""
+        (out,) = call.outputs
+        return Place(out.offset, out.size * self.steps)
 
 
 def dense(function: ca.Function) -> ca.Function:
@@ -158,28 +96,30 @@ def rollout_program(
 def _rollout_program(
     rollout: Rollout, exact: bool, recorded: Mapping[str, Formula], shift: int, by_step: Sequence[str]
 ) -> Program:
-    samples = ProgramSamples(rollout, by_step)
+    places = RolloutPlaces(rollout, by_step)
+    samples = FormulaSamples(rollout, separate=True)
     asked = terms(samples)
-    series = {name: samples.recorded(formula, shift) for name, formula in recorded.items()}
-    body = [*_knot_calls(samples), *control_calls(rollout, samples), *step_calls(samples, exact)]
-    epilogue, outputs = _epilogue(samples, asked)
-    alive = _alive(samples)
+    formulas = {each: places.recorded(*each) for each in samples.series}
+    series = {name: places.recorded(formula, shift) for name, formula in recorded.items()}
+    body = [*_knot_calls(places), *control_calls(rollout, places), *step_calls(places, exact)]
+    epilogue, outputs = _epilogue(places, samples, asked, formulas)
+    alive = _alive(places)
     if alive is not None:
         outputs["alive"] = alive.later(rollout.steps).still()
-    outputs |= series
+    outputs |= {name: places.whole(call) for name, call in series.items()}
     times = tuple(np.arange(rollout.steps + 1) * rollout.dt)
-    fixed = () if rollout.problem.free_duration else ((Place(samples.time.offset, len(times)), times),)
+    fixed = () if rollout.problem.free_duration else ((Place(places.time.offset, len(times)), times),)
     return Program(
-        size=samples.layout.size,
-        z=samples.z,
-        parameters=samples.smoothing,
+        size=places.layout.size,
+        z=places.z,
+        parameters=places.smoothing,
         steps=rollout.steps,
         outputs=outputs,
-        prologue=_prologue(samples),
-        body=(*body, *samples.calls),
-        epilogue=(*samples.sum_calls, epilogue),
+        prologue=_prologue(places),
+        body=(*body, *formulas.values(), *series.values()),
+        epilogue=epilogue,
         constants=fixed,
-        discounted=AdjointDiscount(samples.x, alive),
+        discounted=AdjointDiscount(places.x, alive),
     )
 
 
@@ -259,7 +199,7 @@ def _guarded(traced: TracedCall, places: Mapping[TracedVector, Place], zeros: Pl
     return FunctionCall(traced.function, inputs, outputs, False, guard, otherwise, section, beside)
 
 
-def _alive(samples: ProgramSamples) -> Place | None:
+def _alive(samples: RolloutPlaces) -> Place | None:
     """Whether a motion is not over at each step; None where it never is."""
     memory = samples.rollout.memory
     return _part(samples.x, memory.columns[ALIVE]) if memory.terminates else None
@@ -279,7 +219,7 @@ def _part(place: Place, columns: slice) -> Place:
     return Place(place.offset + start, stop - start, place.stride)
 
 
-def _knot_calls(samples: ProgramSamples) -> list[FunctionCall]:
+def _knot_calls(samples: RolloutPlaces) -> list[FunctionCall]:
     """The call that adds a step's knots to its other inputs, which are 0 where nothing else sets them.
 
     There is none where the prologue writes inputs as they are, and none without inputs.
@@ -301,7 +241,7 @@ def _knot_calls(samples: ProgramSamples) -> list[FunctionCall]:
     return [FunctionCall(function, (samples.begun, *places), (samples.given,))]
 
 
-def _prologue(samples: ProgramSamples) -> tuple[FunctionCall, ...]:
+def _prologue(samples: RolloutPlaces) -> tuple[FunctionCall, ...]:
     rollout = samples.rollout
     first = start_of(samples.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z, samples.by_step)
     u0: Expr = first.u if samples.begun.size else ca.MX(0, 1)
@@ -317,7 +257,10 @@ def _prologue(samples: ProgramSamples) -> tuple[FunctionCall, ...]:
     return start, FunctionCall(times, (samples.p,), (Place(samples.time.offset, samples.steps + 1),))
 
 
-def _epilogue(samples: ProgramSamples, asked: Terms) -> tuple[FunctionCall, dict[str, Place]]:
+def _epilogue(
+    places: RolloutPlaces, samples: FormulaSamples, asked: Terms, formulas: Mapping[Series, FunctionCall]
+) -> tuple[tuple[FunctionCall, ...], dict[str, Place]]:
+    """The calls after the last step, and where their results lie."""
     parts = {
         "merit": asked.objective + asked.penalties,
         "objective": asked.objective,
@@ -330,8 +273,20 @@ def _epilogue(samples: ProgramSamples, asked: Terms) -> tuple[FunctionCall, dict
     if asked.residuals is not None:
         parts["residuals"] = asked.residuals
     parts = {name: ca.densify(part) for name, part in parts.items() if part.shape[0]}
+    series = {each: places.whole(call) for each, call in formulas.items()}
+    moments = [at for k, step in samples.moments for at in (places.x.later(k).still(), places.u.later(step).still())]
+    sums, totals = list[FunctionCall](), list[Place]()
+    for (keys, scale), symbol in samples.totals.items():
+        rows = symbol.numel() - (scale is not None)
+        calls, total = sums_in_calls(places.layout, [series[key] for key in keys], rows, scale)
+        sums += calls
+        totals.append(total)
+    lie = [places.z, places.p, *moments, *series.values(), *totals]
     read = {symbol.__hash__() for symbol in ca.symvar(ca.veccat(*parts.values()))}
-    symbols = {place: symbol for place, symbol in samples.symbols.items() if symbol.__hash__() in read}
-    function = ca.Function("aims", list(symbols.values()), list(parts.values())).expand()
-    outputs = {name: samples.layout.take(int(part.shape[0])) for name, part in parts.items()}
-    return FunctionCall(function, tuple(symbols), tuple(outputs.values())), outputs
+    used = [(symbol, at) for symbol, at in zip(samples.symbols, lie, strict=True) if symbol.__hash__() in read]
+    function = ca.Function("objective", [symbol for symbol, _ in used], list(parts.values())).expand()
+    columns = [ca.SX.sym("a", at.size) for _, at in used]
+    shaped = [ca.reshape(column, symbol.shape) for column, (symbol, _) in zip(columns, used, strict=True)]
+    function = ca.Function("objective", columns, function.call(shaped, True, False))
+    outputs = {name: places.layout.take(int(part.shape[0])) for name, part in parts.items()}
+    return (*sums, FunctionCall(function, tuple(at for _, at in used), tuple(outputs.values()))), outputs

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import casadi as ca
 import numpy as np
@@ -25,8 +25,6 @@ from symphys.transcription.formula_names import (
     moving_names,
     varied_parameters,
 )
-from symphys.transcription.formulas.motion_parts import part_arguments
-from symphys.transcription.objective import plain_sums
 from symphys.transcription.termination import termination_function
 from symphys.types import Expr
 
@@ -186,40 +184,20 @@ class Rollout:
         return self.parameters.step_length(self.problem.simulation, self.p)
 
     def compiled(self, formula: Formula) -> ca.Function:
-        """The formula as a casadi function of (x, u, p, time, z), and of its parts; see ``part_arguments``."""
+        """The formula as a casadi function of (x, u, p, time, z), and of its parts, one after the other."""
         return compile_formula(self.problem, self.world, self.inputs, self.parameters, self.memory, formula)
 
     def tick(self, when: str | float) -> int:
         """The number of the state at the end, or nearest to a time [s]."""
         return self.steps if isinstance(when, str) else round(when / self.dt)
 
-    def at(self, formula: Formula, when: str | float) -> Expr:
-        """(m,): the formula's value at the end or at the step nearest to a time; inputs are those of that step."""
-        k = self.tick(when)
-        u = self.u[:, min(k, self.steps - 1)]
-        parts = part_arguments(self, formula)
-        return self.compiled(formula)(self.x[:, k], u, self.p, k * self.interval, self.z, *parts)
-
-    def after_steps(self, formula: Formula) -> Expr:
-        """(m, N): its value at the end of every step, with that step's inputs."""
-        return self._mapped(formula, self.x[:, 1:], np.arange(1, self.steps + 1))
-
-    def over_steps(self, formula: Formula) -> Expr:
-        """(m, N or 2N): samples whose mean is the time average; 2N for what moves (trapezoid)."""
-        before = self._mapped(formula, self.x[:, :-1], np.arange(self.steps))
-        if not self.moves(formula):
-            return before
-        return ca.horzcat(before, self.after_steps(formula))
-
-    def sums(self, samples: Expr, scale: Any = None) -> tuple[Expr, Expr]:
-        """See ``Sampled.sums``."""
-        return plain_sums(samples, scale)
-
-    def _mapped(self, formula: Formula, x: Expr, ticks: Any) -> Expr:
-        stage = self.compiled(formula).map(self.steps)
+    def sampled(self, formula: Formula, shift: int) -> Expr:
+        """Return the values (m, N) of a formula at the starts (0) or ends (1) of all steps, with each step's inputs."""
+        x, ticks = self.x[:, shift : self.steps + shift], np.arange(shift, self.steps + shift)
         p, z = ca.repmat(self.p, 1, self.steps), self.z
-        shared = ca.repmat(z, 1, self.steps) if self._uses_z(formula) else ca.DM(z.shape[0], self.steps)
-        return stage(x, self.u, p, ca.DM(ticks).T * self.interval, shared)
+        named = any(variable.name in formula.names for variable in self.problem.variables)
+        shared = ca.repmat(z, 1, self.steps) if named else ca.DM(z.shape[0], self.steps)
+        return self.compiled(formula).map(self.steps)(x, self.u, p, ca.DM(ticks).T * self.interval, shared)
 
     def moves(self, formula: Formula) -> bool:
         """Whether the formula depends on what changes within a step."""
@@ -228,9 +206,6 @@ class Rollout:
     @cached_property
     def _moving(self) -> frozenset[str]:
         return moving_names(self.world).union(*(each.names for each in self.problem.references))
-
-    def _uses_z(self, formula: Formula) -> bool:
-        return any(variable.name in formula.names for variable in self.problem.variables)
 
 
 def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None) -> Rollout:

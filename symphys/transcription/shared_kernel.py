@@ -14,31 +14,16 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen.backends import Backend, BackendSource, choose
-from symphys.problem import Problem, Variable, VariableSlot
+from symphys.problem import Problem, Variable
 from symphys.shooting import Evaluator, Nlp, Values
-from symphys.transcription.formula_names import swept_parameters
 from symphys.transcription.functions import ExpressionFunctions
-from symphys.transcription.objective import Terms, terms
+from symphys.transcription.objective import Terms, rollout_terms
 from symphys.transcription.program import rollout_program
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.types import Array
 
 KEPT: dict[tuple[object, ...], Backend] = {}
 """The backend of the last problem of a sweep, by all that it is made from."""
-
-
-def inputs_of(problem: Problem) -> tuple[Variable, ...]:
-    """A variable for each parameter in which the problems of its sweep differ, and that no variable of its own sets."""
-    own = {slot.name for variable in problem.variables for slot in variable.slots}
-    values = {name: problem.parameters[name] for name in swept_parameters(problem) if name not in own}
-    if not values:
-        return ()
-    from symphys.transcription.randomization.numbers import hidden
-
-    return tuple(
-        hidden(f"{name} of the sweep", "parameter", VariableSlot(name, tuple(range(value.size))), value)
-        for name, value in values.items()
-    )
 
 
 def shared_backend(
@@ -48,14 +33,14 @@ def shared_backend(
 
     Args:
         problem: of a sweep.
-        inputs: see ``inputs_of``.
+        inputs: see ``swept_inputs``.
         nlp: of the problem itself, see ``Nlp.expression``.
         exact: as for ``transcribe``.
         backend: likewise.
         threads: likewise.
     """
     rollout = symbolic_rollout(replace(problem, variables=(*problem.variables, *inputs)))
-    asked = terms(rollout)
+    asked = rollout_terms(rollout)
     key = (whole(rollout, asked), exact, backend, threads)
     if key in KEPT:
         made = KEPT[key].description

@@ -12,11 +12,12 @@ from symphys.problem import GuessedMotion, Problem
 from symphys.shooting import GuessedStates, ShootingProblem, StagedProblem
 from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
-from symphys.transcription.network_rollout import has_large_nets, require_fixed_duration, require_small_nets
+from symphys.transcription.network_rollout import has_large_nets
 from symphys.transcription.objective import bounds, has_squares, limits
 from symphys.transcription.program import program_identity, rollout_program
+from symphys.transcription.randomization.numbers import swept_inputs
 from symphys.transcription.rollout import Rollout, symbolic_rollout
-from symphys.transcription.shared_kernel import inputs_of, shared_backend
+from symphys.transcription.shared_kernel import shared_backend
 from symphys.transcription.transcription import Transcription
 
 
@@ -40,18 +41,14 @@ def transcribe(
         >>> made.judge(made.shooting.start(0)).solved, made.shooting.n
         (False, 6)
     """
-    if problem.varied and (problem.scenarios is not None or has_large_nets(problem)):
-        problem = replace(problem, varied=frozenset())  # their kernels are made in other ways
     if problem.scenarios is not None:
-        from symphys.transcription.randomization import with_scenarios
+        from symphys.transcription.randomization.transcription import with_scenarios
 
-        require_small_nets(problem, "a problem with scenarios")
         plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads)
         return with_scenarios(plain, problem, exact, backend, threads)
     if has_large_nets(problem):
         from symphys.transcription.network_rollout import transcribe_large
 
-        require_fixed_duration(problem)
         return transcribe_large(problem, exact, backend, threads)
     return _transcribed(problem, exact, backend, threads)
 
@@ -96,7 +93,7 @@ def _evaluating(
 ) -> Backend:
     """What evaluates a rollout; problems of a sweep share a kernel."""
     problem = rollout.problem
-    inputs = () if backend == "casadi" else inputs_of(problem)
+    inputs = () if backend == "casadi" else swept_inputs(problem)
     if inputs:
         return shared_backend(problem, inputs, functions.nlp, exact, backend, threads)
     source = BackendSource(functions, lambda: rollout_program(rollout, exact), exact, program_identity(problem, exact))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ from worlds.monopod import MONOPOD
 
 from symphys.errors import ProblemError
 from symphys.problem import load_problem
+from symphys.problem.sweeps.points import combined, swept
+from symphys.problem.sweeps.texts import read_axes
+from symphys.shooting import ScenarioEvaluator
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.network_rollout import LargeEvaluator, LargeTranscription, net_values, require_small_nets
 from symphys.transcription.network_rollout import evaluator as evaluators
@@ -178,6 +182,52 @@ value = "integral(bob.velocity[2]**2) / (1 + end.bob.position[2] - start.bob.pos
 """With a force law, a reference, a phase, and parts of the whole motion."""
 
 
+FREE = (
+    LIFTS[1]
+    + """
+[[variable]]
+name = "T"
+sets = "simulation.duration"
+lower = 0.1
+upper = 0.5
+
+[[cost]]
+name = "soon"
+value = "T + integral(bob.velocity[2]**2)"
+
+[[force]]
+name = "air"
+on = "bob.force[2]"
+value = "-2 * bob.velocity[2] + sin(20 * time)"
+"""
+)
+"""With a duration that a variable sets, and sensors and forces that look at the time."""
+
+SAMPLED = (
+    LIFTS[1]
+    + """
+[termination]
+margin = "bob.position[2] - 0.14"
+
+[[scenario]]
+name = "mass"
+sets = "bob.mass"
+factor = 0.3
+
+[[scenario]]
+name = "push"
+sets = "bob.force[2]"
+shift = 100
+lasts = 0.05
+
+[[scenario]]
+name = "finer"
+simulation = { dt = 0.005 }
+"""
+)
+"""Samples of scenarios, some of which end before their time."""
+
+
 def problems(*texts: str) -> pytest.MarkDecorator:
     """The last of these problems in every run, all with ``make test-all``, the other hops with ``make thorough``."""
     others = (thorough(text) for text in HOPS if text not in texts)
@@ -188,7 +238,7 @@ def problems(*texts: str) -> pytest.MarkDecorator:
 def named(text: str) -> str:
     """A problem by what moves and its net's form."""
     form = next(form for form in FORMS if f", {form} }}" in text.partition('name = "other"')[0])
-    kind = "hop" if text in HOPS else "asked" if text == ASKED else "lift"
+    kind = "hop" if text in HOPS else {ASKED: "asked", FREE: "free"}.get(text, "lift")
     return f"{kind}-{form}"
 
 
@@ -220,7 +270,7 @@ def points(context: Transcription) -> Array:
     return start + 0.05 * np.random.default_rng(5).standard_normal((2, start.size))
 
 
-@problems(HOPS[0], *LIFTS[1:], ASKED)
+@problems(HOPS[0], *LIFTS[1:], FREE, ASKED)
 @pytest.mark.parametrize("smoothing", [0.0, 0.05])
 def test_values_and_gradients(both: tuple[Transcription, LargeTranscription], smoothing: float) -> None:
     """To rounding, which impacts amplify, whatever the length of segments, and how much is computed again."""
@@ -385,9 +435,77 @@ def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyP
         require_small_nets(problem, "export")
 
 
-def test_the_duration_cannot_be_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "large.toml"
-    path.write_text(f'{LIFTS[1]}\n[[variable]]\nname = "T"\nsets = "simulation.duration"\n')
+@pytest.fixture(scope="module")
+def sampled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Transcription, Transcription]:
+    """A problem with scenarios, with its net in the step, and beside it."""
+    path = tmp_path_factory.mktemp("sampled") / "sampled.toml"
+    path.write_text(SAMPLED)
+    problem = load_problem(path)
+    made = []
+    for most in (1000, 10):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(split, "MOST_WEIGHTS", most)
+            made.append(transcribe(problem))
+    if made[0].shooting.scenario is None:
+        pytest.skip(made[0].backend.note)
+    return made[0], made[1]
+
+
+@pytest.mark.parametrize(("discount", "horizon"), [(0.0, np.inf), (20.0, np.inf), (20.0, 0.12)])
+@pytest.mark.parametrize("grid", [0, 1])
+def test_samples_of_scenarios(
+    sampled: tuple[Transcription, Transcription], grid: int, discount: float, horizon: float
+) -> None:
+    """Values, gradients and what lasted, of each sample, with shorter adjoints and shorter motions too."""
+    assert [isinstance(made, LargeTranscription) for made in sampled] == [False, True]
+    z = points(sampled[0])[:1]
+    found = []
+    for made in sampled:
+        scenario = made.shooting.scenario
+        assert scenario is not None
+        drawn = scenario.draw(np.random.default_rng(4), 19, 1.0, grid)
+        found.append(scenario.gradient(z, drawn, 0.02, discount, horizon))
+    a, b = found
+    assert a.gradient is not None and b.gradient is not None and a.alive is not None and b.alive is not None
+    assert np.array_equal(a.alive, b.alive) and set(a.alive) == {0.0, 1.0}
+    assert np.allclose(a.merit, b.merit, rtol=1e-10) and np.allclose(a.errors, b.errors, rtol=1e-10)
+    assert np.allclose(a.gradient, b.gradient, rtol=1e-7, atol=1e-8 * np.abs(a.gradient).max())
+    assert np.ptp(a.merit) > 1e-3
+
+
+def test_points_of_their_own_in_samples(sampled: tuple[Transcription, Transcription]) -> None:
+    """As searches by values alone ask: each sample with weights of its own."""
+    rng = np.random.default_rng(6)
+    Z = points(sampled[0])[0] + 0.1 * rng.standard_normal((5, sampled[0].shooting.n))
+    a, b = (
+        scenario.value(Z, scenario.draw(np.random.default_rng(4), 5), 0.0) for scenario in map(scenario_of, sampled)
+    )
+    assert np.allclose(a.merit, b.merit, rtol=1e-10) and np.array_equal(a.alive, b.alive)
+
+
+def scenario_of(made: Transcription) -> ScenarioEvaluator:
+    assert made.shooting.scenario is not None
+    return made.shooting.scenario
+
+
+@pytest.mark.parametrize("text", [LIFTS[1], SAMPLED], ids=["plain", "with scenarios"])
+def test_points_of_a_sweep(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each has its own numbers, and all have one kernel."""
+    path = tmp_path / "sweep.toml"
+    path.write_text(text)
+    base = load_problem(path)
+    found = list(swept(base, combined(None, base, read_axes(("bob.mass=0.8,1.25",))[0])))
+    monkeypatch.setattr(split, "MOST_WEIGHTS", 1000)
+    within = [transcribe(replace(problem, scenarios=None, varied=frozenset()), backend="casadi") for problem in found]
     monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
-    with pytest.raises(ProblemError, match=r'variable "T".sets: .*net'):
-        transcribe(load_problem(path))
+    beside = [transcribe(problem, threads=1) for problem in found]
+    assert beside[1].backend.cached
+    z = points(within[0])
+    for own, made in zip(within, beside, strict=True):
+        a, b = (each.shooting.evaluator.gradient(z, 0.0) for each in (own, made))
+        assert a.gradient is not None and b.gradient is not None
+        assert np.allclose(a.merit, b.merit, rtol=1e-10)
+        assert np.allclose(a.gradient, b.gradient, rtol=1e-7, atol=1e-8 * np.abs(a.gradient).max())
+        assert made.judge(z[0]).objective == pytest.approx(own.judge(z[0]).objective, rel=1e-12)
+        assert np.allclose(made.probe.gradient(z[0]), own.probe.gradient(z[0]), rtol=1e-6, atol=1e-9)
+    assert abs(within[0].judge(z[0]).objective / within[1].judge(z[0]).objective - 1) > 1e-3

@@ -15,7 +15,7 @@ from symphys.problem import Problem, problem_of_tables
 from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.texts import read_axes
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.shared_kernel import inputs_of
+from symphys.transcription.randomization.numbers import swept_inputs
 
 TOO_HIGH = {"constraint": [{"name": "stays low", "value": "ball.position[2]", "at": "always", "upper": 1.2}]}
 SWEEP = ("ball.mass=0.5:0.7:2", "ground.friction=0.2,0.4", "ball.shape.sphere.radius=0.1,0.12")
@@ -114,9 +114,9 @@ def test_steps_are_built_once(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_a_variable_sets_is_no_input() -> None:
     mass = {"name": "weight", "sets": "ball.mass", "lower": 0.1, "upper": 2}
     found = points("ball.mass=0.5,1", "ground.friction=0.2,0.4", tables={"variable": [*TABLES["variable"], mass]})
-    assert [slot.name for each in inputs_of(found[0]) for slot in each.slots] == ["ground.friction"]
+    assert [slot.name for each in swept_inputs(found[0]) for slot in each.slots] == ["ground.friction"]
 
 
 def test_a_problem_by_itself_has_a_kernel_of_its_own() -> None:
-    assert inputs_of(problem_of_tables(TABLES)) == ()
-    assert inputs_of(points("simulation.dt=0.01,0.02")[0]) == ()
+    assert swept_inputs(problem_of_tables(TABLES)) == ()
+    assert swept_inputs(points("simulation.dt=0.01,0.02")[0]) == ()

@@ -13,8 +13,6 @@ import casadi as ca
 from symphys.codegen import FunctionCall, MemoryLayout, Place
 from symphys.types import Expr
 
-LONG = 512
-"""Samples with fewer numbers are left to one function."""
 CHUNK = 64
 """Numbers that a call adds up."""
 

@@ -48,7 +48,7 @@ class RolloutArrays:
 
 
 def part_numbers(rollout: Rollout, arrays: RolloutArrays, formula: Formula) -> list[Array]:
-    """The same as ``part_arguments``, in numbers, of a rollout that was simulated."""
+    """Return what a formula takes of the whole motion, in numbers, of a rollout that was simulated."""
     if not formula.parts:
         return []
     return [np.concatenate([_numbers(rollout, arrays, part) for part in formula.parts])]

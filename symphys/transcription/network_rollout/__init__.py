@@ -6,11 +6,7 @@ from symphys.later import later
 
 if TYPE_CHECKING:
     from symphys.transcription.network_rollout.evaluator import LargeEvaluator, Shared
-    from symphys.transcription.network_rollout.partition import (
-        has_large_nets,
-        require_fixed_duration,
-        require_small_nets,
-    )
+    from symphys.transcription.network_rollout.partition import has_large_nets, require_small_nets
     from symphys.transcription.network_rollout.transcription import LargeTranscription, transcribe_large
 
 __all__ = [
@@ -18,7 +14,6 @@ __all__ = [
     "LargeTranscription",
     "Shared",
     "has_large_nets",
-    "require_fixed_duration",
     "require_small_nets",
     "transcribe_large",
 ]
@@ -27,7 +22,7 @@ __getattr__ = later(
     __name__,
     {
         "evaluator": ("LargeEvaluator", "Shared"),
-        "partition": ("has_large_nets", "require_fixed_duration", "require_small_nets"),
+        "partition": ("has_large_nets", "require_small_nets"),
         "transcription": ("LargeTranscription", "transcribe_large"),
     },
 )

@@ -9,11 +9,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem import Problem
+from symphys.problem import ALIVE, Problem
 from symphys.transcription.network_rollout.objectives import RolloutObjectives, start_function
 from symphys.transcription.network_rollout.partition import Partition, partition
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.stage import BatchStep, KernelStep, Stage, sense_function
+from symphys.types import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,11 @@ class RolloutContext:
     def sense(self) -> ca.Function:
         """See ``sense_function``."""
         return sense_function(self.rollout, self.sensors)
+
+    def alive(self, x: Array) -> Array | float:
+        """Return for states (B, nx) whether a motion is not over, (B, 1); 1 where none ever is."""
+        memory = self.rollout.memory
+        return x[:, memory.columns[ALIVE]] if memory.terminates else 1.0
 
     @cached_property
     def stage(self) -> Stage:

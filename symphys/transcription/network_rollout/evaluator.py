@@ -35,16 +35,34 @@ class Shared:
         merit, objective: (B,).
         errors: (B, e).
         outputs: (B, o).
+        alive: (B,) 1 where a motion lasted to its end, 0 where it was over before; None where none ever is.
         small: (B, s) gradient of each robot's merit with respect to what robots do not share; None if not asked for.
-        weights: for each net (w,) the gradient of the sum of merits; None likewise.
+        weights: for each net the gradient (w,) of the sum of merits, or (B, w) that of each; None likewise.
     """
 
     merit: Array
     objective: Array
     errors: Array
     outputs: Array
+    alive: Array | None = None
     small: Array | None = None
     weights: tuple[Array, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Backward:
+    """How a gradient is taken.
+
+    Attributes:
+        discount: share of its adjoint that a state loses in each step back; 0: the exact gradient.
+        each: whether each robot has a gradient of the weights for itself.
+    """
+
+    discount: float = 0.0
+    each: bool = False
+
+
+EXACT = Backward()
 
 
 class LargeEvaluator(WithoutResiduals):
@@ -61,7 +79,15 @@ class LargeEvaluator(WithoutResiduals):
         """``threads`` share the robots of a call; the nets have their precision, ``real``, and may be on a device."""
         self.context, self.batch_step, self.threads, self.real, self.device = context, batch_step, threads, real, device
 
-    def shared(self, weights: Sequence[Array], Z: Array, smoothing: float = 0.0, gradient: bool = False) -> Shared:
+    def shared(
+        self,
+        weights: Sequence[Array],
+        Z: Array,
+        smoothing: float = 0.0,
+        gradient: bool = False,
+        backward: Backward = EXACT,
+        skipped: int = 0,
+    ) -> Shared:
         """Roll out robots.
 
         Args:
@@ -69,26 +95,33 @@ class LargeEvaluator(WithoutResiduals):
             Z: (B, s) what robots do not share: the entries ``context.partition.small`` of z.
             smoothing: [m/s].
             gradient: whether derivatives are wanted.
+            backward: how they are taken.
+            skipped: steps at the end that are not computed.
         """
         count = max(1, min(self.threads, len(Z) // LEAST_ROBOTS))
         nets = self._nets(weights, len(Z) // count)
-        parts, room = np.array_split(Z, count), KEPT_NUMBERS // count if gradient else 0
+        room = KEPT_NUMBERS // count if gradient else 0
+
+        def part(rows: Array) -> Shared:
+            return self._part(nets, rows, smoothing, room, backward, skipped)
+
         if count == 1:
-            found = [self._part(nets, parts[0], smoothing, room)]
-        else:
-            with ThreadPoolExecutor(count) as pool:
-                found = list(pool.map(lambda part: self._part(nets, part, smoothing, room), parts))
-        common = Shared(*stacked(found))
+            return part(Z)
+        with ThreadPoolExecutor(count) as pool:
+            found = list(pool.map(part, np.array_split(Z, count)))
+        common = stacked(found)
         if not gradient:
             return common
-        small = np.concatenate([part.small for part in found if part.small is not None])
-        sums = zip(*(part.weights for part in found if part.weights is not None), strict=True)
-        return replace(common, small=small, weights=tuple(np.sum(own, axis=0) for own in sums))
+        small = np.concatenate([each.small for each in found if each.small is not None])
+        own = zip(*(each.weights for each in found if each.weights is not None), strict=True)
+        slopes = tuple(np.concatenate(each) if backward.each else np.sum(each, axis=0) for each in own)
+        return replace(common, small=small, weights=slopes)
 
     def forward_pass(self, z: Array, smoothing: float, room: int = 0) -> ForwardPass:
         """The motion of one decision vector; ``room``: see ``values_of``."""
         parts = self.context.partition
-        return forward(self.context, self.batch_step, self.nets_at(z), z[None, parts.small], smoothing, room)
+        small = parts.whole(z[None])[:, parts.small]
+        return forward(self.context, self.batch_step, self.nets_at(z), small, smoothing, room)
 
     def nets_at(self, z: Array) -> list[Layers]:
         """The nets of one decision vector."""
@@ -100,18 +133,22 @@ class LargeEvaluator(WithoutResiduals):
             for law, own in zip(self.context.partition.laws, weights, strict=True)
         ]
 
-    def _part(self, nets: Sequence[Layers], Z: Array, smoothing: float, room: int) -> Shared:
-        kept = None if room else {k for k, _ in self.context.objectives.samples.moments}
-        motion = forward(self.context, self.batch_step, nets, Z, smoothing, room, kept)
-        values = Shared(*self._values(motion))
+    def _part(
+        self, nets: Sequence[Layers], Z: Array, smoothing: float, room: int, backward: Backward, skipped: int
+    ) -> Shared:
+        objectives, steps = self.context.objectives, self.context.rollout.steps
+        kept = None if room else {steps, *(k for k, _ in objectives.samples.moments)}
+        motion = forward(self.context, self.batch_step, nets, Z, smoothing, room, kept, skipped)
+        values = self._values(motion)
         if not room:
             return values
+        discount, each = backward.discount, backward.each
         small, weights = BackwardPass(
-            self.context, self.batch_step, nets, motion, smoothing, self.context.objectives.slopes
+            self.context, self.batch_step, nets, motion, smoothing, objectives.slopes, discount, each
         ).run()
-        return replace(values, small=small, weights=tuple(weights))
+        return replace(values, small=small, weights=tuple(own if each else own[0] for own in weights))
 
-    def _values(self, motion: ForwardPass) -> tuple[Array, Array, Array, Array]:
+    def _values(self, motion: ForwardPass) -> Shared:
         found = [
             self.context.objectives.value.call(objective_arguments(self.context, motion, b))
             for b in range(len(motion.z))
@@ -119,37 +156,61 @@ class LargeEvaluator(WithoutResiduals):
         merit, objective, errors, outputs = (
             np.array([np.array(row[i]).ravel() for row in found]) for i in (0, 1, 2, 4)
         )
-        return merit[:, 0], objective[:, 0], errors, outputs
+        alive = self.context.alive(motion.x[self.context.rollout.steps])
+        lasted = alive[:, 0] if isinstance(alive, np.ndarray) else None
+        return Shared(merit[:, 0], objective[:, 0], errors, outputs, lasted)
 
     def value(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        return self._each(Z, smoothing, gradient=False)
+        return self._value(list(self.context.partition.whole(Z)[:, None]), smoothing)
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
         """See ``Evaluator``."""
-        return self._each(Z, smoothing, gradient=True)
+        found = self._gradient(list(self.context.partition.whole(Z)[:, None]), smoothing)
+        assert found.gradient is not None, "gradients were asked for"
+        return replace(found, gradient=np.ascontiguousarray(found.gradient[:, : Z.shape[1]]))
 
-    def _each(self, Z: Array, smoothing: float, gradient: bool) -> Values:
-        partition, found = self.context.partition, []
-        for z in Z:
-            weights = [own.at(z) for own in partition.weights]
-            found.append(self.shared(weights, z[None, partition.small], smoothing, gradient))
-        values = Values(*stacked(found))
-        if not gradient:
-            return values
-        slopes = []
-        for each in found:
-            assert each.small is not None and each.weights is not None
-            slopes.append(partition.joined(each.small[0], each.weights))
-        return replace(values, gradient=np.array(slopes).reshape(len(Z), partition.n))
+    def sample_values(self, rows: Array, smoothing: float) -> Values:
+        """See ``SampleEvaluator``."""
+        return self._value(self._alike(rows), smoothing)
+
+    def sample_gradients(self, rows: Array, smoothing: float, discount: float, skipped: int) -> Values:
+        """See ``SampleEvaluator``."""
+        return self._gradient(self._alike(rows), smoothing, discount, skipped)
+
+    def _value(self, groups: Sequence[Array], smoothing: float) -> Values:
+        small = self.context.partition.small
+        return _values(stacked([self.shared(self._weights(Z), Z[:, small], smoothing) for Z in groups]))
+
+    def _gradient(self, groups: Sequence[Array], smoothing: float, discount: float = 0.0, skipped: int = 0) -> Values:
+        """Of rows in groups that share their weights."""
+        partition, backward, slopes = self.context.partition, Backward(discount, each=True), list[Array]()
+        found = list[Shared]()
+        for rows in groups:
+            weights, small = self._weights(rows), rows[:, partition.small]
+            found.append(self.shared(weights, small, smoothing, True, backward, skipped))
+            assert found[-1].small is not None and found[-1].weights is not None
+            each = zip(found[-1].small, zip(*found[-1].weights, strict=True), strict=True)
+            slopes += [partition.joined(own, of_weights) for own, of_weights in each]
+        return replace(_values(stacked(found)), gradient=np.array(slopes).reshape(len(slopes), partition.n))
+
+    def _alike(self, Z: Array) -> list[Array]:
+        """Rows that share their weights, together; row by row where they do not."""
+        entries = np.concatenate([own.of_z for own in self.context.partition.weights])
+        return [Z] if np.array_equal(Z[:, entries], np.tile(Z[:1, entries], (len(Z), 1))) else list(Z[:, None])
+
+    def _weights(self, rows: Array) -> list[Array]:
+        return [own.at(rows[0]) for own in self.context.partition.weights]
 
 
-def stacked(parts: Sequence[Shared]) -> tuple[Array, Array, Array, Array]:
-    """Merits, objectives, errors and outputs of all."""
-    merit, objective, errors, outputs = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("merit", "objective", "errors", "outputs")
-    )
-    return merit, objective, errors, outputs
+def stacked(parts: Sequence[Shared]) -> Shared:
+    """Put the values of all robots together, without gradients."""
+    names = ("merit", "objective", "errors", "outputs", *(("alive",) if parts[0].alive is not None else ()))
+    return Shared(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+
+
+def _values(found: Shared) -> Values:
+    return Values(found.merit, found.objective, found.errors, found.outputs, alive=found.alive)
 
 
 class LargeProbe:
@@ -175,4 +236,4 @@ class LargeProbe:
         nets, motion = evaluator.nets_at(z), evaluator.forward_pass(z, 0.0, KEPT_NUMBERS)
         slopes = self._context.objectives.probe_slopes
         small, weights = BackwardPass(self._context, evaluator.batch_step, nets, motion, 0.0, slopes).run()
-        return self._context.partition.joined(small[0], weights)
+        return self._context.partition.joined(small[0], [own[0] for own in weights])[: z.size]

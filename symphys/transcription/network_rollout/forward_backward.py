@@ -34,6 +34,8 @@ class ForwardPass:
             row for all steps.
         given: (N, B, nu) inputs before small controllers add to them.
         p: (B, np).
+        interval: (B, 1) [s] the time step.
+        last: how many steps are computed: after them a robot stays where it is.
         sensed: (N + 1, B, o) what large nets sense.
         asked: (N, B, a) values of formulas along the way.
         u: (N, B, nu) inputs.
@@ -45,6 +47,8 @@ class ForwardPass:
     x: Any
     given: Array
     p: Array
+    interval: Array
+    last: int
     sensed: Array
     asked: Array
     u: Array
@@ -59,14 +63,22 @@ def forward(
     smoothing: float,
     room: int = 0,
     kept: Collection[int] | None = None,
+    skipped: int = 0,
 ) -> ForwardPass:
     """Roll out robots (B, s) that share these nets.
 
-    ``room``: see ``values_of``; ``kept``: the steps whose states are wanted, after which there is no pass backwards;
-    None: all.
+    Args:
+        context: of the problem.
+        batch_step: takes a step.
+        nets: with their weights.
+        Z: (B, s) what robots do not share.
+        smoothing: [m/s].
+        room: see ``values_of``.
+        kept: the numbers of the states that are wanted, after which there is no pass backwards; None: all.
+        skipped: steps at the end that are not computed: the state stays, and what is summed over them is 0.
     """
-    steps, dt = context.rollout.steps, context.rollout.dt
-    x0, flat, p, sensed0 = row_by_row(context.start, Z)
+    steps = context.rollout.steps
+    x0, flat, p, sensed0, interval = row_by_row(context.start, Z)
     nx, nu, whole = x0.shape[1], context.rollout.given.shape[0], kept is None
     at = [k if whole else 0 for k in range(steps + 1)]
     rows = np.empty((at[-1] + 1, len(Z), nx + nu + p.shape[1] + 2 + Z.shape[1]))
@@ -77,15 +89,17 @@ def forward(
         x=x if kept is None else dict.fromkeys(kept, x0),
         given=given[:steps],
         p=p,
+        interval=interval,
+        last=steps - skipped,
         sensed=np.empty((at[-1] + 1, *sensed0.shape)),
-        asked=np.empty((steps, len(Z), batch_step.sizes.get("asked", 0))),
-        u=np.empty((steps, len(Z), nu)),
+        asked=np.zeros((steps, len(Z), batch_step.sizes.get("asked", 0))),
+        u=np.zeros((steps, len(Z), nu)),
         values=values_of(nets, len(Z), steps, room),
     )
     x[0], motion.sensed[0], parts[2][:], parts[4][:] = x0, sensed0, p, Z
     beside = list(zip(nets, motion.values, context.columns, context.partition.places, strict=True))
-    for k, (now, then) in enumerate(pairwise(at)):
-        given[now], times[now] = flat[:, k * nu : (k + 1) * nu], (k * dt, (k + 1) * dt)
+    for k, (now, then) in enumerate(pairwise(at[: motion.last + 1])):
+        given[now], times[now] = flat[:, k * nu : (k + 1) * nu], interval * (k, k + 1)
         for net, own, columns, place in beside:
             values = own.at(k)
             net.set(values[0], motion.sensed[now][:, columns])
@@ -97,6 +111,9 @@ def forward(
             motion.x[k + 1] = found["after"]
         if "asked" in found:
             motion.asked[k] = found["asked"]
+    for k in range(motion.last + 1, steps + 1):
+        if kept is None or k in kept:
+            motion.x[k] = x[at[motion.last]]
     return motion
 
 
@@ -123,20 +140,29 @@ class BackwardPass:
         motion: ForwardPass,
         smoothing: float,
         slopes: ca.Function,
+        discount: float = 0.0,
+        each: bool = False,
     ) -> None:
-        """Begin with what ``slopes``, one of those of ``context.objectives``, say of the robots' motions."""
-        self.context, self.batch_step, self.nets, self.motion, self.smoothing = (
-            context,
-            batch_step,
-            nets,
-            motion,
-            [smoothing],
-        )
-        self.z, self.p = np.zeros_like(motion.z), np.zeros_like(motion.p)
+        """Begin with what ``slopes``, one of those of ``context.objectives``, say of the robots' motions.
+
+        Args:
+            context: of the problem.
+            batch_step: that the motion was made with.
+            nets: likewise.
+            motion: forwards.
+            smoothing: of it [m/s].
+            slopes: of ``context.objectives``.
+            discount: share of its adjoint that a state loses in each step back; above 0 it loses all where a motion
+                was over, see ``AdjointDiscount``.
+            each: whether each robot has a gradient of the weights for itself.
+        """
+        self.context, self.batch_step, self.nets, self.motion = context, batch_step, nets, motion
+        self.smoothing, self.discount, self.each = [smoothing], discount, each
+        self.z, self.p, self.interval = (np.zeros_like(part) for part in (motion.z, motion.p, motion.interval))
         self.at_x: dict[int, Array] = {}
         self.at_u: dict[int, Array] = {}
         self.asked = np.zeros_like(motion.asked)
-        self.weights = [np.zeros(net.net.sizes["weights"]) for net in nets]
+        self.weights = [np.zeros((len(motion.z) if each else 1, net.net.sizes["weights"])) for net in nets]
         self.adjoints = [
             [net.room(width, len(motion.z) * own.length) for width in (*net.widths[1:], net.widths[-1])]
             for net, own in zip(nets, motion.values, strict=True)
@@ -151,7 +177,7 @@ class BackwardPass:
         self.z[b], self.p[b], others = found[0].ravel(), found[1].ravel(), found[2:]
         for k, row in samples.moments:
             x, u, *others = others
-            self.at_x.setdefault(k, np.zeros_like(motion.x[0]))[b] += x.ravel()
+            self.at_x.setdefault(min(k, motion.last), np.zeros_like(motion.x[0]))[b] += x.ravel()
             self.at_u.setdefault(row, np.zeros_like(motion.u[0]))[b] += u.ravel()
         start = 0
         for series in others:
@@ -159,15 +185,19 @@ class BackwardPass:
             start += len(series)
 
     def run(self) -> tuple[Array, list[Array]]:
-        """(B, s) the gradients of what robots do not share, and for each net that of the shared weights, summed."""
-        steps = len(self.motion.given)
+        """Return the gradients (B, s) of what robots do not share, and for each net those of the weights.
+
+        They are (B, w), or (1, w) and summed over the robots.
+        """
+        steps = self.motion.last
         length = max((own.length for own in self.motion.values), default=steps)
         x, sensed = self.at_x.get(steps, np.zeros_like(self.motion.x[0])), np.zeros_like(self.motion.sensed[0])
         given = np.zeros_like(self.motion.given)
         for number in reversed(range(-(-steps // length))):
             x, sensed = self.segment(number, min(steps, number * length + length), x, sensed, given)
-        first = [self.motion.x[0], _flat(self.motion.given), self.motion.p, self.motion.sensed[0]]
-        (pulled,) = row_by_row(self.context.pull, self.motion.z, *first, x, _flat(given), self.p, sensed)
+        motion = self.motion
+        first = [motion.x[0], _flat(motion.given), motion.p, motion.sensed[0], motion.interval]
+        (pulled,) = row_by_row(self.context.pull, motion.z, *first, x, _flat(given), self.p, sensed, self.interval)
         self.z += pulled
         return self.z, self.weights
 
@@ -184,10 +214,14 @@ class BackwardPass:
                 *deltas, output = (array[:, now] for array in room)
                 net.set(output, given[k] @ place)
                 sensed[:, columns] += net.pull([value[:, now] for value in own], output, deltas)
-        used = slice(0, (end - first) * robots)
-        for i, (net, own, room) in enumerate(zip(self.nets, values, self.adjoints, strict=True)):
-            *deltas, output = (array[:, used] for array in room)
-            self.weights[i] += net.gradient(own, deltas, output)
+            if self.discount:
+                share = (1 - self.discount) * self.context.alive(self.motion.x[k])
+                x, sensed = x * share, sensed * share
+        for b in range(robots) if self.each else (0,):
+            used = slice(b, (end - first) * robots, robots if self.each else 1)
+            for i, (net, own, room) in enumerate(zip(self.nets, values, self.adjoints, strict=True)):
+                *deltas, output = (array[:, used] for array in room)
+                self.weights[i][b] += net.gradient([value[:, used] for value in own], deltas, output)
         return x, sensed
 
     def step(self, k: int, x: Array, sensed: Array) -> tuple[Array, Array, Array]:
@@ -197,7 +231,8 @@ class BackwardPass:
         seeds = np.concatenate([parts[name] for name in self.batch_step.sizes], axis=1)
         _, slopes = self.batch_step.gradient(self.motion.rows[k], seeds, self.smoothing)
         sizes = [self.motion.x.shape[2], self.motion.given.shape[2], self.motion.p.shape[1], 2, self.motion.z.shape[1]]
-        before, given, p, _, z = np.split(slopes, np.cumsum(sizes)[:-1], axis=1)
+        before, given, p, times, z = np.split(slopes, np.cumsum(sizes)[:-1], axis=1)
+        self.interval += times @ [[k], [k + 1]]
         self.p += p
         self.z += z
         if k in self.at_x:
@@ -214,7 +249,7 @@ def back(
     ends: Array,
 ) -> Iterator[Array]:
     """See ``Transcription.back``; of the first robot of a pass."""
-    count, dt = ends.shape[1], context.rollout.dt
+    count, interval = ends.shape[1], float(motion.interval[0, 0])
     nx, nu = motion.x.shape[2], motion.u.shape[2]
     sense, x = context.sense.reverse(count), ends.T
     blank = {name: np.zeros((count, size)) for name, size in batch_step.sizes.items()}
@@ -226,7 +261,7 @@ def back(
             output, values = net.put((given @ place).T), net.sense(motion.sensed[k][:1, columns])
             deltas = [net.room(width, count) for width in net.widths[1:]]
             sensed[:, columns] += net.pull(values, output, deltas)
-        through = sense(motion.x[k, 0], motion.p[0], k * dt, motion.sensed[k, 0], sensed.T)[0]
+        through = sense(motion.x[k, 0], motion.p[0], k * interval, motion.sensed[k, 0], sensed.T)[0]
         x = slopes[:, :nx] + np.array(through).T
         yield x.T
 

@@ -13,6 +13,7 @@ from symphys.errors import Issue, ProblemError
 from symphys.model.controllers import Net
 from symphys.problem import Constraint, Cost, FeedbackController, Output, Problem, Target
 from symphys.transcription.formula_names import input_names, spans
+from symphys.transcription.randomization.numbers import swept_inputs
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.types import Array
 
@@ -71,8 +72,9 @@ class Partition:
 
     Attributes:
         rollout: of the problem without its large nets, whose inputs they add to.
-        small: (s,) the entries of z that it depends on.
-        n: the length of z.
+        small: (s,) the entries of z, with what stands behind it, that it depends on.
+        n: the length of z with what stands behind it.
+        behind: numbers behind z, in which the problems of a sweep differ.
         nets, laws: the controllers that are large nets, and the nets.
         places: for each (nu, m) which input an output is added to, scaled.
         weights: for each.
@@ -85,6 +87,11 @@ class Partition:
     laws: tuple[Net, ...]
     places: tuple[Array, ...]
     weights: tuple[Weights, ...]
+    behind: Array
+
+    def whole(self, Z: Array) -> Array:
+        """Return points (B, n) with what stands behind z."""
+        return np.concatenate([Z, np.broadcast_to(self.behind, (len(Z), self.behind.size))], axis=1)
 
     def joined(self, small: Array, weights: Sequence[Array]) -> Array:
         """(n,) a gradient from those of what is small and of the weights of each net."""
@@ -97,7 +104,8 @@ class Partition:
 
 def partition(problem: Problem) -> Partition:
     """Take a problem apart; ProblemError if its formulas look at the weights of large nets."""
-    nets = large_nets(problem)
+    nets, swept = large_nets(problem), swept_inputs(problem)
+    problem = replace(problem, variables=(*problem.variables, *swept))
     names = {name for controller in nets for name in controller.weights}
     parts = list(zip(problem.variables, spans(problem.variables), strict=True))
     kept = [(v, span) for v, span in parts if not any(slot.name in names for slot in v.slots)]
@@ -113,6 +121,7 @@ def partition(problem: Problem) -> Partition:
         laws=tuple(controller.law for controller in nets if isinstance(controller.law, Net)),
         places=tuple(np.array(ca.DM(rollout.control.place(controller)).full()) for controller in nets),
         weights=tuple(_weights(problem, controller) for controller in nets),
+        behind=np.concatenate([np.zeros(0), *(variable.guess for variable in swept)]),
     )
 
 
@@ -132,14 +141,6 @@ def refuse_large(problem: Problem, nets: Sequence[FeedbackController], most: int
         Issue(f'controller "{net.name}".net', f"has {net.law.sizes['weights']} weights; {what} takes up to {most}")
         for net in nets
     ]
-    if issues:
-        raise ProblemError(problem.file, issues)
-
-
-def require_fixed_duration(problem: Problem) -> None:
-    """ProblemError if a variable sets the duration."""
-    text = "sets the duration, which a problem with a net that is so large cannot vary"
-    issues = [Issue(f'variable "{each.name}".sets', text) for each in problem.variables if each.kind == "duration"]
     if issues:
         raise ProblemError(problem.file, issues)
 

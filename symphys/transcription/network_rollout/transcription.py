@@ -99,7 +99,7 @@ def transcribe_large(
     began = perf_counter()
     context = make_context(problem)
     built = perf_counter() - began
-    evaluator, description = _evaluator(context, exact, backend, processors() if threads is None else threads)
+    evaluator, description = evaluator_or_plain(context, exact, backend, processors() if threads is None else threads)
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),
@@ -118,16 +118,25 @@ def transcribe_large(
     return LargeTranscription(problem, context.rollout, functions, shooting, description, built, context=context)
 
 
-def _evaluator(context: RolloutContext, exact: bool, backend: str, threads: int) -> tuple[LargeEvaluator, Description]:
-    """The evaluator that is asked for, or casadi's with a note. Steps are in double precision always."""
-    began = perf_counter()
+def evaluator_or_plain(
+    context: RolloutContext, exact: bool, backend: str, threads: int
+) -> tuple[LargeEvaluator, Description]:
+    """The evaluator that is asked for, or casadi's with a note."""
     if backend in PLAIN:
         return LargeEvaluator(context, context.plain, threads), Description("casadi", threads=threads)
     try:
-        step = context.compiled(exact, STEPPING[backend])
+        return large_evaluator(context, exact, backend, threads)
     except (KernelUnavailable, ProgramError) as error:
         note = f"casadi's virtual machine evaluates, which is slower: {error}"
         return LargeEvaluator(context, context.plain, threads), Description("casadi", threads=threads, note=note)
+
+
+def large_evaluator(
+    context: RolloutContext, exact: bool, backend: str, threads: int
+) -> tuple[LargeEvaluator, Description]:
+    """An evaluator whose steps are a kernel, in double precision always; KernelUnavailable if that cannot be."""
+    began = perf_counter()
+    step = context.compiled(exact, STEPPING[backend])
     kernel, precision = step.kernel, PRECISIONS[backend]
     device = kernel.device if isinstance(kernel, DeviceKernel) else None
     shared, nets = threads if device is None else 1, "nets by matrix products"

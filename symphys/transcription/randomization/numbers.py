@@ -1,10 +1,11 @@
-"""Numbers that differ from sample to sample, as variables that no solver chooses."""
+"""Numbers that differ between samples of a scenario or problems of a sweep, as variables that no solver chooses."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from symphys.problem import Problem, RandomizedQuantity, Variable, VariableSlot
+from symphys.transcription.formula_names import swept_parameters
 from symphys.types import Array
 
 LEAST = 0.05
@@ -52,3 +53,13 @@ def hidden(name: str, kind: str, slot: VariableSlot, guess: Array, knots: int = 
     """A variable that no solver sees."""
     none, one = np.full(guess.size, np.inf), np.ones(guess.size)
     return Variable(name, kind, (slot,), knots, "constant", guess, -none, none, one, 0 * one)  # type: ignore[arg-type]
+
+
+def swept_inputs(problem: Problem) -> tuple[Variable, ...]:
+    """A variable for each parameter in which the problems of its sweep differ, and that no variable of its own sets."""
+    own = {slot.name for variable in problem.variables for slot in variable.slots}
+    values = {name: problem.parameters[name] for name in swept_parameters(problem) if name not in own}
+    return tuple(
+        hidden(f"{name} of the sweep", "parameter", VariableSlot(name, tuple(range(value.size))), value)
+        for name, value in values.items()
+    )

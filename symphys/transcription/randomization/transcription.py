@@ -5,13 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 from time import perf_counter
 
-from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
-from symphys.codegen.backends import PRECISIONS, build_kernel, described
+from symphys.codegen import KernelUnavailable, ProgramError, processors
+from symphys.codegen.backends import PRECISIONS, Description, build_kernel, described
+from symphys.codegen.backends.interface import joined
 from symphys.codegen.toolchain.warm_start import ProgramSource
 from symphys.problem import Problem
 from symphys.shooting import Nlp
+from symphys.transcription.network_rollout.context import make_context
+from symphys.transcription.network_rollout.partition import has_large_nets
+from symphys.transcription.network_rollout.transcription import large_evaluator
 from symphys.transcription.program import program_identity, rollout_program
-from symphys.transcription.randomization.evaluator import KernelScenarioEvaluator, NominalEvaluator
+from symphys.transcription.randomization.evaluator import (
+    KernelSamples,
+    NominalEvaluator,
+    SampledEvaluator,
+    SampleEvaluator,
+)
 from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.transcription import Transcription
@@ -26,31 +35,31 @@ def with_scenarios(
 
     Where there can be no kernels it stays as it is, and its backend's note says so.
     """
-    began = perf_counter()
+    began, count = perf_counter(), processors() if threads is None else threads
+    assert problem.scenarios is not None, "nothing differs"
+    grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.discretisations}}
     try:
         if backend not in PRECISIONS:
             raise KernelUnavailable(f"the backend {backend} cannot draw samples of scenarios")
-        scenario = _evaluator(problem, exact, backend, processors() if threads is None else threads)
+        samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]
+        made = [_evaluating(each.problem, exact, backend, count) for each in samplers]
     except (KernelUnavailable, ProgramError) as error:
         description = replace(plain.backend, note=f"{WITHOUT}: {error}")
         return replace(plain, problem=problem, backend=description)
+    scenario = SampledEvaluator(list(grids), samplers, [evaluator for evaluator, _ in made])
     shooting = replace(
         plain.shooting, evaluator=NominalEvaluator(scenario), scenario=scenario, squares=False, nlp=Nlp(None)
     )
-    grids = f"{len(scenario.kernels)} discretisations" if len(scenario.kernels) > 1 else ""
-    description = described(scenario.kernels[0], perf_counter() - began, note=grids)
-    cached = all(kernel.report.cached for kernel in scenario.kernels)
-    return replace(plain, problem=problem, shooting=shooting, backend=replace(description, cached=cached))
+    note = joined(made[0][1].note, f"{len(grids)} discretisations" if len(grids) > 1 else "")
+    cached = all(description.cached for _, description in made)
+    description = replace(made[0][1], seconds=perf_counter() - began, note=note, cached=cached)
+    return replace(plain, problem=problem, shooting=shooting, backend=description)
 
 
-def _evaluator(problem: Problem, exact: bool, backend: str, threads: int) -> KernelScenarioEvaluator:
-    assert problem.scenarios is not None, "nothing differs"
-    grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.discretisations}}
-    samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]
-    return KernelScenarioEvaluator(list(grids), samplers, [_kernel(each, exact, backend, threads) for each in samplers])
-
-
-def _kernel(sampler: Sampler, exact: bool, backend: str, threads: int) -> Kernel:
-    problem = sampler.problem
+def _evaluating(problem: Problem, exact: bool, backend: str, threads: int) -> tuple[SampleEvaluator, Description]:
+    """What evaluates the samples of one grid: a kernel, or steps by a kernel with large nets between them."""
+    if has_large_nets(problem):
+        return large_evaluator(make_context(problem), exact, backend, threads)
     source = ProgramSource(lambda: rollout_program(symbolic_rollout(problem), exact), program_identity(problem, exact))
-    return build_kernel(backend, source, ("merit",), threads)
+    kernel = build_kernel(backend, source, ("merit",), threads)
+    return KernelSamples(kernel), described(kernel, 0.0)
