@@ -16,7 +16,7 @@ from table_robot import table_problem
 from symphys.codegen import Kernel, compile_program
 from symphys.model.state_layout import Layout
 from symphys.transcription import symbolic_rollout
-from symphys.transcription.network_rollout.objectives import RolloutObjectives, start_function
+from symphys.transcription.network_rollout.context import RolloutObjectives, start_function
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 

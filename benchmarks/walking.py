@@ -23,7 +23,7 @@ from symphys.runs.job import solver_options
 from symphys.shooting import ScenarioSamples
 from symphys.solvers import SOLVERS
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.randomization.evaluator import KernelScenarioEvaluator
+from symphys.transcription.randomization.transcription import KernelScenarioEvaluator
 from symphys.types import Array
 
 UNSEEN, SEED, LEAST = 500, 20161105, 0.7

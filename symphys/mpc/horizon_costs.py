@@ -18,7 +18,7 @@ from symphys.codegen import FunctionCall, KernelUnavailable, MemoryLayout, Proce
 from symphys.errors import Issue, ProblemError
 from symphys.problem import Constraint
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.staged.columns import ByColumns
+from symphys.transcription.staged.stage_functions import ByColumns
 from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm
 from symphys.transcription.staged.tangent import Tangent
 from symphys.types import Array, Expr

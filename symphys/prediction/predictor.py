@@ -18,7 +18,7 @@ from symphys.prediction.rotations import turned
 from symphys.problem import Problem, Recording, Variable, VariableSlot
 from symphys.trajectory import Trajectory
 from symphys.transcription.quantity_slopes import QuantitySlopes
-from symphys.transcription.randomization.numbers import hidden
+from symphys.transcription.randomization.sampler import hidden
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.simulation import recorder, simulate
 from symphys.types import Array

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from symphys.problem import RecordedInput, Recording, Variable, VariableSlot
-from symphys.transcription.randomization.numbers import hidden
+from symphys.transcription.randomization.sampler import hidden
 from symphys.types import Array
 
 SLACK = 1e-9

@@ -12,7 +12,7 @@ from symphys.transcription.transcribe import guessed, transcribe
 from symphys.transcription.transcription import Transcription
 
 if TYPE_CHECKING:
-    from symphys.transcription.nan_tracing.steps import first_non_finite, first_non_finite_derivative
+    from symphys.transcription.nan_tracing import first_non_finite, first_non_finite_derivative
     from symphys.transcription.simulation import Record, plain
 
 __all__ = [
@@ -36,7 +36,7 @@ __all__ = [
 __getattr__ = later(
     __name__,
     {
-        "nan_tracing.steps": ("first_non_finite", "first_non_finite_derivative"),
+        "nan_tracing": ("first_non_finite", "first_non_finite_derivative"),
         "simulation": ("Record", "plain"),
     },
 )

@@ -1,8 +1,14 @@
-"""What a formula's names mean at one instant of a rollout, and the symbols that stand for them."""
+"""What a formula's names mean at one instant of a rollout, and the symbols that stand for them.
+
+Phases may set numbers of the world. A step has one value of each number. Its inputs hold a share for each phase that
+sets something, 1 in the steps of the phase and 0 in others, and a number is base + sum of share (own - base). Impulses
+of constraints cover half of the substep before as well (docs/time_step.md, equation 2), so that where they are bounded
+by a number, as friction is, the first step has that part of its share from the step before.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -23,10 +29,88 @@ from symphys.expression import Formula
 from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, input_symbols
 from symphys.model.world import Scheme, World
 from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable, placing
+from symphys.problem.parametric.by_phase import lagged
 from symphys.problem.references import reference_values
 from symphys.transcription.feedback.sensor_memory import SensorMemory
-from symphys.transcription.formulas.phase_numbers import PhaseNumbers, phase_numbers
-from symphys.types import Expr
+from symphys.types import Array, Expr
+
+QUARTER = 0.25
+"""Of a step: so far from its ends it is asked which step a number belongs to, so that rounding does not matter."""
+
+
+@dataclass(frozen=True)
+class PhaseShare:
+    """How much of a phase there is in a step.
+
+    Attributes:
+        name: of the input.
+        symbol: SX, that stands for it in a world.
+        ticks: the numbers of its first and last state.
+        before: how much of a step counts as the step before it.
+    """
+
+    name: str
+    symbol: Expr
+    ticks: tuple[int, int]
+    before: float
+
+    def at(self, tick: Expr) -> Expr:
+        """The share in the step of this number."""
+        now = self._within(tick)
+        return (1 - self.before) * now + self.before * self._within(ca.fmax(tick - 1, 0)) if self.before else now
+
+    def _within(self, tick: Expr) -> Expr:
+        first, last = (end - QUARTER for end in self.ticks)
+        return ca.logic_and(tick > first, tick < last)
+
+
+@dataclass(frozen=True)
+class PhaseNumbers:
+    """What phases set.
+
+    Attributes:
+        shares: of the phases that set something, one or two each.
+        sets: by the name of a parameter, the names of the numbers that stand for it, with their shares.
+        nominal: the numbers of the file.
+    """
+
+    shares: tuple[PhaseShare, ...] = ()
+    sets: Mapping[str, tuple[tuple[str, PhaseShare], ...]] = field(default_factory=dict)
+    nominal: Mapping[str, Array] = field(default_factory=dict)
+
+    def at(self, ticks: Expr) -> Expr:
+        """(shares, N): of the steps of these numbers (1, N)."""
+        return ca.vertcat(type(ticks)(0, ticks.shape[1]), *(share.at(ticks) for share in self.shares))
+
+    def values(self, known: Mapping[str, Expr]) -> dict[str, Expr]:
+        """Map parameters to their expressions (SX) in a step; ``known``: those that are symbols of p."""
+        found = {}
+        for name, parts in self.sets.items():
+            base = known.get(name, ca.DM(self.nominal[name]))
+            found[name] = ca.SX(base) + sum(share.symbol * (known[own] - base) for own, share in parts)
+        return found
+
+
+def phase_numbers(problem: Problem) -> PhaseNumbers:
+    """Return the numbers that the phases of a problem set."""
+    setting = [phase for phase in problem.phases if phase.sets]
+    if not setting:
+        return PhaseNumbers()
+    from symphys.dynamics.step import splits_of  # late: the physics of a step, which few problems need here
+
+    simulation, shares = problem.simulation, dict[tuple[str, bool], PhaseShare]()
+    before = 0.5 / (1 + splits_of(problem.world(), simulation.scheme()))
+    sets: dict[str, list[tuple[str, PhaseShare]]] = {}
+    for phase in setting:
+        for name in phase.sets:
+            late = lagged(problem.parametric, name)
+            if (phase.name, late) not in shares:
+                called = f"{phase.name}.{'share_of_impulses' if late else 'share'}"
+                ticks = phase.ticks(simulation.steps)
+                shares[phase.name, late] = PhaseShare(called, ca.SX.sym(called), ticks, before if late else 0.0)
+            sets.setdefault(name, []).append((f"{phase.name}.{name}", shares[phase.name, late]))
+    nominal = {name: problem.parameters[name] for name in sets}
+    return PhaseNumbers(tuple(shares.values()), {name: tuple(parts) for name, parts in sets.items()}, nominal)
 
 
 @dataclass(frozen=True)
@@ -40,7 +124,7 @@ class Instant:
     z: Expr
 
     def arguments(self) -> list[Expr]:
-        """In the order in which compiled formulas take them."""
+        """Return the symbols in the order of the arguments of compiled formulas."""
         return [self.x, self.u, self.p, self.time, self.z]
 
 
@@ -64,12 +148,12 @@ class Parameters:
 
     @cached_property
     def columns(self) -> dict[str, slice]:
-        """Where each lies in p."""
+        """Map each parameter to its columns of p."""
         ends = np.cumsum([0, *(symbol.shape[0] for symbol in self.symbols)]).tolist()
         return {name: slice(*part) for name, part in zip(self.names, pairwise(ends), strict=True)}
 
     def overrides(self) -> dict[str, Expr]:
-        """What physical parameters are in a step, by name: symbols, and what phases make of them."""
+        """Map physical parameters to their expressions in a step, phases included."""
         found = dict(zip(self.names, self.symbols, strict=True))
         return {name: found[name] for name in self.names[: self.physical]} | self.phases.values(found)
 
@@ -78,7 +162,7 @@ class Parameters:
         return p[self.columns[DURATION]] / simulation.steps if DURATION in self.columns else simulation.dt
 
     def scheme(self, simulation: Simulation) -> Scheme:
-        """How a step is taken; its ``dt`` is an expression of the symbols where a variable sets the duration."""
+        """Return the scheme of a step; ``dt`` is an expression of the symbols where a variable sets the duration."""
         return replace(simulation.scheme(), dt=self.step_length(simulation, ca.vertcat(ca.SX(0, 1), *self.symbols)))
 
 
@@ -169,7 +253,7 @@ def namespace(
     at: Instant,
     wanted: frozenset[str],
 ) -> dict[str, Expr]:
-    """What names mean at an instant, variables aside; of what takes work to express only what is wanted."""
+    """Map names, except those of variables, to expressions at an instant; expensive ones only if they are wanted."""
     layout = Layout(world)
     dt = parameters.step_length(problem.simulation, at.p)
     names: dict[str, Expr] = {"time": at.time, "duration": ca.SX(dt * problem.simulation.steps)}

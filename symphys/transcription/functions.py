@@ -15,7 +15,7 @@ class ExpressionFunctions:
     """Each function is made when it is first asked for; see ``symphys.codegen.backends.Functions``."""
 
     def __init__(self, rollout: Rollout, asked: Terms | None = None) -> None:
-        """Nothing is made yet; ``asked``: of the rollout, None: to be made too."""
+        """Prepare the functions; ``asked``: terms of the rollout, built on demand where None."""
         self._rollout, self._asked = rollout, asked
 
     @cached_property

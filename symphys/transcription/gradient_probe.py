@@ -50,7 +50,7 @@ class ExpressionProbe:
         self._slopes: dict[bytes, Array] = {}
 
     def values(self, Z: Array) -> Array:
-        """See ``Probe``; the virtual machine's on all processors."""
+        """Implement ``Probe.values``; the virtual machine uses all processors."""
         known = None if self._evaluator is None else self._evaluator.value(Z, 0.0).probe
         if known is not None:
             return known
@@ -60,7 +60,7 @@ class ExpressionProbe:
         return self._calls[len(Z)](Z, 0.0)[0][:, 0]
 
     def gradient(self, z: Array) -> Array:
-        """See ``Probe``; that of the last z is kept."""
+        """Implement ``Probe.gradient``; the gradient at the last z is cached."""
         key = np.asarray(z, np.float64).tobytes()
         if key not in self._slopes:
             self._slopes = {key: np.array(self._gradient(z, 0.0)).ravel()}

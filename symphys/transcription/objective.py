@@ -40,7 +40,7 @@ class FormulaSamples:
     """
 
     def __init__(self, rollout: Rollout, separate: bool = False) -> None:
-        """Nothing is asked for yet.
+        """Start without requests.
 
         Args:
             rollout: of the problem.
@@ -71,7 +71,7 @@ class FormulaSamples:
         return self.rollout.compiled(formula)(x, u, self.p, k * self.interval, self.z, *parts)
 
     def _part(self, part: MotionPart) -> Expr:
-        """What a formula takes of the whole motion (m,); integrals by the rule of running costs."""
+        """Return the part (m,) that a formula takes of the whole motion; integrals follow the rule of running costs."""
         if part.kind in ("start", "end"):
             return self.at(part.formula, 0.0 if part.kind == "start" else "end")
         average = _mean(ca.horzcat(*map(self.values, self.over_steps(part.formula))))
@@ -206,7 +206,7 @@ def goal_error(objective: Any, goal: float) -> Any:
 
 
 def limits(problem: Problem) -> range:
-    """Which of the errors are those of constraints."""
+    """Return which entries of ``Terms.errors`` belong to constraints."""
     return range(len(problem.targets), len(problem.targets) + len(problem.constraints))
 
 

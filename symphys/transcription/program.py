@@ -1,4 +1,9 @@
-"""A problem's rollout as a program of calls, for the compiled kernels."""
+"""A problem's rollout as a program of calls, for the compiled kernels.
+
+Long sums over the samples of a motion are short calls, one after the other. As one function they are as long as the
+motion: that of ten seconds of a quadruped has 230,000 operations, and takes the compiler two thirds of its time. The
+order of the sums is that of casadi's, so that no bit differs.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +25,6 @@ from symphys.problem import ALIVE, Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controller_calls import Places, control_calls
 from symphys.transcription.formula_names import spans
-from symphys.transcription.formulas.long_sums import sums_in_calls
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.objective import FormulaSamples, Series, Terms, terms
 from symphys.transcription.rollout import Rollout
@@ -29,6 +33,53 @@ from symphys.types import Expr
 if TYPE_CHECKING:
     from symphys.dynamics.tracing.guards import Guard, Part
     from symphys.dynamics.tracing.recording import TracedCall, TracedVector
+
+
+CHUNK = 64
+"""Numbers that a call adds up."""
+
+
+def sums_in_calls(
+    layout: MemoryLayout, series: Sequence[Place], rows: int, scale: float | None
+) -> tuple[list[FunctionCall], Place]:
+    """Calls that add up samples, and where the result lies.
+
+    Args:
+        layout: takes what the calls give.
+        series: places of samples, ``rows`` numbers each, one after the other.
+        rows: m.
+        scale: of the squares; None: there are none.
+
+    Returns:
+        The calls, and the place of the sum (m,) of the samples with, after it, that of the squares of scale times each
+        number.
+    """
+    count = rows + (scale is not None)
+    calls, chunks = list[FunctionCall](), dict[int, ca.Function]()
+    total = layout.take(count)
+    calls.append(FunctionCall(ca.Function("zeros", [], [ca.DM.zeros(count)]), (), (total,)))
+    longest = max(CHUNK // rows, 1) * rows
+    for whole in series:
+        for start in range(0, whole.size, longest):
+            part, after = Place(whole.offset + start, min(longest, whole.size - start)), layout.take(count)
+            if part.size not in chunks:
+                chunks[part.size] = _chunk(rows, part.size // rows, scale)
+            calls.append(FunctionCall(chunks[part.size], (total, part), (after,)))
+            total = after
+    return calls, total
+
+
+def _chunk(rows: int, columns: int, scale: float | None) -> ca.Function:
+    """(sums before, samples) -> sums after."""
+    before, samples = ca.SX.sym("before", rows + (scale is not None)), ca.SX.sym("samples", rows * columns)
+    after: list[Expr] = [before[i] for i in range(before.numel())]
+    for k in range(rows * columns):
+        after[k % rows] += samples[k]
+        if scale is not None:
+            scaled = scale * samples[k]
+            after[rows] += scaled * scaled
+    return ca.Function("sums", [before, samples], [ca.vertcat(*after)])
+
 
 NOTHING: Mapping[str, Formula] = MappingProxyType({})
 ASIDE = frozenset({"name", "title", "description", "file", "text", "settings", "solvers", "solver_tables"})
@@ -124,7 +175,7 @@ def _rollout_program(
 
 
 def program_identity(problem: Problem, exact: bool) -> str | None:
-    """Of the program of a problem's rollout: equal for problems that differ in texts and options of solvers alone."""
+    """Return a key of a rollout's program; problems that differ only in texts and solver options share it."""
     data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in ASIDE}
     return identity_of(data, exact)
 
@@ -200,13 +251,13 @@ def _guarded(traced: TracedCall, places: Mapping[TracedVector, Place], zeros: Pl
 
 
 def _alive(samples: RolloutPlaces) -> Place | None:
-    """Whether a motion is not over at each step; None where it never is."""
+    """Return the place of the flag ``alive`` of each step; None without termination."""
     memory = samples.rollout.memory
     return _part(samples.x, memory.columns[ALIVE]) if memory.terminates else None
 
 
 def _remember(samples: Places, result: Place) -> FunctionCall:
-    """What the next step's sensors need to know of this one."""
+    """Return the call that stores what the sensors of the next step need of this one."""
     memory, inputs = samples.rollout.memory, samples.rollout.inputs
     x, u = ca.SX.sym("x", samples.x.size), ca.SX.sym("u", samples.u.size)
     function = ca.Function("remember", [x, u], [ca.densify(memory.after(x, u, inputs))])

@@ -43,7 +43,7 @@ class QuantitySlopes:
         by_step: Sequence[str] = (),
         watched: Mapping[str, Formula] = NOTHING,
     ) -> None:
-        """Nothing is compiled before it is asked for; KernelUnavailable then, where nothing can be compiled.
+        """Prepare the kernels, which the first call compiles; that call raises KernelUnavailable without a compiler.
 
         ``by_step``: see ``rollout_program``.
         """
@@ -55,7 +55,7 @@ class QuantitySlopes:
         self.sizes = {name: self._program.outputs[name].size // self.steps for name in both}
 
     def values(self, Z: Array, lasts: Sequence[int], names: Sequence[str] | None = None) -> Iterator[Array]:
-        """For each row of Z (B, n): (last + 1, m) the quantities, side by side, at the starts of steps 0 .. last.
+        """Yield for each row of Z (B, n) the quantities (last + 1, m), side by side, at the starts of steps 0 .. last.
 
         ``names``: of some of them, or of those that are watched; by default all but these.
         """
@@ -65,7 +65,7 @@ class QuantitySlopes:
             yield from self._rows(found, names, [lasts[row] + 1 for row in rows], 1)
 
     def slopes(self, Z: Array, directions: Array, lasts: Sequence[int]) -> Iterator[tuple[Array, Array]]:
-        """The same with their derivatives: (last + 1, m) and (last + 1, m, d).
+        """Yield the quantities (last + 1, m) of each row and their derivatives (last + 1, m, d).
 
         ``directions``: (B, n, d) how the numbers of each row of Z change.
         """

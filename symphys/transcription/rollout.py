@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
@@ -14,7 +14,7 @@ from symphys.dynamics.kept import kept
 from symphys.expression import Formula
 from symphys.maths.verbatim import verbatim
 from symphys.model.world import World
-from symphys.problem import Problem
+from symphys.problem import ALIVE, Problem, Termination
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.feedback.controllers import Control
 from symphys.transcription.feedback.sensor_memory import SensorMemory, memory_of
@@ -25,8 +25,26 @@ from symphys.transcription.formula_names import (
     moving_names,
     varied_parameters,
 )
-from symphys.transcription.termination import termination_function
 from symphys.types import Expr
+
+
+def termination_function(
+    problem: Problem,
+    termination: Termination,
+    world: World,
+    inputs: Sequence[str],
+    parameters: Parameters,
+    memory: SensorMemory,
+) -> ca.Function:
+    """(x, after, p) -> the next state: ``after`` is all of it but ``alive``, as the step from x has it."""
+    margin = compile_formula(problem, world, inputs, parameters, memory, termination.margin)
+    x, after = ca.SX.sym("x", memory.size), ca.SX.sym("after", memory.size - 1)
+    p = ca.SX.sym("p", margin.size1_in(2))
+    blank = [ca.SX.zeros(margin.size1_in(i)) for i in (1, 3, 4)]
+    left = margin(ca.vertcat(after, 1), blank[0], p, blank[1], blank[2])
+    moved = ca.vertcat(after, left >= 0)
+    return ca.Function("termination", [x, after, p], [ca.if_else(x[memory.columns[ALIVE]] > 0, moved, x)])
+
 
 T = TypeVar("T")
 
@@ -62,7 +80,7 @@ class Rollout:
 
     @property
     def controls(self) -> int:
-        """How many of the inputs variables, controllers and laws may set: all but the shares of phases."""
+        """Return how many inputs variables, controllers and laws may set: all but the shares of phases."""
         return int(self.given.shape[0]) - len(self.world.scheduled)
 
     def with_shares(self, u: Expr, tick: Expr) -> Expr:
@@ -89,7 +107,7 @@ class Rollout:
         return bool(self.problem.varied) and not self.problem.free_duration and not self.world.scheduled
 
     def built(self, make: Callable[..., T], *more: Hashable) -> T:
-        """What a function makes of the world; problems of a sweep share it, as far as their worlds are equal."""
+        """Build something from the world; problems of a sweep with equal worlds share it."""
         scheme = self.parameters.scheme(self.problem.simulation)
         arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
         return kept(make, *arguments, *more) if self._shares else make(*arguments, *more)
@@ -109,7 +127,7 @@ class Rollout:
 
     @cached_property
     def termination(self) -> ca.Function | None:
-        """See ``termination_function``; None where nothing falls."""
+        """Return ``termination_function``; None for a problem without termination."""
         problem = self.problem
         if problem.termination is None:
             return None
@@ -131,7 +149,7 @@ class Rollout:
         return self.close(self.step)
 
     def close(self, step: ca.Function) -> ca.Function:
-        """From (x, u, p, smoothing) -> (x_next, ...) to the same of ([u; time] as variables give it) with u at the end.
+        """Put the controllers into a step (x, u, p, smoothing) -> (x_next, ...), which then takes [u; time] and adds u.
 
         Without controllers the second argument is u alone, and u is not among the results.
         """

@@ -70,19 +70,19 @@ class BoundEvaluator:
         self.evaluator, self.numbers = evaluator, numbers
 
     def value(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.value``."""
         return self.evaluator.value(self.joined(Z), smoothing)
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.gradient``."""
         return self.cut(self.evaluator.gradient(self.joined(Z), smoothing))
 
     def residuals(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.residuals``."""
         return self.evaluator.residuals(self.joined(Z), smoothing)
 
     def jacobian(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.jacobian``."""
         return self.cut(self.evaluator.jacobian(self.joined(Z), smoothing))
 
     def joined(self, Z: Array) -> Array:

@@ -13,8 +13,8 @@ from symphys.dynamics.observation import reading_function
 from symphys.model.joints import Joint
 from symphys.model.state_layout import GIVEN, Layout, input_columns
 from symphys.trajectory import NotFinite, Trajectory
-from symphys.transcription.formulas.recorded_parts import RolloutArrays
-from symphys.transcription.nan_tracing.steps import first_non_finite
+from symphys.transcription.nan_tracing import first_non_finite
+from symphys.transcription.recorded_parts import RolloutArrays
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 
@@ -127,7 +127,7 @@ def _joints(rollout: Rollout, x: Array, u: Array, p: Array) -> dict[str, Any]:
 
 
 def _unit(joint: Joint) -> str:
-    """Of a joint's coordinates; empty where it has none."""
+    """Return the units of a joint's coordinates; none for a joint without coordinates."""
     return "".join("rad" if coordinate.turns else "m" for coordinate in joint.kind.coordinates[:1])
 
 

@@ -34,11 +34,11 @@ class BatchStep(Protocol):
 
     @property
     def sizes(self) -> Mapping[str, int]:
-        """See above."""
+        """Return the sizes of the results by name, in their order."""
 
     @property
     def doubt(self) -> str:
-        """See above."""
+        """Return ``Kernel.doubt``."""
 
     def forward(self, rows: Array, smoothing: Sequence[float]) -> Mapping[str, Array]:
         """(B, m) -> results by name, each (B, size)."""
@@ -67,7 +67,7 @@ class Stage:
         looks_at_z: bool = True,
         shows_inputs: bool = False,
     ) -> None:
-        """Of a rollout.
+        """Describe one step of a rollout.
 
         Args:
             rollout: of the problem.
@@ -90,7 +90,7 @@ class Stage:
         return self._values.setdefault((formula, shift), ca.SX.sym("value", size))
 
     def compiled(self, exact: bool, backend: str, threads: int) -> KernelStep:
-        """By a kernel; KernelUnavailable if that cannot be. ``exact``: for smoothing 0 only."""
+        """Compile a kernel, for smoothing 0 only if ``exact``; KernelUnavailable without a compiler."""
         program = self.program(exact)
         return KernelStep(build_kernel(backend, program, list(program.outputs), threads))
 
@@ -168,14 +168,14 @@ class KernelStep:
     """A stage by a kernel; see ``BatchStep``."""
 
     def __init__(self, kernel: Kernel) -> None:
-        """Of ``Stage.program``."""
+        """Wrap a kernel of ``Stage.program``."""
         self.kernel = kernel
         self.sizes = {name: kernel.program.outputs[name].size for name in kernel.seeded}
         self.forward, self.gradient = kernel.forward, kernel.gradient
 
     @property
     def doubt(self) -> str:
-        """See ``Kernel.doubt``."""
+        """Return ``Kernel.doubt``."""
         return self.kernel.doubt
 
 
@@ -185,17 +185,17 @@ class VirtualMachineStep:
     doubt = ""
 
     def __init__(self, value: ca.Function) -> None:
-        """Of (row, smoothing) -> results."""
+        """Wrap a function (row, smoothing) -> results."""
         self._value, self._pull = value, value.reverse(1)
         self.sizes = {value.name_out(k): int(value.size1_out(k)) for k in range(value.n_out())}
 
     def forward(self, rows: Array, smoothing: Sequence[float]) -> Mapping[str, Array]:
-        """See ``BatchStep``."""
+        """Implement ``BatchStep.forward``."""
         found = [[np.array(part).ravel() for part in self._value.call([row, smoothing[0]])] for row in rows]
         return {name: np.array([each[i] for each in found]) for i, name in enumerate(self.sizes)}
 
     def gradient(self, rows: Array, seeds: Array, smoothing: Sequence[float]) -> tuple[Any, Array]:
-        """See ``BatchStep``."""
+        """Implement ``BatchStep.gradient``."""
         cuts, slopes = np.cumsum(list(self.sizes.values()))[:-1], []
         for row, seed in zip(rows, seeds, strict=True):
             values, parts = self._value.call([row, smoothing[0]]), np.split(seed, cuts)

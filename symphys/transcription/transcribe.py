@@ -15,7 +15,7 @@ from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.network_rollout import has_large_nets
 from symphys.transcription.objective import bounds, has_squares, limits
 from symphys.transcription.program import program_identity, rollout_program
-from symphys.transcription.randomization.numbers import swept_inputs
+from symphys.transcription.randomization.sampler import swept_inputs
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.shared_kernel import shared_backend
 from symphys.transcription.transcription import Transcription
@@ -54,7 +54,7 @@ def transcribe(
 
 
 def _transcribed(problem: Problem, exact: bool, backend: str, threads: int | None) -> Transcription:
-    """Of one rollout that is an expression."""
+    """Transcribe a problem whose rollout is one expression."""
     began = perf_counter()
     rollout = symbolic_rollout(problem)
     functions = ExpressionFunctions(rollout)
@@ -91,7 +91,7 @@ def _stages(rollout: Rollout, backend: str, threads: int | None, exact: bool) ->
 def _evaluating(
     rollout: Rollout, functions: ExpressionFunctions, exact: bool, backend: str, threads: int | None
 ) -> Backend:
-    """What evaluates a rollout; problems of a sweep share a kernel."""
+    """Choose the backend of a rollout; problems of a sweep share a kernel."""
     problem = rollout.problem
     inputs = () if backend == "casadi" else swept_inputs(problem)
     if inputs:

@@ -52,11 +52,11 @@ class Transcription:
 
     @property
     def terms(self) -> Terms:
-        """What is asked of the exact rollout, as expressions; made when first asked for, which takes its time."""
+        """Return the terms of the exact rollout as expressions; built at the first access, which can take seconds."""
         return self.functions.terms
 
     def judge(self, z: Array, smoothing: float = 0.0) -> Assessment:
-        """How ``z`` does in the exact rollout, or in a smoothed one."""
+        """Assess ``z`` by the exact rollout, or by a smoothed one."""
         return self._judge(z, smoothing)
 
     def simulate(self, z: Array, smoothing: float = 0.0) -> Trajectory:
@@ -78,7 +78,7 @@ class Transcription:
         return motion_of(self.rollout, np.arange(len(x), dtype=np.float64) * float(dt), x, u, p)
 
     def timed(self, record: Record) -> Transcription:
-        """The same with the duration of a motion in place of that of the file; itself if no variable sets it."""
+        """Return a copy with the duration of a recorded motion; itself if no variable sets the duration."""
         if not self.problem.free_duration:
             return self
         simulation, duration = self.problem.simulation, float(record.arrays.time[-1])
@@ -107,7 +107,7 @@ class Transcription:
 
     @cached_property
     def probe(self) -> Probe:
-        """What is differentiated to examine the gradient."""
+        """Return the number that is differentiated to examine the gradient."""
         return ExpressionProbe(self.rollout, self.terms, self.shooting.evaluator)
 
     def back(self, record: Record, ends: Array) -> Iterator[Array]:

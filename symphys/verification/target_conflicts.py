@@ -17,7 +17,7 @@ from symphys.problem import Target
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import NotFinite
 from symphys.transcription import Record, Rollout, Transcription
-from symphys.transcription.formulas.recorded_parts import part_numbers
+from symphys.transcription.recorded_parts import part_numbers
 from symphys.types import Array
 from symphys.verification.held_bounds import lies_at
 from symphys.verification.sensitivity_growth import DIRECTIONS

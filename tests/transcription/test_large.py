@@ -19,7 +19,7 @@ from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.texts import read_axes
 from symphys.shooting import ScenarioEvaluator
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.network_rollout import LargeEvaluator, LargeTranscription, net_values, require_small_nets
+from symphys.transcription.network_rollout import LargeEvaluator, LargeTranscription, layers, require_small_nets
 from symphys.transcription.network_rollout import evaluator as evaluators
 from symphys.transcription.network_rollout import partition as split
 from symphys.types import Array
@@ -278,9 +278,9 @@ def test_values_and_gradients(both: tuple[Transcription, LargeTranscription], sm
     Z = points(within)
     a = within.shooting.evaluator.gradient(Z, smoothing)
     assert a.gradient is not None
-    for columns, kept in ((1, 1), (4, 150), (net_values.SEGMENT_COLUMNS, evaluators.KEPT_NUMBERS)):
+    for columns, kept in ((1, 1), (4, 150), (layers.SEGMENT_COLUMNS, evaluators.KEPT_NUMBERS)):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(net_values, "SEGMENT_COLUMNS", columns)
+            patch.setattr(layers, "SEGMENT_COLUMNS", columns)
             patch.setattr(evaluators, "KEPT_NUMBERS", kept)
             b = beside.shooting.evaluator.gradient(Z, smoothing)
         assert b.gradient is not None

@@ -10,8 +10,8 @@ import pytest
 from symphys.codegen import compile_program, interpret
 from symphys.problem import Problem, problem_of_tables
 from symphys.transcription import rollout_program, transcribe
-from symphys.transcription.formulas.long_sums import CHUNK
 from symphys.transcription.objective import LONG
+from symphys.transcription.program import CHUNK
 from symphys.transcription.rollout import symbolic_rollout
 
 FREE = {"value": "0.1 * ball.position[0] + 0.2", "weight": 0.3}

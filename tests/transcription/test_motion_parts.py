@@ -10,7 +10,7 @@ import pytest
 from symphys.errors import ProblemError, SymphysError
 from symphys.problem import Problem, load_problem
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.nan_tracing.steps import first_non_finite
+from symphys.transcription.nan_tracing import first_non_finite
 from symphys.transcription.open_step import compile_open_step
 
 BALL = """

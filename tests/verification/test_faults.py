@@ -8,7 +8,7 @@ import pytest
 
 from symphys.trajectory import NotFinite
 from symphys.transcription import first_non_finite, first_non_finite_derivative
-from symphys.transcription.nan_tracing.operations import non_finite_operation
+from symphys.transcription.nan_tracing import non_finite_operation
 from symphys.verification import examine
 
 THROW = """

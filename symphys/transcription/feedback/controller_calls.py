@@ -57,7 +57,7 @@ class ControllerCalls:
         return list(dict.fromkeys(name for c in self.rollout.problem.controllers for name in c.senses))
 
     def sense(self, name: str) -> Place:
-        """What a sensor reads."""
+        """Add the call of a sensor and return the place of its reading."""
         sensor = next(s for s in self.rollout.problem.sensors if s.name == name)
         places = self.places
         return self.call(self.rollout.control.sensor(sensor), places.x, places.p, places.time)
@@ -69,7 +69,7 @@ class ControllerCalls:
         return result
 
     def outputs(self, controller: FeedbackController, senses: Sequence[Place]) -> list[Place]:
-        """What a controller gives: places that are joined one after the other."""
+        """Add the calls of a controller and return the places of its outputs, in order."""
         law = controller.law
         if isinstance(law, Net):
             return self.net(law, self.numbers(controller, "weights"), senses)
@@ -82,7 +82,7 @@ class ControllerCalls:
         return [self.call(function, *senses, self.places.time, *held)]
 
     def numbers(self, controller: FeedbackController, key: str) -> Place:
-        """Where a controller's numbers lie among the parameters."""
+        """Return the place of a controller's numbers among the parameters."""
         return part(self.places.p, self.rollout.parameters.columns[f"{controller.name}.{key}"])
 
     def net(self, net: Net, weights: Place, senses: Sequence[Place]) -> list[Place]:

@@ -33,7 +33,7 @@ class SensorMemory:
 
     @cached_property
     def columns(self) -> dict[str, slice]:
-        """Where each lies in the whole state: inputs by their names, velocities as ``torso.velocity``."""
+        """Map inputs by name and velocities such as ``torso.velocity`` to their columns of the whole state."""
         sizes, start, found = input_sizes(self.world), Layout(self.world).size, dict[str, slice]()
         lengths = [(name, sizes[name]) for name in self.inputs] + [(f"{body}.velocity", 3) for body in self.bodies]
         lengths += [(ALIVE, 1)] * self.terminates
@@ -44,7 +44,7 @@ class SensorMemory:
 
     @cached_property
     def size(self) -> int:
-        """Of the whole state."""
+        """Return the size of the whole state."""
         return max((part.stop for part in self.columns.values()), default=Layout(self.world).size)
 
     def start(self, x: Expr) -> Expr:
@@ -62,16 +62,16 @@ class SensorMemory:
         return ca.vertcat(type(x)(0, 1), *given, *(x[layout[f"{body}.velocity"]] for body in self.bodies))
 
     def velocities(self, x: Expr) -> dict[str, Expr]:
-        """By body, its velocity one step before."""
+        """Return the velocity of each body one step before."""
         return {body: x[self.columns[f"{body}.velocity"]] for body in self.bodies}
 
     def commands(self, x: Expr) -> dict[str, Expr]:
-        """By name, the inputs of the step before."""
+        """Return the inputs of the step before by name."""
         return {name: x[self.columns[name]] for name in self.inputs}
 
 
 def memory_of(problem: Problem, world: World) -> SensorMemory:
-    """What the sensors of a problem, and its accelerometers, make necessary."""
+    """Collect the memory that the sensors of a problem need."""
     sensed = frozenset[str]().union(*(formula.names for sensor in problem.sensors for formula in sensor.formulas))
     objectives: list[Cost | Target | Constraint | Output] = [
         *problem.costs,

@@ -82,7 +82,7 @@ class StateReader:
         return whole
 
     def values(self, x: Array) -> dict[str, Array]:
-        """What a state (nx,) is by the names of ``sizes``."""
+        """Split a state (nx,) by the names of ``sizes``."""
         world = x[: self._layout.size]
         now = [np.array(part).ravel() for part in self._reading(world, self._nominal)[:2]]
         found = {name: now[which][columns] for name, (which, columns, _) in self._joints.items()}

@@ -18,8 +18,7 @@ from symphys.transcription.network_rollout.forward_backward import (
     forward,
     objective_arguments,
 )
-from symphys.transcription.network_rollout.layers import Layers
-from symphys.transcription.network_rollout.net_values import KEPT_NUMBERS
+from symphys.transcription.network_rollout.layers import KEPT_NUMBERS, Layers
 from symphys.transcription.stage import BatchStep
 from symphys.types import Array
 
@@ -161,21 +160,21 @@ class LargeEvaluator(WithoutResiduals):
         return Shared(merit[:, 0], objective[:, 0], errors, outputs, lasted)
 
     def value(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.value``."""
         return self._value(list(self.context.partition.whole(Z)[:, None]), smoothing)
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.gradient``."""
         found = self._gradient(list(self.context.partition.whole(Z)[:, None]), smoothing)
         assert found.gradient is not None, "gradients were asked for"
         return replace(found, gradient=np.ascontiguousarray(found.gradient[:, : Z.shape[1]]))
 
     def sample_values(self, rows: Array, smoothing: float) -> Values:
-        """See ``SampleEvaluator``."""
+        """Implement ``SampleEvaluator.sample_values``."""
         return self._value(self._alike(rows), smoothing)
 
     def sample_gradients(self, rows: Array, smoothing: float, discount: float, skipped: int) -> Values:
-        """See ``SampleEvaluator``."""
+        """Implement ``SampleEvaluator.sample_gradients``."""
         return self._gradient(self._alike(rows), smoothing, discount, skipped)
 
     def _value(self, groups: Sequence[Array], smoothing: float) -> Values:
@@ -183,7 +182,7 @@ class LargeEvaluator(WithoutResiduals):
         return _values(stacked([self.shared(self._weights(Z), Z[:, small], smoothing) for Z in groups]))
 
     def _gradient(self, groups: Sequence[Array], smoothing: float, discount: float = 0.0, skipped: int = 0) -> Values:
-        """Of rows in groups that share their weights."""
+        """Evaluate gradients of rows in groups that share their weights."""
         partition, backward, slopes = self.context.partition, Backward(discount, each=True), list[Array]()
         found = list[Shared]()
         for rows in groups:
@@ -217,11 +216,11 @@ class LargeProbe:
     """See ``Probe``; by the passes that solvers' gradients are made of."""
 
     def __init__(self, evaluator: LargeEvaluator) -> None:
-        """By the nets and steps of an evaluator."""
+        """Use the nets and steps of an evaluator."""
         self._evaluator, self._context = evaluator, evaluator.context
 
     def values(self, Z: Array) -> Array:
-        """See ``Probe``."""
+        """Implement ``Probe.values``."""
         motions = (self._evaluator.forward_pass(z, 0.0) for z in Z)
         return np.array(
             [
@@ -231,7 +230,7 @@ class LargeProbe:
         )
 
     def gradient(self, z: Array) -> Array:
-        """See ``Probe``."""
+        """Implement ``Probe.gradient``."""
         evaluator = self._evaluator
         nets, motion = evaluator.nets_at(z), evaluator.forward_pass(z, 0.0, KEPT_NUMBERS)
         slopes = self._context.objectives.probe_slopes

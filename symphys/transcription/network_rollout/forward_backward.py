@@ -17,8 +17,7 @@ import numpy as np
 
 from symphys.codegen.backends.calls import row_by_row
 from symphys.transcription.network_rollout.context import RolloutContext
-from symphys.transcription.network_rollout.layers import Layers
-from symphys.transcription.network_rollout.net_values import NetValues, values_of
+from symphys.transcription.network_rollout.layers import Layers, NetValues, values_of
 from symphys.transcription.stage import BatchStep
 from symphys.types import Array
 
@@ -118,7 +117,7 @@ def forward(
 
 
 def objective_arguments(context: RolloutContext, motion: ForwardPass, b: int) -> list[Array]:
-    """What ``context.objectives`` takes, for one robot."""
+    """Return the arguments of ``context.objectives`` for one robot."""
     samples = context.objectives.samples
     moments = [part for k, row in samples.moments for part in (motion.x[k][b], motion.u[row, b])]
     series, start = [], 0
@@ -202,7 +201,7 @@ class BackwardPass:
         return self.z, self.weights
 
     def segment(self, number: int, end: int, x: Array, sensed: Array, given: Array) -> tuple[Array, Array]:
-        """From step ``end`` back to the first of a segment: adjoints of the state and of what is sensed there."""
+        """Go from step ``end`` back to the first of a segment; return the adjoints of its state and sensor readings."""
         first, robots = number * self.motion.values[0].length, len(x)
         values = [own.again(number) for own in self.motion.values]
         for k in range(end - 1, first - 1, -1):
@@ -248,7 +247,7 @@ def back(
     smoothing: float,
     ends: Array,
 ) -> Iterator[Array]:
-    """See ``Transcription.back``; of the first robot of a pass."""
+    """Implement ``Transcription.back`` for the first robot of a pass."""
     count, interval = ends.shape[1], float(motion.interval[0, 0])
     nx, nu = motion.x.shape[2], motion.u.shape[2]
     sense, x = context.sense.reverse(count), ends.T

@@ -13,7 +13,7 @@ from symphys.errors import Issue, ProblemError
 from symphys.model.controllers import Net
 from symphys.problem import Constraint, Cost, FeedbackController, Output, Problem, Target
 from symphys.transcription.formula_names import input_names, spans
-from symphys.transcription.randomization.numbers import swept_inputs
+from symphys.transcription.randomization.sampler import swept_inputs
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.types import Array
 
@@ -33,7 +33,7 @@ def has_large_nets(problem: Problem) -> bool:
 
 
 def large_nets(problem: Problem) -> tuple[FeedbackController, ...]:
-    """Those that are."""
+    """Return the controllers that are large nets."""
     return tuple(controller for controller in problem.controllers if is_large(controller))
 
 

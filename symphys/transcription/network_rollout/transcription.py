@@ -44,7 +44,7 @@ class LargeTranscription(Transcription):
     context: RolloutContext
 
     def judge(self, z: Array, smoothing: float = 0.0) -> Assessment:
-        """See ``Transcription``."""
+        """Implement ``Transcription.judge``."""
         motion = self._plain.forward_pass(z, smoothing)
         _, objective, errors, costs, outputs = (
             np.array(part).ravel()
@@ -53,7 +53,7 @@ class LargeTranscription(Transcription):
         return assessment(self.problem, float(objective[0]), costs, errors, outputs)
 
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
-        """See ``Transcription``."""
+        """Implement ``Transcription.record``."""
         motion = self._plain.forward_pass(z, smoothing)
         found = simulate(self.rollout, lambda *_: self._happened(motion, smoothing), motion.z[0], smoothing)
         return replace(found, z=np.asarray(z, float))
@@ -61,22 +61,22 @@ class LargeTranscription(Transcription):
     def prices(
         self, kinds: Iterable[str] = ("gradient",), clock: Callable[[], float] = perf_counter
     ) -> dict[str, float]:
-        """See ``Transcription``."""
+        """Implement ``Transcription.prices``."""
         return gradient_prices(self.shooting, kinds, clock)
 
     @cached_property
     def probe(self) -> Probe:
-        """See ``Transcription``."""
+        """Implement ``Transcription.probe``."""
         return LargeProbe(self._plain)
 
     def back(self, record: Record, ends: Array) -> Iterator[Array]:
-        """See ``Transcription``."""
+        """Implement ``Transcription.back``."""
         plain, smoothing = self._plain, record.arrays.smoothing
         motion = plain.forward_pass(record.z, smoothing)
         return back(self.context, plain.batch_step, plain.nets_at(record.z), motion, smoothing, ends)
 
     def pull(self, record: Record, states: Mapping[int, Array], parameters: Array) -> Array | None:
-        """See ``Transcription``."""
+        """Implement ``Transcription.pull``."""
         return None
 
     @cached_property
@@ -85,7 +85,7 @@ class LargeTranscription(Transcription):
         return LargeEvaluator(self.context, self.context.plain, 1)
 
     def _happened(self, motion: ForwardPass, smoothing: float) -> list[Any]:
-        """What ``recorder`` gives, of the first robot."""
+        """Return the results of ``recorder`` for the first robot."""
         step, steps = self.rollout.report, self.rollout.steps
         x, u, given, p = motion.x[:, 0].T, motion.u[:, 0].T, motion.given[:, 0].T, motion.p[0]
         _, *happened = step.map(steps)(x[:, :-1], u, np.tile(p[:, None], steps), smoothing)
@@ -95,7 +95,7 @@ class LargeTranscription(Transcription):
 def transcribe_large(
     problem: Problem, exact: bool = False, backend: str = BEST, threads: int | None = None
 ) -> LargeTranscription:
-    """See ``transcribe``: "simd32" has nets in single precision, and steps in double all the same."""
+    """Transcribe a problem with large nets; with "simd32" nets are in single precision, steps in double."""
     began = perf_counter()
     context = make_context(problem)
     built = perf_counter() - began

@@ -15,20 +15,83 @@ from symphys.codegen import KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS
 from symphys.codegen.backends.calls import row_by_row
 from symphys.codegen.backends.precision import warn
-from symphys.problem import ALIVE, Problem
+from symphys.model.state_layout import GIVEN, Layout
+from symphys.problem import ALIVE, Cost, Problem, Target
 from symphys.transcription.decision_variables import start_of
-from symphys.transcription.open_step.costs import (
-    body_columns,
-    looks_at_variables,
-    moments,
-    observe_function,
-    open_stage,
-)
 from symphys.transcription.open_step.opening import Opening, opened
 from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import Rollout, symbolic_rollout
-from symphys.transcription.stage import BatchStep
-from symphys.types import Array
+from symphys.transcription.stage import BatchStep, Stage, Value, sense_function
+from symphys.types import Array, Expr
+
+
+def looks_at_variables(problem: Problem) -> bool:
+    """Whether a cost or target has a variable in its formula."""
+    names = {variable.name for variable in problem.variables}
+    return any(not names.isdisjoint(each.formula.names) for each in asked(problem))
+
+
+def asked(problem: Problem) -> list[Cost | Target]:
+    """Return the costs and targets, whose sum is the objective."""
+    return [*problem.costs, *problem.targets]
+
+
+def moments(problem: Problem) -> tuple[int, ...]:
+    """The steps, by number, in which something is asked for at one instant: at their starts, in the last at its end."""
+    last = problem.simulation.steps
+    instants = {each.at for each in asked(problem) if each.at != "always"}
+    return tuple(sorted({last if isinstance(at, str) else round(at / problem.simulation.dt) for at in instants}))
+
+
+def costs(rollout: Rollout, value: Value) -> tuple[Expr, Expr]:
+    """Return the running costs of a step, and the costs (moments,) that the step with each of these numbers adds.
+
+    Over all steps of a horizon both add up to the objective.
+    """
+    problem, dt = rollout.problem, rollout.dt
+    running: Expr = ca.DM(0)
+    ticks = moments(problem)
+    single: list[Expr] = [ca.DM(0) for _ in ticks]
+    for each in asked(problem):
+        squares = each.squares if isinstance(each, Cost) else True
+        if each.at == "always":
+            shifts = (0, 1) if rollout.moves(each.formula) else (0,)
+            for shift in shifts:
+                running = running + each.weight * dt / len(shifts) * size(value(each.formula, shift), squares)
+        else:
+            tick = rollout.tick(each.at)
+            found = value(each.formula, 1 if tick == problem.simulation.steps else 0)
+            single[ticks.index(tick)] = single[ticks.index(tick)] + each.weight * size(found, squares)
+    return running, ca.vertcat(ca.DM(0, 1), *single)
+
+
+def size(value: Expr, squares: bool) -> Expr:
+    """A cost of a value: its square, or itself."""
+    return ca.sumsqr(value) if squares else value
+
+
+def open_stage(rollout: Rollout, sensors: Sequence[str]) -> Stage:
+    """A step with the costs ``running`` and ``moments``; see ``costs``."""
+
+    def ask(value: Value) -> dict[str, Expr]:
+        return dict(zip(("running", "moments"), costs(rollout, value), strict=True))
+
+    return Stage(rollout, observe_function(rollout, sensors), ask, looks_at_variables(rollout.problem))
+
+
+def observe_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
+    """(x, p, time) -> what these sensors read; without any, the states of all bodies."""
+    if sensors:
+        return sense_function(rollout, sensors)
+    x, p, time = ca.SX.sym("x", rollout.x0.shape[0]), ca.SX.sym("p", rollout.p.shape[0]), ca.SX.sym("time")
+    columns = [x[part] for _, part in body_columns(rollout)]
+    return ca.Function("sense", [x, p, time], [ca.densify(ca.vertcat(ca.SX(0, 1), *columns))])
+
+
+def body_columns(rollout: Rollout) -> list[tuple[str, slice]]:
+    """Name and columns of the state of each body."""
+    layout = Layout(rollout.world)
+    return [(f"{body.name}.{key}", layout[f"{body.name}.{key}"]) for body in rollout.world.bodies for key in GIVEN]
 
 
 class StepStart(NamedTuple):
@@ -100,7 +163,7 @@ class CompiledStep:
 
     @cached_property
     def observations(self) -> tuple[str, ...]:
-        """What each number of an observation is: ``feeling[0]`` of a sensor, or ``ball.position[2]``."""
+        """Return the name of each number of an observation: ``feeling[0]`` of a sensor, or ``ball.position[2]``."""
         sizes = {sensor.name: sensor.size for sensor in self.problem.sensors}
         parts = [(name, sizes[name]) for name in self._opening.sensors]
         parts = parts or [(name, part.stop - part.start) for name, part in body_columns(self._rollout)]
@@ -108,7 +171,7 @@ class CompiledStep:
 
     @cached_property
     def columns(self) -> dict[str, slice]:
-        """Where quantities lie in a state: ``ball.position`` (3) [m], ``ball.velocity``, ..., world frame."""
+        """Map quantities to columns of a state: ``ball.position`` (3) [m], ``ball.velocity``, ..., world frame."""
         return dict(body_columns(self._rollout))
 
     @property
@@ -117,7 +180,7 @@ class CompiledStep:
         return self._rollout.steps
 
     def start(self, count: int = 1, seed: int | None = None) -> StepStart:
-        """Where motions begin.
+        """Return initial states.
 
         Args:
             count: B.
@@ -134,7 +197,7 @@ class CompiledStep:
         return self.start_at(rows) if len(rows) == count else StepStart(*(tiled(p, count) for p in self.start_at(rows)))
 
     def start_at(self, rows: Sequence[Array]) -> StepStart:
-        """Where motions begin, of values of all variables, a row each."""
+        """Return the initial states for values of all variables, one row each."""
         x, inputs, p, sensed = row_by_row(self._start, np.array(rows))
         z = [np.array(rows)] if self._sizes[-1] else []
         state = np.concatenate([x, p, np.zeros((len(x), 1)), *z], axis=1)
@@ -258,7 +321,7 @@ class CompiledStep:
 
     @cached_property
     def _sizes(self) -> tuple[int, int, int, int]:
-        """Of x, p, time and z in a state."""
+        """Return the columns of x, p, time and z in a state."""
         rollout = self._rollout
         n = int(rollout.z.shape[0]) if looks_at_variables(self.problem) else 0
         return int(rollout.x0.shape[0]), int(rollout.p.shape[0]), 1, n
@@ -316,7 +379,7 @@ def compile_open_step(
 
 
 def evaluated_by(rollout: Rollout, opening: Opening, exact: bool, backend: str, threads: int) -> tuple[BatchStep, str]:
-    """What computes the step, and that in words; casadi's virtual machine where there can be no kernel."""
+    """Choose a kernel, or casadi's virtual machine without a compiler, and describe the choice."""
     note, stage = "", open_stage(rollout, opening.sensors)
     if backend in PRECISIONS:
         try:

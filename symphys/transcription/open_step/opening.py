@@ -54,7 +54,7 @@ class Opening:
         return np.array([getattr(action, end) for action in self.acting], float)
 
     def inputs(self, problem: Problem) -> tuple[str, ...]:
-        """What u stacks: the inputs of a problem, and those that actions add to."""
+        """Return the inputs that u stacks: those of the problem, and those that actions add to."""
         return tuple(dict.fromkeys([*input_names(problem), *(action.input for action in self.acting)]))
 
     def place(self, world: World, inputs: Sequence[str]) -> Array:
@@ -129,7 +129,7 @@ def known_name(name: str, known: Sequence[str] | dict[str, FeedbackController], 
 
 
 def outputs(controller: FeedbackController) -> list[Action]:
-    """What a controller gives, before it is scaled."""
+    """Return the unscaled outputs of a controller as actions."""
     law = controller.law
     most = 1.0 if isinstance(law, Net) and law.output == "tanh" and not law.skip else np.inf
     return [
@@ -139,7 +139,7 @@ def outputs(controller: FeedbackController) -> list[Action]:
 
 
 def knots(variable: Variable) -> list[Action]:
-    """What a variable sets over time, with the widest bounds of its knots."""
+    """Return the inputs that a variable sets over time as actions, with the widest bounds of its knots."""
     count = variable.components
     lower, upper = variable.lower.reshape(-1, count).min(axis=0), variable.upper.reshape(-1, count).max(axis=0)
     return [
@@ -175,7 +175,7 @@ def reach(joint: Joint, k: int) -> tuple[float, float]:
 
 
 def slots(variable: Variable) -> str:
-    """What a variable sets, as formulas name it."""
+    """Return the quantities that a variable sets, as formulas name them."""
     return " or ".join(slot.name for slot in variable.slots)
 
 

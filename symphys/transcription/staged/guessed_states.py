@@ -12,7 +12,7 @@ from symphys.model.state_layout import Layout
 from symphys.problem import DURATION, GuessedMotion
 from symphys.problem.guess.motion import is_orientation, turn_between
 from symphys.problem.guess.names import ball_joints, guessable, rate_of
-from symphys.transcription.staged.columns import ByColumns
+from symphys.transcription.staged.stage_functions import ByColumns
 from symphys.transcription.staged.staged_problem import RolloutStages
 from symphys.types import Array, Ints
 
@@ -44,7 +44,7 @@ def guessed_states(stages: RolloutStages, guess: GuessedMotion, z: Array, ticks:
 
 
 def _entries(name: str, names: list[str]) -> Iterator[int]:
-    """Where a quantity is in the tangent, which calls places and rates of joints the same for all kinds."""
+    """Return the columns of a quantity in the tangent, where all joints have coordinates and rates."""
     owner, _, field = name.rpartition(".")
     jointed = f"{owner}.coordinate[0]" in names
     words = {"angle": "coordinate", "position": "coordinate", "orientation": "coordinate", "angular_velocity": "rate"}
@@ -54,7 +54,7 @@ def _entries(name: str, names: list[str]) -> Iterator[int]:
 
 
 def _stretch(stages: RolloutStages, z: Array) -> float:
-    """How many times as long as the file has it the motion of z takes."""
+    """Return the duration of the motion of z divided by that in the file."""
     problem, columns = stages.rollout.problem, stages.rollout.parameters.columns
     if not problem.free_duration:
         return 1.0

@@ -57,7 +57,7 @@ class Linearization:
         return next(self._by_statics(motion, p, iter([slopes])))
 
     def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
-        """The same in runs of steps, the last run first, each as soon as it is known; they are begun at once."""
+        """Yield slopes of runs of steps, the last run first; all runs start at once."""
         p = self.begun(motion.z)[2]
         return self._by_statics(motion, p, self.step.slopes_from_end(motion.x[:-1], motion.u, p, motion.smoothing))
 
@@ -73,7 +73,7 @@ class Linearization:
             yield Linearized(a, b, c, start)
 
     def start_slopes(self, motion: StagedMotion) -> tuple[Array, Array, Array]:
-        """By the static entries: the first state in its tangent (n, s), what lies beside that (nx, s), p (np, s)."""
+        """Differentiate by the static entries: the first state in its tangent (n, s), its rest (nx, s), p (np, s)."""
         if not len(self.statics):
             nx, n, _, np_ = self.step.arguments.sizes
             return np.zeros((n, 0)), np.zeros((nx, 0)), np.zeros((np_, 0))

@@ -56,7 +56,7 @@ class LinearizedStep:
 
     @cached_property
     def arguments(self) -> StepArguments:
-        """Of the step."""
+        """Return the arguments of the step."""
         return StepArguments(self.rollout, self.tangent, self.parameters)
 
     def step(self, k: int | NDArray[np.int64], X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Array:
@@ -68,7 +68,7 @@ class LinearizedStep:
         return self._step.values(varying, given)
 
     def difference(self, X: ArrayLike, Y: ArrayLike) -> Array:
-        """See ``Tangent.difference``: (B, nx), (B, nx) -> (B, n), with the parameters of the guess."""
+        """Return ``Tangent.difference`` of (B, nx), (B, nx) as (B, n), with the parameters of the guess."""
         first, second = np.asarray(X, float), np.asarray(Y, float)
         if self._apart is None or not self._apart.lends(len(first)):
             return self.tangent.difference(first, second)
@@ -108,7 +108,7 @@ class LinearizedStep:
     def slopes_from_end(
         self, X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float, after: ArrayLike | None = None
     ) -> Iterator[Slopes]:
-        """The same of runs of steps, the last run first, each as soon as it is known; they are begun at once."""
+        """Yield ``slopes`` of runs of steps, the last run first; all runs start at once."""
         k = np.arange(len(np.asarray(X)))
         after = self.step(k, X, U, P, smoothing) if after is None else after
         varying, given = self.rows(k, X, after, U, P, smoothing)
@@ -116,11 +116,11 @@ class LinearizedStep:
 
     @property
     def _columns(self) -> int:
-        """By how many numbers a step is differentiated: d, u, and p as far as z sets it."""
+        """Return the number of columns of a Jacobian: d, u, and the entries of p that z sets."""
         return sum(self.arguments.varying[:3])
 
     def _cut(self, jacobians: Array) -> Slopes:
-        """By states, inputs and parameters."""
+        """Split Jacobians into those by states, inputs and parameters."""
         _, n, m, np_ = self.arguments.sizes
         a, b, varied = np.split(jacobians, [n, n + m], 2)
         if not varied.shape[2]:
@@ -138,7 +138,7 @@ class LinearizedStep:
     def rows(
         self, k: Any, X: ArrayLike, after: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float
     ) -> tuple[Array, Array]:
-        """What varies and what is given, a row a state; see ``StepArguments``."""
+        """Return the varying and the given arguments, one row a state; see ``StepArguments``."""
         x, aim, u, p = (np.atleast_2d(np.asarray(each, float)) for each in (X, after, U, P))
         count, (_, n, m, np_) = len(x), self.arguments.sizes
         p = np.broadcast_to(p, (count, np_))
@@ -158,7 +158,7 @@ class LinearizedStep:
 
     @cached_property
     def description(self) -> str:
-        """What evaluates slopes, in words."""
+        """Describe the evaluator of the slopes."""
         if isinstance(self._off, _ByCasadi):
             return f"casadi's virtual machine{self._note}"
         report = self._off.kernel.report
@@ -170,7 +170,7 @@ class LinearizedStep:
 
     @cached_property
     def _step(self) -> _ByKernel | _ByCasadi:
-        """What gives states after the step."""
+        """Return the evaluator of next states."""
         try:
             return _ByKernel(self._kernel(step_program(self.arguments, self.exact, False)))
         except (KernelUnavailable, ProgramError):
@@ -178,7 +178,7 @@ class LinearizedStep:
 
     @cached_property
     def _off(self) -> _BySlopes | _ByCasadi:
-        """What gives slopes."""
+        """Return the evaluator of slopes."""
         try:
             self._refuse()
             return _BySlopes(compile_slopes(step_program(self.arguments, self.exact, True), "off", threads=self._count))
@@ -188,7 +188,7 @@ class LinearizedStep:
 
     @cached_property
     def _apart(self) -> _ByKernel | None:
-        """What gives differences of states."""
+        """Return the kernel for differences of states; None without one."""
         try:
             return _ByKernel(self._kernel(difference_program(self.tangent)))
         except (KernelUnavailable, ProgramError):

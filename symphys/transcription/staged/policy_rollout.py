@@ -80,7 +80,7 @@ class PolicyRollout:
 
     @cached_property
     def kernel(self) -> ProcessorKernel | None:
-        """What evaluates; None without a compiler."""
+        """Return the compiled kernel; None without a compiler."""
         if self.step.backend not in PRECISIONS:
             return None
         try:
@@ -237,7 +237,7 @@ def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts
 
 
 def _prologue(step: LinearizedStep, places: PolicyPlaces) -> tuple[FunctionCall, ...]:
-    """What a lane starts from, and the times of all states."""
+    """Return the calls for the start of a lane and the times of all states."""
     row, clock, steps = ca.SX.sym("row", places.row.size), ca.SX.sym("clock"), step.rollout.steps
     held, p = ca.SX.sym("held", places.first_held.size), ca.SX.sym("p", places.p.size)
     taken = (places.length, places.share, places.statics, places.p, places.x.still())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -21,8 +21,24 @@ from symphys.codegen import (
     compile_program,
 )
 from symphys.codegen.backends import PRECISIONS
-from symphys.transcription.staged.columns import ByColumns
 from symphys.types import Array, Expr, Ints
+
+
+class ByColumns:
+    """A casadi function of columns, for any number of them; what was built for a number of columns is kept."""
+
+    def __init__(self, function: ca.Function) -> None:
+        """Wrap a function; it is built at the first call."""
+        self.function = function
+        self._mapped: dict[int, ca.Function] = {}
+
+    def __call__(self, *columns: Any) -> list[Array]:
+        """(size, T) each -> results (rows, T * columns), side by side."""
+        count = int(columns[0].shape[1])
+        if count not in self._mapped:
+            self._mapped[count] = self.function.map(count)
+        return [np.array(result, float) for result in self._mapped[count].call(list(columns))]
+
 
 COMPILED = 30_000
 """Operations of a horizon from which a compiler is worth its second: casadi's machine does as many in 0.2 ms."""
@@ -61,7 +77,7 @@ class ReadingFunction:
 
     @property
     def segments(self) -> list[tuple[str, tuple[int, ...]]]:
-        """What it reads of which field of ``StepRows``."""
+        """Return the entries that the function reads of each field of ``StepRows``."""
         state, tick = ("after", "next") if self.after else ("before", "ticks")
         return [*zip((state, "before", "u", "constants", tick), self.reads, strict=True)]
 
@@ -103,7 +119,7 @@ class StageFunctions:
         self._ends = np.cumsum([0, *sizes])
 
     def __call__(self, rows: StepRows) -> list[list[Array]]:
-        """Of each function its results, (R, size) each."""
+        """Return the results of each function, (R, size) each."""
         table = self._table(rows)
         if self._kernel is None:
             found = [part.T for part in self._columns(np.ascontiguousarray(table.T))] if len(table) else []

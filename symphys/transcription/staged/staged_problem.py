@@ -17,8 +17,7 @@ from symphys.transcription.staged.linearization import Linearization, statics_of
 from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes
 from symphys.transcription.staged.stage_functions import StepRows
 from symphys.transcription.staged.stage_terms import StageTerm
-from symphys.transcription.staged.term_groups import TermGroups
-from symphys.transcription.staged.term_slopes import Blocks, TermSlopes
+from symphys.transcription.staged.term_slopes import Blocks, TermGroups, TermSlopes
 from symphys.types import Array, Ints
 
 
@@ -150,13 +149,13 @@ class RolloutStages:
         return self._with_sums(found, motion) if self._sums else found
 
     def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
-        """The same in runs of steps, the last run first; with sums all steps are one run."""
+        """Yield linearisations of runs of steps, the last run first; with sums all steps are one run."""
         if self._sums:
             return iter([self.linearize(motion)])
         return map(self._with_knots, self._linearization.linearize_from_end(self._plain(motion)))
 
     def _with_knots(self, found: Linearized) -> Linearized:
-        """With a column for each named knot, on which no step depends."""
+        """Append a zero column for each named knot, on which no step depends."""
         more = self.input_size - self._given
         if not more:
             return found
@@ -164,7 +163,7 @@ class RolloutStages:
         return Linearized(found.a, b, found.c, found.start)
 
     def _with_sums(self, found: Linearized, motion: StagedMotion) -> Linearized:
-        """The same with the sums, which look at the states before and after each step."""
+        """Append the rows of the sums, which depend on the states before and after each step."""
         n, total, count = self.tangent.size, self.tangent_size, self.steps
         a = np.tile(np.eye(total), (count, 1, 1))
         b, c = (np.zeros((count, total, each.shape[2])) for each in (found.b, found.c))

@@ -36,7 +36,7 @@ class StepArguments:
 
     @cached_property
     def sizes(self) -> tuple[int, int, int, int]:
-        """Of x, d, u without shares of phases, and p."""
+        """Return the sizes of x, d, u without shares of phases, and p."""
         rollout = self.rollout
         return rollout.memory.size, self.tangent.size, rollout.controls, int(rollout.p.shape[0])
 

@@ -27,7 +27,7 @@ from symphys.maths import rotation
 from symphys.model.joints import Joint, kinematic_trees, tree_joints
 from symphys.model.state_layout import BODY_FIELDS, Layout
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.staged.columns import ByColumns
+from symphys.transcription.staged.stage_functions import ByColumns
 from symphys.transcription.staged.tree_chart import Moving, Pose, TreeChart
 from symphys.types import Array, Expr
 
@@ -48,12 +48,12 @@ class Tangent:
 
     @cached_property
     def size(self) -> int:
-        """N."""
+        """Return the tangent dimension ``n``."""
         return len(self.names)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """What each number is: ``torso.position[0]``, ``knee.coordinate[0]``, ``knee.rate[0]``, ``foot.force[2]``."""
+        """Return the labels: ``torso.position[0]``, ``knee.coordinate[0]``, ``knee.rate[0]``, ``foot.force[2]``."""
         found = []
         for (index, chart), kinds in ((each, kinds) for each in self._charts for kinds in ("coordinate", "rate")):
             fields = ("position", "turn") if kinds == "coordinate" else ("velocity", "angular_velocity")
@@ -158,7 +158,7 @@ class Tangent:
 
     @cached_property
     def _charts(self) -> tuple[tuple[int, TreeChart | None], ...]:
-        """Of each tree, then of each body that is in none, with its index or that of the root."""
+        """Yield each tree with the index of its root, then each free body with its index."""
         world = self.rollout.world
         trees = kinematic_trees(world.joints)
         held = {body for tree in trees for body in tree.bodies}

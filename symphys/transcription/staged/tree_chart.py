@@ -103,7 +103,7 @@ class TreeChart:
         return ca.vertcat(ca.SX(0, 1), *found)
 
     def velocities(self, poses: Mapping[int, Pose], rates: Expr) -> dict[int, Moving]:
-        """Of the bodies at these poses, from the rates (size,)."""
+        """Return the velocities of the bodies at these poses from the rates (size,)."""
         found: dict[int, Moving] = {}
         for link, joint in self._links():
             own = rates[list(link.coordinates)]

@@ -19,7 +19,7 @@ from symphys.solvers.ddp.knots import knot_steps
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.staged import stage_functions
 from symphys.transcription.staged.tangent import Tangent
-from symphys.transcription.staged.term_groups import TermGroups
+from symphys.transcription.staged.term_slopes import TermGroups
 from symphys.types import Array
 
 CART = """

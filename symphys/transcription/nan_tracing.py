@@ -3,21 +3,129 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
 
+import casadi as ca
 import numpy as np
 
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout, input_columns
 from symphys.problem import Constraint, Cost, Output, Target
-from symphys.transcription.formulas.recorded_parts import (
+from symphys.transcription.recorded_parts import (
     RolloutArrays,
     formula_arguments,
     instants,
     part_numbers,
 )
-from symphys.transcription.nan_tracing.operations import NonFiniteOperation, non_finite_operation
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
+
+WORDS = {
+    ca.OP_ADD: "{} + {}",
+    ca.OP_SUB: "{} - {}",
+    ca.OP_MUL: "{} * {}",
+    ca.OP_DIV: "{} / {}",
+    ca.OP_INV: "1 / {}",
+    ca.OP_POW: "{} ** {}",
+    ca.OP_CONSTPOW: "{} ** {}",
+    ca.OP_SQ: "{} squared",
+    ca.OP_TWICE: "2 * {}",
+    ca.OP_SQRT: "sqrt({})",
+    ca.OP_LOG: "log({})",
+    ca.OP_EXP: "exp({})",
+    ca.OP_TAN: "tan({})",
+    ca.OP_ASIN: "asin({})",
+    ca.OP_ACOS: "acos({})",
+    ca.OP_SINH: "sinh({})",
+    ca.OP_COSH: "cosh({})",
+}
+"""How operations are written; ``{}`` stand for the values of their operands."""
+
+
+@dataclass(frozen=True)
+class NonFiniteOperation:
+    """An operation with finite operands whose result is not, on the way to a result of the function.
+
+    Attributes:
+        operation: with the values that it was given, such as ``1 / 0``; empty where an argument itself is not finite.
+        arguments: (argument, element) of everything that went into it.
+        result: (output, element) that it spoils: the first that is not finite.
+    """
+
+    operation: str
+    arguments: tuple[tuple[int, int], ...]
+    result: tuple[int, int]
+
+
+def non_finite_operation(function: ca.Function, arguments: Sequence[Array]) -> NonFiniteOperation | None:
+    """Find the first operation of an SX function that is not finite, or None; ``arguments``: one dense vector each."""
+    run = _Run(function, arguments)
+    spoilt = [(place, source) for place, source in run.results if not isfinite(run.values[source])]
+    if not spoilt:
+        return None
+    result, at = min(spoilt)
+    while bad := [source for source in run.operands[at] if not isfinite(run.values[source])]:
+        at = bad[0]
+    return NonFiniteOperation(run.words(at), run.origins(at), result)
+
+
+class _Run:
+    """Every instruction of a function with its value, its operands, and the argument that it reads."""
+
+    def __init__(self, function: ca.Function, arguments: Sequence[Array]) -> None:
+        self.values: list[float] = []
+        self.operands: list[list[int]] = []
+        self.codes: list[int] = []
+        self.reads: dict[int, tuple[int, int]] = {}
+        self.results: list[tuple[tuple[int, int], int]] = []
+        work: dict[int, int] = {}
+        for i in range(function.n_instructions()):
+            code, takes, gives = (
+                function.instruction_id(i),
+                function.instruction_input(i),
+                function.instruction_output(i),
+            )
+            operands: list[int] = []
+            if code == ca.OP_OUTPUT:
+                self.results.append(((gives[0], gives[1]), work[takes[0]]))
+                continue
+            if code == ca.OP_INPUT:
+                self.reads[len(self.values)] = (takes[0], takes[1])
+                value = float(arguments[takes[0]][takes[1]])
+            elif code == ca.OP_CONST:
+                value = function.instruction_constant(i)
+            else:
+                operands = [work[x] for x in takes]
+                value = _compute(code, [self.values[x] for x in operands])
+            work[gives[0]] = len(self.values)
+            self.values.append(value)
+            self.operands.append(operands)
+            self.codes.append(code)
+
+    def words(self, at: int) -> str:
+        """The operation with its operands' values."""
+        if not self.operands[at]:
+            return ""
+        known = [f"{self.values[x]:.6g}" for x in self.operands[at]]
+        pattern = WORDS.get(self.codes[at], f"operation {self.codes[at]} of " + ", ".join("{}" for _ in known))
+        return pattern.format(*known)
+
+    def origins(self, at: int) -> tuple[tuple[int, int], ...]:
+        """The arguments that a value is made from."""
+        seen, left = set[int](), [at]
+        while left:
+            x = left.pop()
+            if x not in seen:
+                seen.add(x)
+                left += self.operands[x]
+        return tuple(sorted({self.reads[x] for x in seen if x in self.reads}))
+
+
+def _compute(code: int, operands: list[float]) -> float:
+    compute = ca.DM.unary if len(operands) == 1 else ca.DM.binary
+    return float(compute(code, *operands))
+
 
 Asked = Cost | Target | Constraint | Output
 Columns = Sequence[str]
@@ -32,7 +140,7 @@ def first_non_finite(rollout: Rollout, arrays: RolloutArrays) -> str:
 
 
 def first_non_finite_derivative(rollout: Rollout, arrays: RolloutArrays) -> str:
-    """The same for derivatives: of the formulas, then of the steps, from the last one back."""
+    """Find the first derivative that is not finite: of the formulas, then of the steps, from the last one back."""
     formulas = (_derivative_clause(rollout, arrays, *case) for case in _instants(rollout))
     return next(filter(None, formulas), "") or _in_steps_back(rollout, arrays)
 
@@ -140,7 +248,7 @@ def _formula_arguments(rollout: Rollout, arrays: RolloutArrays, formula: Formula
 
 
 def _argument_names(rollout: Rollout) -> tuple[Columns, Columns, Columns]:
-    """Of x, u and p; components of one quantity share its name."""
+    """Return the names of the entries of x, u and p; components of one quantity share its name."""
     layout = Layout(rollout.world)
     states = [layout.owner(column) for column in range(layout.size)]
     states += [name for name, part in rollout.memory.columns.items() for _ in range(part.start, part.stop)]

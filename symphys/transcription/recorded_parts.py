@@ -34,15 +34,15 @@ class RolloutArrays:
     time: Array
 
     def step_arguments(self, k: int) -> list[Array]:
-        """Of the step function at step k."""
+        """Return the arguments of the step function at step k."""
         return [self.x[k], self.u[k], self.p, np.array([self.smoothing])]
 
     def control_arguments(self, k: int) -> list[Array]:
-        """Of the controllers at step k."""
+        """Return the arguments of the controllers at step k."""
         return [self.x[k], self.given[k], self.p, self.time[k : k + 1]]
 
     def closed_arguments(self, k: int, rollout: Rollout) -> list[Array]:
-        """Of the step with its controllers."""
+        """Return the arguments of the step with its controllers."""
         time = [] if rollout.feedback is None else [self.time[k]]
         return [self.x[k], np.array([*self.given[k], *time]), self.p, np.array([self.smoothing])]
 
@@ -72,5 +72,5 @@ def instants(rollout: Rollout, part: MotionPart) -> list[tuple[int, int]]:
 
 
 def formula_arguments(arrays: RolloutArrays, k: int, row: int) -> list[Array]:
-    """Of a compiled formula without parts, at state k with inputs ``row``."""
+    """Return the arguments of a compiled formula without parts, at state k with inputs ``row``."""
     return [arrays.x[k], arrays.u[row], arrays.p, arrays.time[k : k + 1], arrays.z]

@@ -1,1 +1,0 @@
-"""What formulas take of whole motions."""

@@ -1,1 +1,0 @@
-"""Where the first number that is not finite comes from."""
