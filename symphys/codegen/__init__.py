@@ -8,9 +8,8 @@ if TYPE_CHECKING:
     from symphys.codegen.emit.source import SourceFile
     from symphys.codegen.errors import KernelUnavailable, ProgramError
     from symphys.codegen.program.interpret import interpret
-    from symphys.codegen.program.layout import MemoryLayout
     from symphys.codegen.program.nan_location import Bad
-    from symphys.codegen.program.program import AdjointDiscount, FunctionCall, Place, Program
+    from symphys.codegen.program.program import AdjointDiscount, FunctionCall, MemoryLayout, Place, Program
     from symphys.codegen.runtime.fixed_addresses import Fixed, FixedBatch
     from symphys.codegen.runtime.kernel import Kernel, ProcessorKernel
     from symphys.codegen.toolchain.build import compile_program, shared_library
@@ -48,9 +47,8 @@ __getattr__ = later(
         "emit.source": ("SourceFile",),
         "errors": ("KernelUnavailable", "ProgramError"),
         "program.interpret": ("interpret",),
-        "program.layout": ("MemoryLayout",),
         "program.nan_location": ("Bad",),
-        "program.program": ("AdjointDiscount", "FunctionCall", "Place", "Program"),
+        "program.program": ("AdjointDiscount", "FunctionCall", "MemoryLayout", "Place", "Program"),
         "runtime.fixed_addresses": ("Fixed", "FixedBatch"),
         "runtime.kernel": ("Kernel", "ProcessorKernel"),
         "toolchain.build": ("compile_program", "shared_library"),

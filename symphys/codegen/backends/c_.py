@@ -40,7 +40,7 @@ def c(source: BackendSource, threads: int) -> Backend:
 
 
 def parts(nlp: Function) -> dict[str, Function]:
-    """What an NLP solver asks for without second derivatives."""
+    """Return the functions that an NLP solver needs without second derivatives."""
     z, smoothing = ca.MX.sym("z", nlp.size1_in(0)), ca.MX.sym("smoothing")
     objective, constraints = nlp(z, smoothing)
     results = {"nlp": [objective, constraints], "nlp_gradient": [objective, ca.gradient(objective, z)]}

@@ -14,27 +14,27 @@ class FunctionEvaluator:
     """Evaluates casadi functions, a batch in one call; see ``Evaluator``."""
 
     def __init__(self, functions: ProblemFunctions, threads: int = 1) -> None:
-        """Nothing is made yet."""
+        """Prepare the functions, which are built on demand."""
         self.functions, self.threads = functions, threads
         self._calls: dict[tuple[str, int], BufferedFunction] = {}
 
     def value(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.value``."""
         merit, objective, errors, outputs = self._call("value", Z, smoothing)
         return Values(merit[:, 0], objective[:, 0], errors, outputs)
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.gradient``."""
         merit, objective, errors, gradient, outputs = self._call("gradient", Z, smoothing)
         return Values(merit[:, 0], objective[:, 0], errors, outputs, gradient=gradient)
 
     def residuals(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.residuals``."""
         r, objective, errors, outputs = self._call("residuals", Z, smoothing)
         return Values(squared(r), objective[:, 0], errors, outputs, residuals=r)
 
     def jacobian(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.jacobian``."""
         r, objective, errors, jacobian, outputs = self._call("jacobian", Z, smoothing)
         jacobian = jacobian.reshape(*r.shape, Z.shape[1])
         return Values(squared(r), objective[:, 0], errors, outputs, residuals=r, jacobian=jacobian)

@@ -15,7 +15,7 @@ from symphys.errors import SymphysError
 
 
 def c(source: BackendSource, threads: int) -> Backend:
-    """See ``c_``, which is imported when it is asked for."""
+    """Make the backend of ``c_``, imported late."""
     from symphys.codegen.backends import c_
 
     return c_.c(source, threads)

@@ -65,7 +65,7 @@ def external_nlp(made: ProcessorKernel, expression: Function, rows: Seeds | None
 
 
 def task(fixed: Fixed, first: Array, second: Array) -> Task:
-    """What external.c needs to know of an evaluation; the results are views of its arrays."""
+    """Return the data of an evaluation for external.c; the results are views of its arrays."""
     results = (ctypes.c_void_p * 2)(first.ctypes.data, second.ctypes.data)
     return Task(*fixed.addresses, fixed.z.ctypes.data, fixed.parameters.ctypes.data, results)
 

@@ -56,12 +56,12 @@ class BackendSource:
 
 
 def nothing() -> str:
-    """Nothing was decided."""
+    """Return an empty note."""
     return ""
 
 
 def joined(*notes: str) -> str:
-    """What there is to say, in one line."""
+    """Join notes that are not empty."""
     return "; ".join(filter(None, notes))
 
 
@@ -98,7 +98,7 @@ class Description:
     finish: Callable[[], object] = field(default=nothing, repr=False, compare=False)
 
     def __str__(self) -> str:
-        """In a line."""
+        """Describe the backend in one line."""
         parts = [f"{self.name}: lanes {self.lanes}, threads {self.threads}, {self.precision} precision"]
         if self.cached is not None:
             parts.append(f"{self.compiler}, {'taken from the cache' if self.cached else 'compiled'}")

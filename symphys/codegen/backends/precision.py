@@ -40,7 +40,7 @@ class PrecisionCheck:
     """Compares gradients of a program in single precision with those in double precision."""
 
     def __init__(self, program: Program | ProgramSource, seeded: tuple[str, ...]) -> None:
-        """Nothing is built before the first gradient; ``seeded``: outputs that are differentiated."""
+        """Compare at the first gradient; ``seeded``: outputs that are differentiated."""
         self._program, self._seeded = program, seeded
 
     def __call__(self, gradient: Array, arguments: tuple[Any, ...]) -> str:

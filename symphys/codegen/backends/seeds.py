@@ -39,7 +39,7 @@ class Seeds:
 
     @classmethod
     def compressed(cls, kernel: Kernel, name: str, function: Callable[[], Function], index: int) -> Seeds:
-        """As few lanes as the sparsity lets do; ``function()`` gives the same output as its result ``index``."""
+        """Color the sparsity of the result ``index`` of ``function()`` into as few lanes as possible."""
         m, n = kernel.program.outputs[name].size, kernel.program.z.size
         if m <= kernel.report.lanes:
             return cls.whole(kernel, name)

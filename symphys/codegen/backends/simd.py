@@ -37,23 +37,23 @@ class KernelEvaluator:
         return (smoothing,)
 
     def value(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.value``."""
         outputs = self.kernel.forward(Z, self.parameters(smoothing))
         return Values(*common(outputs), probe=probed(self.kernel, outputs))
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.gradient``."""
         outputs, gradient = self.kernel.gradient(Z, self.steepest, self.parameters(smoothing))
         return Values(*common(outputs), gradient=gradient)
 
     def residuals(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.residuals``."""
         outputs = self.kernel.forward(Z, self.parameters(smoothing))
         r = outputs["residuals"]
         return Values(squared(r), *common(outputs)[1:], residuals=r)
 
     def jacobian(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.jacobian``."""
         assert self.rows is not None, "a problem without residuals has no Jacobian"
         rows = self.rows()
         seeds = rows.words

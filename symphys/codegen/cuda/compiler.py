@@ -63,7 +63,7 @@ def image(texts: Sequence[str], architecture: str, cache: Cache, folder: Path) -
 
 
 def compiled(texts: Sequence[str], architecture: str, flags: Sequence[str] = ()) -> list[tuple[bytes, str]]:
-    """Of each text the object and what the compiler says; KernelUnavailable with its first error."""
+    """Compile each text to an object and the compiler's log; KernelUnavailable with the first error."""
     nvrtc, _ = _libraries()
     options = [flag.encode() for flag in (f"--gpu-architecture={architecture}", *FLAGS, *flags)]
     with ThreadPoolExecutor(processors()) as pool:
@@ -106,7 +106,7 @@ def _object(nvrtc: Any, text: str, options: list[bytes]) -> tuple[bytes, str]:
 
 
 def _checked(nvrtc: Any, answer: tuple[Any, ...]) -> Any:
-    """What a call gives beside its status."""
+    """Return the results of a call without its status."""
     status, *values = answer
     if status != nvrtc.nvrtcResult.NVRTC_SUCCESS:
         raise KernelUnavailable(f"nvrtc: {status.name}")

@@ -37,10 +37,10 @@ class Device(Protocol):
         """Memory."""
 
     def lacks(self) -> str:
-        """What is missing for products of its arrays, in a line; empty: nothing."""
+        """Return in one line why the device cannot multiply its arrays; empty if it can."""
 
     def address(self, array: Array) -> int:
-        """Of the array's first word."""
+        """Return the address of the array's first word."""
 
     def get(self, array: Array) -> NDArray[Any]:
         """A copy of an array, once all that was launched is done."""

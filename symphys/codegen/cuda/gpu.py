@@ -33,7 +33,7 @@ class Gpu:
         self.architecture = f"sm_{properties['major']}{properties['minor']}"
 
     def load(self, texts: Sequence[str]) -> tuple[Any, str, bool, str]:
-        """See ``Device``."""
+        """Implement ``Device.load``."""
         with temporary_folder("symphys-cuda-") as folder:
             found = image(texts, self.architecture, self.cache, Path(folder))
             with self._told():
@@ -42,22 +42,22 @@ class Gpu:
         return module, found.compiler, found.cached, found.note
 
     def free(self) -> int:
-        """See ``Device``."""
+        """Implement ``Device.free``."""
         self.cupy.get_default_memory_pool().free_all_blocks()
         return max(0, int(self.cupy.cuda.runtime.memGetInfo()[0]) - SPARED)
 
     def put(self, values: NDArray[Any]) -> Any:
-        """See ``Device``."""
+        """Implement ``Device.put``."""
         with self._told():
             return self.cupy.asarray(np.ascontiguousarray(values))
 
     def empty(self, shape: tuple[int, ...], dtype: DTypeLike) -> Any:
-        """See ``Device``."""
+        """Implement ``Device.empty``."""
         with self._told():
             return self.cupy.empty(shape, dtype)
 
     def lacks(self) -> str:
-        """See ``Device``: CuPy looks for cuBLAS when it multiplies first."""
+        """Implement ``Device.lacks``: CuPy looks for cuBLAS at the first product."""
         try:
             array = self.put(np.ones((1, 1)))
             np.tanh(np.matmul(array, array))
@@ -66,21 +66,21 @@ class Gpu:
         return ""
 
     def address(self, array: Any) -> int:
-        """See ``Device``."""
+        """Implement ``Device.address``."""
         return int(array.data.ptr)
 
     def get(self, array: Any) -> NDArray[Any]:
-        """See ``Device``."""
+        """Implement ``Device.get``."""
         with self._told():
             return np.asarray(self.cupy.asnumpy(array))
 
     def launch(self, module: Any, name: str, blocks: int, threads: tuple[int, int], job: Any) -> None:
-        """See ``Device``."""
+        """Implement ``Device.launch``."""
         with self._told():
             module.get_function(name)((blocks,), threads, (job,))
 
     def wait(self) -> None:
-        """See ``Device``."""
+        """Implement ``Device.wait``."""
         with self._told():
             self.cupy.cuda.get_current_stream().synchronize()
 

@@ -59,7 +59,7 @@ class _Call:
 
 
 def schedules(planned: Plan, program: Program, warps: int) -> dict[str, Schedule]:
-    """Of all phases of a planned program."""
+    """Schedule all phases of a planned program."""
     return {
         phase: _schedule(list(_calls(planned, program, phase)), 2 * program.size + planned.tape, steps, warps)
         for phase, steps in {name: program.steps if name in LOOPED else 1 for name in TABLES}.items()
@@ -167,5 +167,5 @@ def _shared(level: Sequence[_Call], warps: int) -> list[list[_Call]]:
 
 
 def _words(spans: Sequence[Span]) -> Ints:
-    """That these have at step 0, one after the other."""
+    """Return the words of these places at step 0, in order."""
     return np.concatenate([np.zeros(0, np.int64), *(np.arange(span.offset, span.offset + span.size) for span in spans)])

@@ -80,7 +80,7 @@ class _Layout:
         return size, self._tape(again, size)
 
     def _families(self) -> list[Ints]:
-        """For each result of each team its words (lanes, size), where all that has to do with them is regular."""
+        """Return the words (lanes, size) of each result of each team whose accesses are all regular."""
         body, free = self._program.phases[1], self._program.scratch()
         found: list[Ints] = []
         for first, lanes in self._planned.teams:
@@ -126,7 +126,7 @@ class _Layout:
 
 
 def _together(entries: Sequence[_Entry], calls: Ints, k: int, lanes: int) -> int:
-    """How many entries from the k-th on are a team's calls of one function: all of them, or 1."""
+    """Return the number of entries from the k-th on that are one team's calls of a function: the whole team, or 1."""
     own = entries[k : k + lanes]
     if len(own) < lanes or {entry.number for entry in own} != {own[0].number}:
         return 1
@@ -172,7 +172,7 @@ class _Tables:
         return self._numbers[key]
 
     def _placed(self, offset: int, size: int) -> tuple[int, int]:
-        """Where a place begins, and how far apart its words are."""
+        """Return the offset and the stride of a place."""
         to = self._layout.to
         first = int(to[offset]) if size else 0
         return first, int(to[offset + 1]) - first if size > 1 else 1

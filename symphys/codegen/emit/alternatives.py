@@ -55,12 +55,12 @@ ALWAYS: Alternatives = (None, None)
 
 
 def of_call(call: FunctionCall) -> Alternatives:
-    """Of a call of a program."""
+    """Name the function of a call."""
     return _section_and_guard(call, None)
 
 
 def of_adjoint(call: FunctionCall, results: Sequence[Span], arguments: Sequence[Span]) -> Alternatives:
-    """Of the adjoint of a call with respect to these results and arguments."""
+    """Name the adjoint of a call with respect to these results and arguments."""
     return _section_and_guard(call, (results, arguments))
 
 

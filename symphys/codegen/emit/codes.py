@@ -123,7 +123,7 @@ class _Encoder:
         words[start + 1] = max(self.kept, 1)
 
     def _ends(self, graph: Graph) -> dict[int, int]:
-        """For each value the last that is made from it."""
+        """Return for each value the last value that depends on it."""
         ends: dict[int, int] = {}
         for piece in self.cut.pieces:
             for x in piece.nodes:

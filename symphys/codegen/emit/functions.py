@@ -68,7 +68,7 @@ class DistinctFunctions:
         return self._taped[key]
 
     def dependence(self, function: Function) -> list[NDArray[np.bool_]]:
-        """For each result (size, arguments): which words depend on which arguments."""
+        """Return for each result the matrix (size, arguments) of dependencies."""
         graph = self.forward(function)
         if id(graph) not in self._dependences:
             bits, arguments = graph.origins(), range(len(graph.sizes))

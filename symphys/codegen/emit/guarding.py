@@ -75,7 +75,7 @@ class Guarding:
 
 
 def guarding_of(program: Program, tables: Mapping[str, Table]) -> Guarding | None:
-    """Of a program; None if it has neither guards nor sections.
+    """Return the guards and sections of a program; None if it has neither.
 
     Args:
         program: whose body has calls with guards.
@@ -234,7 +234,7 @@ class _Chains:
         self._chain = [NONE] * size
 
     def of_words(self) -> list[int]:
-        """For each word the chain that it is part of; a word is written once."""
+        """Map each word, which is written once, to its chain."""
         return self._chain
 
     def of(self, place: Place) -> int:

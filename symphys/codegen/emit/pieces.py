@@ -52,7 +52,7 @@ class GraphPiece:
     targets: dict[int, list[tuple[int, int, int]]] = field(default_factory=dict)
 
     def copied(self) -> list[int]:
-        """What is given and goes to results as it is, after all that is computed."""
+        """Write the results that are arguments, after all computed ones."""
         return sorted(set(self.targets) - set(self.nodes))
 
 

@@ -112,13 +112,13 @@ class PlannedPhase:
         self.taped: dict[int, Taped] = {}
 
     def dependence(self, functions: DistinctFunctions) -> list[NDArray[np.bool_]]:
-        """Of each function which words of its results depend on which arguments."""
+        """Map each function to the dependencies of the words of its results on its arguments."""
         none = (np.zeros((0, function.n_in()), bool) for function in self.calls.functions)
         each = map(functions.dependence, self.calls.functions)
         return [np.concatenate([nothing, *found]) for nothing, found in zip(none, each, strict=True)]
 
     def find_adjoints(self, active: NDArray[np.bool_], functions: DistinctFunctions) -> None:
-        """Of the calls that have active arguments and results, given which words of the memory are active."""
+        """Collect the calls with active arguments and results, given the active words of the memory."""
         before = np.concatenate([[0], np.cumsum(active)])
         marks = [_any(before, spans, self.steps) for spans in (self.calls.inputs, self.calls.outputs)]
         found: list[tuple[int, Ints, Function, Mask, Mask]] = []

@@ -49,7 +49,7 @@ class Plan:
     signature: str = ""
 
     def moving(self) -> list[set[int]]:
-        """For each function, which of its places move with the step in any of its calls."""
+        """Return for each function which of its places move with the step in any of its calls."""
         found: list[set[int]] = [set() for _ in self.functions]
         order = [*TABLES, *(name for name in self.tables if name not in TABLES)]
         words = np.concatenate([self.tables[name][1] for name in order])

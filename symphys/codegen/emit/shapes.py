@@ -40,7 +40,7 @@ class PlaceWords:
         self._word = word
 
     def pointers(self, name: str) -> list[str]:
-        """What a place is called, by the pairs of an entry."""
+        """Return the C expression of a place from the pairs of an entry."""
         return [name]
 
     def load(self, name: str, word: int | str) -> str:
@@ -81,7 +81,7 @@ class TeamWords(PlaceWords):
         return self._lanes == 1
 
     def pointers(self, name: str) -> list[str]:
-        """What a place is called, by the pairs of an entry."""
+        """Return the C expression of a place from the pairs of an entry."""
         if self._access[name].kind in (EACH, TURNS):
             return [f"{name}_{lane}" for lane in range(self._lanes)]
         return [name]

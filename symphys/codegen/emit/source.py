@@ -65,25 +65,25 @@ def listed(count: int, dialect: Dialect = VECTORS) -> str:
 
 
 def head_of(lanes: int, single: bool, dialect: Dialect = VECTORS) -> str:
-    """How a C file begins."""
+    """Return the head of a C file."""
     head = f"#define LANES {lanes}\n#define SINGLE {int(single)}\n"
     return head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
 
 
 def team_head(calls: int, single: bool) -> str:
-    """How a C file of functions for several calls at once begins."""
+    """Return the head of a C file of functions for several calls at once."""
     each = ", ".join(["x_"] * calls)
     whole = f"#define ALL(x) ({{ const R x_ = (x); (V){{{each}}}; }})\n"
     return head_of(calls, single) + whole + UNALIGNED
 
 
 def forms_of(lanes: int) -> Dialect:
-    """How functions are written for blocks of so many lanes: one lane is numbers."""
+    """Return the dialect of functions for blocks of lanes; one lane is plain numbers."""
     return ONE_LANE if lanes == 1 else VECTORS
 
 
 def spread(texts: Sequence[str], work: Sequence[int], most: int) -> list[list[str]]:
-    """At most so many groups of about equal work: the largest first, each to the group with the least so far."""
+    """Split items into at most ``count`` groups of similar work: the largest first, each to the least loaded group."""
     count = max(1, min(most, len(texts), sum(work) // SHARE))
     groups: list[list[str]] = [[] for _ in range(count)]
     loads = [0] * count

@@ -41,7 +41,7 @@ class CallActivity:
 
     @classmethod
     def of(cls, call: FunctionCall, steps: int, dependence: Sequence[Bools]) -> Self:
-        """Of a call that is made in so many steps."""
+        """Find the activity of a call that is made in a number of steps."""
         inputs, outputs = ([words_of(place, steps) for place in places] for places in (call.inputs, call.outputs))
         return cls(call, inputs, outputs, dependence)
 
@@ -94,7 +94,7 @@ class Activity:
         return changed
 
     def marks(self, places: Sequence[Words]) -> tuple[bool, ...]:
-        """For each place whether any of its words is active."""
+        """Return for each place whether any of its words is active."""
         return tuple([bool(self.active[words].any()) for words in places])
 
 
@@ -112,7 +112,7 @@ class _Flags:
         return bool(self.array[words].any())
 
     def columns(self, words: Words) -> bytes | None:
-        """For each word of a place whether it is set at any step; None: none is."""
+        """Return for each word of a place whether any step sets it; None if no word is set."""
         found = bytes(self._bytes[words]) if isinstance(words, slice) else self.array[words].any(axis=0).tobytes()
         return found if 1 in found else None
 

@@ -1,14 +1,122 @@
-"""The adjoint of one call: from its arguments and the adjoints of its results to what is added to its arguments'."""
+"""The adjoint of one call: from its arguments and the adjoints of its results to what is added to its arguments'.
+
+An adjoint adds up what each use of a value gives it, one after the other. In a sweep each sum needs the one before it,
+so that a processor waits for ten additions a row. Here terms are added as they come, in two sums that are added last.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+
 import casadi as ca
 
-from symphys.codegen.graph.graph import Graph
+from symphys.codegen.graph.graph import Graph, Node, ordered
 from symphys.codegen.graph.instructions import graph_of
-from symphys.codegen.graph.rewrite import with_reciprocals
-from symphys.codegen.graph.sums import with_early_sums
+from symphys.codegen.graph.rewrite import rewritten, with_reciprocals
 from symphys.codegen.program.program import Function
+
+WAIT = {"div": 13, "sqrt": 20}
+"""Cycles until a result is there, about; of what is not listed ``SHORT``."""
+SHORT = 4
+GAIN = 2 * SHORT
+"""Cycles that must be gained: two sums instead of one take an operation more."""
+Term = tuple[int, int]
+"""(1 or -1, node)"""
+
+
+def with_early_sums(graph: Graph, primal: int) -> Graph:
+    """The graph of an adjoint, with its sums of adjoints in such an order; what depends on arguments alone stays.
+
+    ``primal``: how many arguments are no adjoints.
+    """
+    origins, needed = graph.origins(), graph.needed()
+    sums = {x for x in needed if graph.nodes[x].op in ("add", "sub") and origins[x] >> primal}
+    uses = Counter(y for x in needed for y in graph.nodes[x].operands)
+    uses.update(y for result in graph.results for y in result)
+    within = {y for x in sums for y in graph.nodes[x].operands if y in sums and uses[y] == 1}
+    new, ready = Graph(graph.sizes), list[int]()
+    numbers: dict[int, int] = {}
+    for x in needed:
+        node = graph.nodes[x]
+        if x in within:
+            continue
+        if x in sums:
+            terms = [(sign, numbers[y]) for sign, y in _terms(graph, x, within)]
+            numbers[x] = _summed(new, terms, _times(new, ready))
+        else:
+            operands = ordered(node.op, tuple(numbers[y] for y in node.operands))
+            numbers[x] = new.put(Node(node.op, operands, node.at, node.value))
+    new.results = [[numbers[x] for x in result] for result in graph.results]
+    last = Graph(graph.sizes)
+    numbers = rewritten(new, last, lambda into, _, node: into.put(node))
+    last.results = [[numbers[x] for x in result] for result in new.results]
+    return last
+
+
+def _terms(graph: Graph, root: int, within: set[int]) -> list[Term]:
+    """Return the terms of a sum in the order of addition."""
+    found: list[Term] = []
+    open_ = [(1, root)]
+    while open_:
+        sign, x = open_.pop()
+        if x != root and x not in within:
+            found.append((sign, x))
+            continue
+        node = graph.nodes[x]
+        first, second = node.operands
+        open_ += [(-sign if node.op == "sub" else sign, second), (sign, first)]
+    return found
+
+
+def _times(graph: Graph, ready: list[int]) -> list[int]:
+    """Return the latency of each node [cycles]; ``ready`` grows with the graph."""
+    for node in graph.nodes[len(ready) :]:
+        wait = 0 if node.op in ("input", "const") else WAIT.get(node.op, SHORT)
+        ready.append(wait + max((ready[y] for y in node.operands), default=0))
+    return ready
+
+
+def _summed(graph: Graph, terms: Sequence[Term], ready: Sequence[int]) -> int:
+    """A node for the sum: as it was, or first two sums of the terms that come early, then those that come late."""
+    early = sorted(terms, key=lambda term: ready[term[1]])
+    at = [ready[x] for _, x in early]
+    best, found = _chained([ready[x] for _, x in terms]) - GAIN, 0
+    for count in range(len(terms), 3, -1):
+        both = max(_chained(at[0:count:2]), _chained(at[1:count:2])) + SHORT
+        time = _chained([both, *at[count:]])
+        if time < best:
+            best, found = time, count
+    if not found:
+        return _finished(graph, _added(graph, terms))
+    halves = [_added(graph, early[k:found:2]) for k in (0, 1)]
+    return _finished(graph, _added(graph, [*halves, *early[found:]]))
+
+
+def _chained(at: Sequence[int]) -> int:
+    """Return the latency of a sum whose terms are added one after the other [cycles]."""
+    time = at[0]
+    for each in at[1:]:
+        time = max(time, each) + SHORT
+    return time
+
+
+def _added(graph: Graph, terms: Sequence[Term]) -> Term:
+    """The sum of terms one after the other."""
+    sign, x = terms[0]
+    for other, y in terms[1:]:
+        if sign == other:
+            x = graph.put(Node("add", ordered("add", (x, y))))
+        else:
+            x = graph.put(Node("sub", (x, y) if sign > 0 else (y, x)))
+            sign = 1
+    return sign, x
+
+
+def _finished(graph: Graph, term: Term) -> int:
+    sign, x = term
+    return x if sign > 0 else graph.put(Node("neg", (x,)))
+
 
 Mask = tuple[bool, ...]
 

@@ -125,7 +125,7 @@ class Graph:
         return sorted(wanted)
 
     def origins(self) -> list[int]:
-        """For each node the arguments that it depends on, as bits."""
+        """Return for each node the arguments that it depends on, as bits."""
         bits: list[int] = []
         for node in self.nodes:
             own = 1 << node.at[0] if node.op == "input" else 0

@@ -25,13 +25,13 @@ class Lists:
 
     @classmethod
     def inverse(cls, keys: Ints, count: int) -> Lists:
-        """For each key where it is found."""
+        """Return the positions of each key."""
         ends = np.cumsum(np.bincount(keys, minlength=count))
         return cls(np.concatenate([[0], ends]), np.argsort(keys, kind="stable"))
 
     @classmethod
     def of(cls, parts: Sequence[Ints]) -> Lists:
-        """Of lists."""
+        """Concatenate lists."""
         sizes = np.cumsum([0, *map(len, parts)])
         return cls(sizes, np.concatenate([np.zeros(0, np.int64), *parts]))
 
@@ -176,7 +176,7 @@ class _Seen:
         self._last: Ints = np.zeros(count, np.int64)
 
     def fresh(self, numbers: Ints) -> Ints:
-        """Those not yet seen, each once; they are seen from now on."""
+        """Return the unseen items, each once, and mark them as seen."""
         found: Ints = numbers[~self.flags[numbers]]
         order = np.arange(len(found))
         self._last[found] = order

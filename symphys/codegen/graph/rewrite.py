@@ -136,7 +136,7 @@ def taped(forward: Graph, adjoint: Graph) -> Taped | None:
 
 
 def _reached(graph: Graph, stops: set[int]) -> list[int]:
-    """Those of the stops that results reach without passing another."""
+    """Return the stops that results reach without passing another stop."""
     open_ = [x for result in graph.results for x in result]
     seen: set[int] = set()
     while open_:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def uncollected() -> Iterator[None]:
-    """What is made meanwhile is not looked through for garbage."""
+    """Suspend the garbage collector for objects that are made meanwhile."""
     if not gc.isenabled():
         yield
         return

@@ -41,7 +41,7 @@ class PhaseCalls:
         self.accumulate: Bools = np.array([call.accumulate for call in calls], bool)
 
     def __len__(self) -> int:
-        """How many."""
+        """Return the number of calls."""
         return len(self.calls)
 
     def by_function(self) -> Iterator[tuple[int, Ints]]:
@@ -50,7 +50,7 @@ class PhaseCalls:
 
 
 def grouped(numbers: Ints, count: int) -> list[Ints]:
-    """For each number from 0 to ``count`` where it is found, in order."""
+    """Return for each number below ``count`` its positions, in order."""
     order = np.argsort(numbers, kind="stable")
     ends = np.cumsum(np.bincount(numbers, minlength=count))
     return np.split(order, ends[:-1]) if count else []

@@ -80,9 +80,29 @@ class Program:
         return flags
 
     def output_slices(self) -> dict[str, slice]:
-        """Where each output lies in the vector of all outputs."""
+        """Map each output to its slice of the vector of all outputs."""
         slices, start = {}, 0
         for name, place in self.outputs.items():
             slices[name] = slice(start, start + place.size)
             start += place.size
         return slices
+
+
+class MemoryLayout:
+    """A memory that grows as places are taken from it."""
+
+    def __init__(self) -> None:
+        """Begin with no words."""
+        self.size = 0
+
+    def take(self, size: int) -> Place:
+        """Words for a vector."""
+        place = Place(self.size, size)
+        self.size += size
+        return place
+
+    def series(self, size: int, count: int) -> Place:
+        """Words for ``count`` vectors one after the other, with the stride that leads from each to the next."""
+        place = Place(self.size, size, size)
+        self.size += size * count
+        return place

@@ -29,7 +29,7 @@ class Spans:
 
     @classmethod
     def of(cls, places: Sequence[Sequence[Place]]) -> Spans:
-        """Of the places of each call; most places belong to several calls, as one object."""
+        """Collect the places of each call; most places belong to several calls as one object."""
         counts = np.array([len(own) for own in places], np.int64)
         found, first, numbers = np.unique(
             np.array([id(place) for own in places for place in own], np.int64), return_index=True, return_inverse=True
@@ -41,7 +41,7 @@ class Spans:
         return cls(starts, np.repeat(np.arange(len(counts)), counts), *rows[numbers.ravel()].T.copy())
 
     def part(self, first: int, last: int) -> Spans:
-        """Those of some calls, which keep their numbers."""
+        """Select some calls, which keep their numbers."""
         begin, end = self.starts[first], self.starts[last]
         rows = (each[begin:end] for each in (self.call, self.offset, self.size, self.stride))
         return Spans(self.starts[first : last + 1] - begin, *rows)

@@ -87,7 +87,7 @@ class _TangentWriter:
         )
 
     def tangent(self, place: Place) -> Place:
-        """Where the derivatives of a place lie."""
+        """Return the place of the derivatives of a place."""
         d = self.directions
         return Place(self.program.size + d * place.offset, d * place.size, d * place.stride)
 
@@ -115,7 +115,7 @@ class _TangentWriter:
 
 
 def with_derivatives(function: Function, inputs: Mask, outputs: Mask, directions: int) -> Function:
-    """Of the arguments, then the derivatives of the marked ones: the results, then those of the marked ones."""
+    """Map arguments and derivatives of the marked ones to results and derivatives of the marked ones."""
     arguments = [ca.SX.sym("x", function.numel_in(i)) for i in range(function.n_in())]
     results = [ca.densify(each) for each in function.call(arguments, True, False)]
     by = [x for x, on in zip(arguments, inputs, strict=True) if on]

@@ -52,7 +52,7 @@ def teamed(program: Program) -> Teamed:
 
 
 def _before(program: Program, body: PhaseCalls) -> list[list[int]] | None:
-    """For each call those that it waits for; None where places move through time at different speeds."""
+    """Return the calls that each call depends on; None if places move through time at different strides."""
     places = [np.stack([spans.offset, spans.size, spans.stride]) for spans in (body.inputs, body.outputs)]
     taken = np.full(program.size, NONE, np.int64)
     for offset, size, stride in np.unique(np.concatenate(places, axis=1), axis=1).T.tolist():
@@ -118,7 +118,7 @@ def _equal(body: PhaseCalls, before: Sequence[Sequence[int]]) -> list[list[int]]
 
 
 def _limbs(sets: Sequence[Sequence[int]], before: Sequence[Sequence[int]], limbs: int, count: int) -> list[int]:
-    """Which limb each call belongs to, -1: none. A call belongs where those belong that it reads, or that read it."""
+    """Assign each call to a chain, -1 for none: the chain of the calls that it reads, or that read it."""
     limb = [NONE] * count
     after: list[list[int]] = [[] for _ in range(count)]
     for c, own in enumerate(before):

@@ -218,7 +218,7 @@ class _Phase:
 
 
 def _words_of(part: Spans, steps: int) -> Ints:
-    """How many words each place covers."""
+    """Return the number of words of each place."""
     return part.size * np.where(part.stride != 0, steps, 1)
 
 

@@ -95,7 +95,7 @@ class SlopeKernel:
         return found
 
     def jacobians_from_end(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None = None) -> Iterator[Array]:
-        """The same in runs of few points, the last run first, each as soon as it is known; they are begun at once."""
+        """Yield Jacobians in runs of few points, the last run first; all runs start at once."""
         z, given, found = self._arguments(Z, parameters, columns)
         ends = [*range(0, len(z), self.report.lanes), len(z)]
         runs = [*pairwise(ends)][::-1]

@@ -22,7 +22,7 @@ class PointPlaces:
     """Where the values of one point lie that adjoints read: in the order in which they read them."""
 
     def __init__(self) -> None:
-        """Nothing is read yet."""
+        """Start with no place read."""
         self._found: dict[Key, tuple[int, Guards]] = {}
         self.size = 0
 

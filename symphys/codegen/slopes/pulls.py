@@ -66,7 +66,7 @@ class Pulls:
     """
 
     def __init__(self, activity: Activity, functions: DistinctFunctions, size: int) -> None:
-        """For a program of so many words."""
+        """Start without pulls for a program of ``size`` words."""
         self.end = size
         self._activity, self._functions = activity, functions
         self._known = dict[tuple[int, Mask, Mask], tuple[Graph, Taped | None]]()
@@ -106,7 +106,7 @@ def sparsity(graph: Graph) -> NDArray[np.float32]:
 
 
 def _operations(graph: Graph, taped: Taped | None) -> int:
-    """Of an adjoint, for a block of rows."""
+    """Write the adjoint of a call for a block of rows."""
     found = taped.adjoint if taped else graph
     return sum(found.nodes[x].op not in ("input", "const") for x in found.needed())
 

@@ -10,9 +10,8 @@ from fakes.emulated import Emulated, needs_compiler
 from worlds.toys import require
 
 from symphys.codegen import KernelUnavailable, ProcessorKernel, compile_program
-from symphys.codegen.backends import BEST, build_kernel, fastest
-from symphys.codegen.backends.fastest import FastestKernel
-from symphys.codegen.backends.kernels import described
+from symphys.codegen.backends import BEST, build_kernel, kernels
+from symphys.codegen.backends.kernels import FastestKernel, described
 from symphys.codegen.cuda import DeviceKernel, compile_on
 from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.problem import load_problem
@@ -64,7 +63,7 @@ def test_a_large_batch_goes_where_the_first_of_its_size_was_faster(
 ) -> None:
     run = Timed(there._run, 1.0)
     monkeypatch.setattr(there, "_run", run)
-    monkeypatch.setattr(fastest, "perf_counter", run.clock)
+    monkeypatch.setattr(kernels, "perf_counter", run.clock)
     kernel = FastestKernel(here, lambda: there, LARGE)
     if faster:
         monkeypatch.setattr(kernel, "_expected", lambda batch: 1e6)

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from worlds import programs
 
-from symphys.codegen.cuda.apart import results_apart
-from symphys.codegen.emit.lines import Lines
+from symphys.codegen.cuda.source import results_apart
 from symphys.codegen.emit.plan import FAST_MEMORY, plan
+from symphys.codegen.emit.writer import Lines
 
 
 def told(ahead: int) -> list[str]:

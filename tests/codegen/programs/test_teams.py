@@ -14,9 +14,9 @@ from worlds.toys import require
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Program, compile_program
 from symphys.codegen.emit.alone import alone
 from symphys.codegen.emit.plan import plan
+from symphys.codegen.graph.adjoint import with_early_sums
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.instructions import graph_of
-from symphys.codegen.graph.sums import with_early_sums
 from symphys.codegen.program.teams import teamed
 from symphys.codegen.runtime.widths import suited
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from symphys.codegen import FunctionCall, MemoryLayout, Program, ProgramError
-from symphys.codegen.slopes import SlopeKernel, compile_slopes, merging
+from symphys.codegen.slopes import SlopeKernel, compile_slopes, plan
 from symphys.codegen.slopes.plan import slope_plan
 
 SIZE, ROWS = 5, 11
@@ -55,7 +55,7 @@ def test_jacobians_are_casadis(kernel: SlopeKernel) -> None:
 
 def test_calls_that_follow_each_other_are_merged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Six steps of a pendulum: calls of four and of two, with the same Jacobian."""
-    monkeypatch.setattr(merging, "SMALLEST", 0)
+    monkeypatch.setattr(plan, "SMALLEST", 0)
     y, a = ca.SX.sym("y", 2), ca.SX.sym("a")
     swing = ca.Function("swing", [y, a], [y + 0.1 * ca.vertcat(y[1], -a * ca.sin(y[0]))])
     at = MemoryLayout()
@@ -63,7 +63,7 @@ def test_calls_that_follow_each_other_are_merged(monkeypatch: pytest.MonkeyPatch
     places = [start, *(at.take(2) for _ in range(5)), at.series(2, 1)]
     calls = tuple(FunctionCall(swing, (x, given), (after,)) for x, after in pairwise(places))
     program = Program(at.size, start, given, 1, {"end": places[-1].still()}, body=calls)
-    assert len(merging.merged(program)) == 2
+    assert len(plan.merged(program)) == 2
     found = compile_slopes(program, "end", threads=1).jacobians([[0.3, 0.1]], [2.0])[0]
     whole = y
     for _ in range(6):
