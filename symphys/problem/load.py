@@ -55,7 +55,7 @@ from symphys.problem.tables.contact import (
 from symphys.problem.tables.controllers import read_controllers, read_sensors
 from symphys.problem.tables.forces import force_quantities, read_forces
 from symphys.problem.tables.joints import read_joints
-from symphys.problem.tables.objectives import Objectives, read_objectives
+from symphys.problem.tables.objectives import Objectives, read_objectives, read_termination, with_termination_cost
 from symphys.problem.tables.scenarios import read_scenarios
 from symphys.problem.tables.simulation import (
     check_read_at_start,
@@ -66,7 +66,6 @@ from symphys.problem.tables.simulation import (
     read_time,
 )
 from symphys.problem.tables.statics import read_statics
-from symphys.problem.tables.termination import read_termination, with_termination_cost
 from symphys.problem.tables.variables import read_variables
 from symphys.problem.units import formula_units
 from symphys.types import Array
@@ -200,7 +199,7 @@ def named_quantities(
     controllers: Sequence[FeedbackController],
     sets: Mapping[str, Mapping[str, tuple[float, ...]]],
 ) -> dict[str, Quantity]:
-    """What variables may set beside the world: numbers of controllers, force laws and phases, clocks of recordings."""
+    """Collect what variables may set besides the world: numbers of controllers, laws, phases; clocks of recordings."""
     delays = [(name, each.delay) for table in document.recording for name, each in table.input_tables.items()]
     clocks = recording_quantities((table.name for table in document.recording), delays)
     return weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets) | clocks
@@ -244,7 +243,7 @@ def check_variables(
     variables: Sequence[Variable],
     faults: Faults,
 ) -> None:
-    """What variables and phases set must fit the world, and the rollout into memory."""
+    """Check that what variables and phases set fits the world, and that the rollout fits into memory."""
     check_rollout(nominal, simulation, variables, faults)
     check_varied(parametric, nominal, varied_names(document, variables), faults)
     check_anchors(parametric, variables, faults)
@@ -252,7 +251,7 @@ def check_variables(
 
 
 def varied_names(document: Document, variables: Sequence[Variable | None]) -> list[tuple[Place, str]]:
-    """What variables and phases set, and where they say so."""
+    """Yield what variables and phases set, with the place in the file."""
     found: list[tuple[Place, str]] = [
         (("phase", k, "sets"), name) for k, table in enumerate(document.phase) for name, _ in dotted(table.sets)
     ]
@@ -313,7 +312,7 @@ def read_world(document: Document, faults: Faults) -> tuple[ParametricWorld, dic
 
 
 def stop_when_met(document: Document, objectives: Objectives) -> bool:
-    """As the file says; else True with a goal, or with targets and no costs, which leave nothing to improve."""
+    """Return the key of the file; by default True with a goal, or with targets and no costs."""
     if document.objective.stop is not None:
         return document.objective.stop == "met"
     return document.objective.goal is not None or (bool(objectives.targets) and not objectives.costs)

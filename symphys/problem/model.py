@@ -76,7 +76,7 @@ class Phase:
 
     @property
     def weights(self) -> dict[str, Array]:
-        """What it sets by the names that variables and formulas use: ``ice.ground.friction``."""
+        """Return what the phase sets by the names that variables and formulas use: ``ice.ground.friction``."""
         return {f"{self.name}.{key}": np.array(numbers) for key, numbers in self.sets.items()}
 
     def ticks(self, steps: int) -> tuple[int, int]:

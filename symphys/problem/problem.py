@@ -35,7 +35,7 @@ class Problem(ProblemData):
     varied: frozenset[str] = frozenset()
 
     def set(self, key: str | Mapping[str, object], value: object = None) -> Problem:
-        """The same problem with another value, or with several from a mapping.
+        """Return a copy with another value, or with several from a mapping.
 
         Args:
             key: of the problem file, dotted: ``ball.mass``, ``ground.friction``, ``simulation.dt``, ``throw.guess``,

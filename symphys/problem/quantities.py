@@ -85,7 +85,7 @@ def start_quantities(parametric: ParametricWorld) -> dict[str, Quantity]:
 
 
 def duration_quantity(duration: float) -> dict[str, Quantity]:
-    """How long the motion takes [s]."""
+    """Return the duration of the motion [s] as a quantity."""
     return {DURATION: Quantity("duration", np.array([duration]), own_scale=True)}
 
 
@@ -95,7 +95,7 @@ def weight_quantities(controllers: Iterable[FeedbackController]) -> dict[str, Qu
 
 
 def recording_quantities(names: Iterable[str], delays: Iterable[tuple[str, float]]) -> dict[str, Quantity]:
-    """Of each [[recording]] what is added to its times [s], and the factor of its lengths; delays of inputs [s]."""
+    """Return the time offset [s] and the scale of each [[recording]], and the delays of inputs [s]."""
     found = dict[str, Quantity]()
     for name in names:
         found[f"{name}.offset"] = Quantity("recording", np.zeros(1))
@@ -156,7 +156,7 @@ def unknown(name: str, known: Collection[str]) -> str:
 
 
 def set_quantities(problem: ProblemData, variable: Variable) -> str:
-    """What a variable sets, as a file writes it; all that a list names gets the same values, which may not be meant."""
+    """Describe what a variable sets as a file writes it; quantities of a list get the same values."""
     values = {**problem.initial, **problem.parametric.starts(), **problem.parameters, **problem.weights}
     tables = sorted({recording.table for recording in problem.recordings})
     delays = {name: each.delay for recording in problem.recordings for name, each in recording.inputs.items()}

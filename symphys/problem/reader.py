@@ -82,7 +82,7 @@ class ProblemReader:
         return replace(merged, data=copied(merged.data)), late
 
     def place(self, key: str) -> tuple[str | int, ...]:
-        """Where a dotted key leads to, however it is written; see ``place_of``."""
+        """Return the place that a dotted key leads to; see ``place_of``."""
         return place_of(self.tables(NOTHING)[0].data, key)
 
 

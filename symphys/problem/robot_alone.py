@@ -74,7 +74,7 @@ def without_contact(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parse_title(tables: Mapping[str, Any], name: str) -> object:
-    """What the included file calls itself; else its name."""
+    """Return the title of the included file, or its file name."""
     (kept,) = tables["included"]
     return parse_toml(Path(kept["file"]), kept["text"]).get("title", name)
 

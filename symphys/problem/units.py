@@ -47,14 +47,14 @@ SLIDING = {
 
 
 def quantity_unit(name: str, world: World) -> str | None:
-    """Of a quantity by its name; None where it is not known."""
+    """Return the unit of a quantity by its name; None if it is unknown."""
     owner, _, key = name.rpartition(".")
     joint = next((joint for joint in world.joints if joint.name == owner), None)
     return UNITS.get(key) if joint is None else joint_unit(joint, key)
 
 
 def joint_unit(joint: Joint, key: str) -> str | None:
-    """Of a quantity of a joint; a command has that of what its motor follows."""
+    """Return the unit of a quantity of a joint; a command has the unit of what its motor follows."""
     units = SLIDING if any(not coordinate.turns for coordinate in joint.kind.coordinates) else TURNING
     if key == "gain" and isinstance(joint.motor, AffineMotor):  # force by command, which has any unit
         return None

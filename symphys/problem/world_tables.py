@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from symphys.errors import SymphysError
@@ -14,9 +15,61 @@ from symphys.model.heightfield import Heightfield
 from symphys.model.shapes import Fixture, Plane, Shape, Static, Terrain
 from symphys.model.shapes.inertia import inertia_of, off_centre, specific
 from symphys.model.world import Law, Side, World
-from symphys.problem.formula_text import formula_text
 from symphys.problem.joint_tables import joint_tables
 from symphys.problem.plain import floats, numbers
+
+LONGEST = 20_000
+"""Characters; beyond that an expression repeats so much that a grid of heights serves better."""
+WORDS: dict[int, str] = {
+    ca.OP_ADD: "({} + {})",
+    ca.OP_SUB: "({} - {})",
+    ca.OP_MUL: "({} * {})",
+    ca.OP_DIV: "({} / {})",
+    ca.OP_POW: "({} ** {})",
+    ca.OP_CONSTPOW: "({} ** {})",
+    ca.OP_SQ: "({} ** 2)",
+    ca.OP_TWICE: "(2 * {})",
+    ca.OP_NEG: "(-{})",
+    ca.OP_INV: "(1 / {})",
+    ca.OP_ATAN2: "atan2({}, {})",
+    ca.OP_FABS: "abs({})",
+    ca.OP_FMIN: "min({}, {})",
+    ca.OP_FMAX: "max({}, {})",
+    ca.OP_ASSIGN: "{}",
+} | {
+    getattr(ca, f"OP_{name.upper()}"): f"{name}({{}})"
+    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "sqrt", "exp", "log", "sign")
+}
+"""By casadi's operations, with places for their arguments."""
+
+
+def formula_text(height: Callable[[Any, Any], Any]) -> str:
+    """The formula of a function of casadi scalars x and y.
+
+    Raises:
+        SymphysError: names an operation that formulas do not have.
+    """
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    made = ca.Function("height", [x, y], [ca.densify(ca.SX(height(x, y)))])
+    values: dict[int, str] = {}
+    text = "0"
+    for k in range(made.n_instructions()):
+        operation, given, out = made.instruction_id(k), made.instruction_input(k), made.instruction_output(k)
+        if operation == ca.OP_OUTPUT:
+            text = values[given[0]]
+        elif operation == ca.OP_INPUT:
+            values[out[0]] = ("x", "y")[given[0]]
+        elif operation == ca.OP_CONST:
+            constant = made.instruction_constant(k)
+            values[out[0]] = repr(constant) if constant >= 0 else f"({constant!r})"
+        elif operation not in WORDS:
+            raise SymphysError("it has an operation that formulas lack, such as a comparison or if_else")
+        else:
+            values[out[0]] = WORDS[operation].format(*(values[i] for i in given))
+            if len(values[out[0]]) > LONGEST:
+                raise SymphysError(f"its formula is longer than {LONGEST} characters")
+    return text
+
 
 Start = Mapping[str, Any]
 """States by name, such as ``ball.position``; what is missing is zero, and upright."""
@@ -113,7 +166,7 @@ def part_table(shape: Shape) -> dict[str, Any]:
 
 
 def static_tables(statics: Sequence[Static]) -> dict[str, Any]:
-    """What stands still, by the kind of its table."""
+    """Return the static surfaces by the kind of their table."""
     found: dict[str, Any] = {"plane": [], "block": [], "terrain": []}
     for static in statics:
         if isinstance(static, Plane) and static.name == "ground" and floats(static.normal) == [0, 0, 1]:

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symphys.problem.checks.inertia import inertia_fault
-from symphys.problem.parametric.mass_distribution import distribution, inertia
+from symphys.problem.parametric.parts import distribution, inertia
+from symphys.problem.tables.bodies import inertia_fault
 
 
 def tensor(value: object) -> np.ndarray:

@@ -32,7 +32,7 @@ def check_pair_limit(world: ParametricWorld, faults: Faults) -> None:
 
 
 def too_many(candidates: CollisionFilter, counted: PairCount) -> str:
-    """How many points there are, where most come from, and what to do."""
+    """Say how many contact points there are, where most come from, and what to do."""
     sets = list(candidates.sets.values())
     largest = counted.shares.most_common(LISTED)
     listed = ", ".join(f"{between(sets[a], sets[b], a == b)}: {count}" for (a, b), count in largest)
@@ -50,7 +50,7 @@ def too_many(candidates: CollisionFilter, counted: PairCount) -> str:
 
 
 def most_points(kind: type[Surface]) -> int:
-    """In how many points a surface of this kind touches another at most."""
+    """Return the largest number of points in which a surface of this kind touches another."""
     return max(points_of_kinds(kind, other) for other in SURFACES.values())
 
 

@@ -63,7 +63,7 @@ class StartFunctions:
 
     @cached_property
     def joints(self) -> ca.Function:
-        """Of each joint its separation, tilt and coordinates."""
+        """Return a function for the separation, tilt and coordinates of each joint."""
         found = self._readings.values()
         return self._function("joints", [part for each in found for part in (each.separation, each.tilt, each.value)])
 
@@ -94,7 +94,7 @@ class Start:
         return dict(zip(names, function.call([self.x, self.p]), strict=True))
 
     def joints(self) -> list[tuple[float, float, Array]]:
-        """Of each joint its separation [m], its tilt [rad], and (k,) its coordinates."""
+        """Return for each joint its separation [m], its tilt [rad], and its coordinates (k,)."""
         found = self.functions.joints.call([self.x, self.p])
         parts = zip(found[::3], found[1::3], found[2::3], strict=True)
         return [(float(apart), float(tilt), np.array(value).ravel()) for apart, tilt, value in parts]
@@ -125,7 +125,7 @@ class StartValues:
         return Start(functions, initial_state(world, given), p)
 
     def _functions(self, world: World, symbols: list[Any]) -> StartFunctions:
-        """Those of the structure of this world: it is equal to another, but for what the symbols stand for."""
+        """Return the readings of this world's structure, which worlds that differ in symbols alone share."""
         key = structure(world, symbols)
         if key not in self._kept:
             if len(self._kept) >= MOST_KEPT:

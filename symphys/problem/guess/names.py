@@ -13,7 +13,7 @@ RATES = {ORIENTATION: "angular_velocity", "angle": "rate"}
 
 
 def guessable(world: World) -> dict[str, int]:
-    """What a guess may name, and how many numbers each has.
+    """Return what a guess may name, with the size of each.
 
     Of bodies that no joint of a tree holds position, orientation and the velocities, world frame. Of trees' joints the
     coordinates and their rates. Of their ball joints, which have no coordinates, the orientation of the second body
@@ -43,7 +43,7 @@ def is_ball(link: Link, joint: Joint) -> bool:
 
 
 def ball_joints(world: World) -> list[Joint]:
-    """Those of the trees."""
+    """Return the joints of the trees."""
     return [joint for link, joint in tree_joints_of(world) if is_ball(link, joint)]
 
 

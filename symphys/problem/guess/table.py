@@ -86,7 +86,7 @@ def _read_state(
 
 
 def _numbers(name: str, value: Any, size: int) -> list[float]:
-    """What a state has for a quantity; ValueError where that cannot be."""
+    """Return the value of a quantity in a state; ValueError for an impossible one."""
     turns = isinstance(value, Mapping)
     numbers = list(value.values()) if turns else value if isinstance(value, list) else [value]
     right = all(isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in numbers)

@@ -12,7 +12,6 @@ from typing import Any, TypeVar, get_origin
 from pydantic import ValidationError
 
 from symphys.problem.include.merge import IncludedFile, MergedFiles, merge
-from symphys.problem.include.prefix import prefixed
 from symphys.problem.reading.faults import Faults, SourceLocation
 from symphys.problem.reading.messages import report
 from symphys.problem.reading.source import MAX_BYTES, parse_toml, read_source, refuse
@@ -21,6 +20,52 @@ from symphys.problem.schema import Document, SchemaTable
 from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
 from symphys.problems import parts
 from symphys.suggest import hint, quote
+
+LABELLED = ("cost", "target", "constraint", "scenario")
+"""Tables whose names nothing refers to."""
+OTHER_TEXTS = ("at", "during", "file", "interpolation", "height", "activation", "output", "weights")
+"""Keys whose texts name nothing of the file."""
+
+BEFORE = r"(?:(?<![\w.])|(?<=\bstart\.)|(?<=\bend\.))"
+"""Before a mention of a name: nothing of a longer one, but ``end.`` in ``end.knee.angle``."""
+
+
+def prefixed(data: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """The tables of a file with ``prefix`` before every name and group, and wherever a text mentions one."""
+    lists = {key: value for key, value in data.items() if isinstance(value, list)}
+    names = sorted(own_names(lists), key=len, reverse=True)
+    mention = (
+        re.compile(rf"(?:(?<![\w.])|(?<=\bstart\.)|(?<=\bend\.))(?:{'|'.join(map(re.escape, names))})(?!\w)")
+        if names
+        else None
+    )
+
+    def renamed(value: Any) -> Any:
+        if isinstance(value, str):
+            return mention.sub(lambda match: prefix + match[0], value) if mention else value
+        if isinstance(value, list):
+            return [renamed(item) for item in value]
+        if isinstance(value, dict):
+            return {key: item if key in OTHER_TEXTS else renamed(item) for key, item in value.items()}
+        return value
+
+    found = dict(data)
+    for key, entries in lists.items():
+        found[key] = [renamed(entry) for entry in entries]
+        for entry in found[key] if key in LABELLED else ():
+            if isinstance(entry, dict) and isinstance(entry.get("name"), str):
+                entry["name"] = f"{prefix}{entry['name']}"
+    return found
+
+
+def own_names(lists: Mapping[str, list[Any]]) -> set[str]:
+    """Return the names of the file's bodies, joints, variables and groups."""
+    tables = [
+        entry for key, entries in lists.items() if key not in LABELLED for entry in entries if isinstance(entry, dict)
+    ]
+    given = [table.get(key) for table in tables for key in ("name", "group")]
+    return {name for name in given if isinstance(name, str) and name}
+
 
 RECORDED = ("recording", "recorded", "identify")
 OF_THE_PROBLEM = ("simulation", "phase", "termination", "fall", "objective", "solver", "solvers", "sweep", *RECORDED)
@@ -154,7 +199,7 @@ def source(file: str, text: str, table: IncludeTable, faults: Faults) -> Include
 
 
 def key_fault(key: str, value: object, problem: str) -> str:
-    """What is wrong with a table or key at the top of an included file; empty if nothing."""
+    """Return the fault of a table or key at the top of an included file; empty without one."""
     if key in OF_THE_PROBLEM:
         return f"belongs to a whole problem; move it to {problem}, which includes this file"
     if key in FURTHER:
@@ -183,7 +228,7 @@ def check_twice(sources: list[IncludedFile], faults: Faults) -> None:
 
 
 def appendix(texts: Mapping[str, str]) -> str:
-    """What makes a problem's text whole without its files: their texts, as [[included]] tables."""
+    """Return [[included]] tables with the texts of included files, so that the problem's text is whole."""
     return "".join(f"\n[[included]]\nfile = {basic(file)}\ntext = {lines(text)}\n" for file, text in texts.items())
 
 

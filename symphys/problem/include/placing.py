@@ -61,7 +61,7 @@ class Placement:
         return [a + b for a, b in zip(self.direction(vector), self.include.position, strict=True)]
 
     def orientation(self, place: Place, given: Any) -> Any:
-        """As the file gives it, turned."""
+        """Return the orientation of the file, turned."""
         if not self.include.yaw_deg:
             return given
         return turned(read_orientation((*place, "orientation"), given, self.faults), 2, self.include.yaw_deg).tolist()

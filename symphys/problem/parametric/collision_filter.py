@@ -120,14 +120,14 @@ class CollisionFilter:
         return self.classes[c].part.name, self.parts[self.classes[d].members[-1]].name
 
     def _rows(self) -> Iterator[tuple[int, Ints]]:
-        """For each class of bodies, which of itself and of later classes, all static ones among them, it may touch."""
+        """Return for each class of bodies which later classes, static ones and itself it may touch."""
         for c, each in enumerate(self.classes):
             if each.moves:
                 met = np.flatnonzero(self._lets(c) & self._let(c) & self._collide(c))
                 yield c, met[met >= c]
 
     def _lets(self, c: int) -> Bools:
-        """Which classes ``c`` lists in collides_with."""
+        """Return the classes that ``c`` lists in collides_with."""
         named = self.classes[c].part.collides_with
         if named is None:
             return np.ones(len(self.classes), bool)
@@ -137,14 +137,14 @@ class CollisionFilter:
         return mask
 
     def _let(self, c: int) -> Bools:
-        """Which classes list ``c`` in collides_with."""
+        """Return the classes that list ``c`` in collides_with."""
         mask = self._free.copy()
         for name in own_names(self.classes[c].part):
             mask[self._wanted.get(name, [])] = True
         return mask
 
     def _collide(self, c: int) -> Bools:
-        """With which classes the [[pair]] tables let ``c`` collide; those that name more surfaces hold."""
+        """Return the classes with which [[pair]] tables let ``c`` collide; tables that name more surfaces win."""
         mask = np.ones(len(self.classes), bool)
         own = own_names(self.classes[c].part)
         for place in sorted({place for name in own for place in self._stated.get(name, [])}):
@@ -188,7 +188,7 @@ def kinds(part: Part) -> tuple[int, ...]:
 
 
 def own_names(part: Part) -> tuple[str, ...]:
-    """What a part is called in collides_with and [[pair]]: its name, and its group's."""
+    """Return the names of a part in collides_with and [[pair]]: its own and its group's."""
     return (part.name,) if part.group is None else (part.name, part.group)
 
 

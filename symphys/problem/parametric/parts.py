@@ -1,18 +1,60 @@
-"""The parts of a parametric world: bodies, static surfaces and [[pair]] tables, with numbers that may be replaced."""
+"""The parts of a parametric world: bodies, static surfaces and [[pair]] tables, with numbers that may be replaced.
+
+Inertia is given by numbers that bounds alone keep physical: second moments of the mass, and how they are correlated.
+With Sigma = integral of x x' dm about the centre of mass, the inertia is trace(Sigma) 1 - Sigma. A rigid body has this
+inertia if and only if Sigma is positive semidefinite (Wensing, Kim and Slotine, IEEE RA-L 3(1), 2018), which holds the
+triangle inequalities of its moments too. Sigma is given by its diagonal, which must not be negative, and by three
+correlations in [-1, 1]: xy, xz, and yz for given x. These are partial correlations (Lewandowski, Kurowicka and Joe,
+J. Multivariate Analysis 100(9), 2009), of which any three make a correlation matrix.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from math import sqrt
 from typing import Any
 
+import casadi as ca
+import numpy as np
+
 from symphys.model.body import Body
-from symphys.model.scalar import is_zero
-from symphys.model.shapes import Scalar, Shape, Sphere, Static, Surface
-from symphys.model.shapes.inertia import Tensor, inertia_of, specific
+from symphys.model.scalar import Scalar, is_zero
+from symphys.model.shapes import Shape, Sphere, Static, Surface
+from symphys.model.shapes.inertia import NOISE, Tensor, inertia_of, specific
 from symphys.model.world import Law
-from symphys.problem.parametric.mass_distribution import distribution, inertia
+
+
+def distribution(tensor: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Second moments (3,) [kg m^2] and correlations (3,) [-] of an inertia as ``Body`` has it, body frame."""
+    given = np.asarray(tensor, float)
+    whole = given if given.ndim == 2 else np.diag(np.broadcast_to(given, 3))
+    sigma = np.trace(whole) / 2 * np.eye(3) - whole
+    moments = np.where(np.diag(sigma) > NOISE * np.trace(whole), np.diag(sigma), 0.0)
+    if not np.any(whole - np.diag(np.diag(whole))):
+        return tuple(moments.tolist()), (0.0, 0.0, 0.0)
+    width = np.sqrt(moments)
+    xy, xz, yz = (_ratio(sigma[i, j], width[i] * width[j]) for i, j in ((0, 1), (0, 2), (1, 2)))
+    return tuple(moments.tolist()), (xy, xz, _ratio(yz - xy * xz, sqrt((1 - xy * xy) * (1 - xz * xz))))
+
+
+def _ratio(part: float, whole: float) -> float:
+    """Return the ratio of a product to its bound, in [-1, 1]; 0 if the bound is 0."""
+    return max(-1.0, min(1.0, float(part / whole))) if whole > 0 else 0.0
+
+
+def inertia(moments: Sequence[Scalar], correlations: Sequence[Scalar]) -> Any:
+    """The inertia [kg m^2] as ``Body`` takes it, body frame: principal moments if nothing is correlated."""
+    a, b, c = moments
+    if all(is_zero(each) for each in correlations):
+        return b + c, a + c, a + b
+    xy, xz, rest = correlations
+    yz = xy * xz + rest * ca.sqrt((1 - xy * xy) * (1 - xz * xz))
+    x, y, z = (ca.sqrt(each) for each in moments)
+    pxy, pxz, pyz = -xy * x * y, -xz * x * z, -yz * y * z
+    return (b + c, pxy, pxz), (pxy, a + c, pyz), (pxz, pyz, a + b)
+
 
 Numbers = float | tuple[float, ...]
 Value = Callable[[str], Any]
@@ -34,7 +76,7 @@ CENTRE = "centre_of_mass"
 
 
 def stated(states: Mapping[str, float]) -> dict[str, Numbers]:
-    """Those of the coefficients that may be varied."""
+    """Return the coefficients that variables may set."""
     return {key: number for key, number in states.items() if number or key not in STRUCTURAL}
 
 
@@ -66,7 +108,7 @@ class ParametricBody:
 
     @property
     def surfaces(self) -> tuple[Surface, ...]:
-        """What may touch others."""
+        """Return the surfaces that may touch others."""
         return self.shapes
 
     def parameters(self) -> dict[str, Numbers]:
@@ -99,7 +141,7 @@ class ParametricBody:
         return tuple(value(f"{self.name}.{CENTRE}")) if self.mass else (0.0, 0.0, 0.0)
 
     def _centred(self, overrides: Mapping[str, Any], value: Value) -> Body:
-        """With its centre of mass at the origin of that frame."""
+        """Return the body with its centre of mass at the origin of the file's frame."""
         mass = value(f"{self.name}.mass")
         if len(self.shapes) != 1:
             return Body(self.name, mass, self._inertia(mass, self._specific), self.shapes)
@@ -182,7 +224,7 @@ class ParametricStatic:
 
     @property
     def surfaces(self) -> tuple[Surface, ...]:
-        """What may be touched."""
+        """Return the surface that may be touched."""
         return (self.static.surface,)
 
     def parameters(self) -> dict[str, Numbers]:

@@ -51,7 +51,7 @@ def components(value: Any) -> list[Expr]:
 
 
 def check_starts(parametric: ParametricWorld, varied: Iterable[tuple[Place, str]], faults: Faults) -> None:
-    """What a joint with a varied start carries must be determined: it closes no loop and does not give way.
+    """Check that a joint with a varied start closes no loop and is rigid, so that what it carries is determined.
 
     ``varied`` are the names of what varies, and where the file says so.
     """

@@ -71,13 +71,13 @@ class ParametricWorld:
 
     @cached_property
     def contact_parameters(self) -> dict[str, Numbers]:
-        """Those of [contact], whose damping is one where some contact is soft."""
+        """Return the parameters of [contact]; damping is one only where some contact is soft."""
         soft = self.contact.soft or any(pair.states.get("frequency") for pair in self.pairs)
         known = stated(vars(self.contact))
         return {f"{CONTACT}.{key}": number for key, number in known.items() if soft or key != "damping"}
 
     def starts(self) -> dict[str, Array]:
-        """What variables may set of joints at the start, as the file has it, (coordinates,) each.
+        """Return the start coordinates and rates of joints that variables may set, (coordinates,) each.
 
         ``hip.start`` are the coordinates [rad] or [m]. ``hip.start_rate`` are rates [rad/s] or [m/s] that come on top
         of those that the velocities of the bodies give: 0, as no file states them.
@@ -146,11 +146,11 @@ class ParametricWorld:
 
     @cached_property
     def jointed(self) -> tuple[PairRule, ...]:
-        """As [[pair]] tables: the bodies that joints hold together do not touch each other."""
+        """Return [[pair]] rules by which jointed bodies do not touch each other."""
         return tuple(joint.apart for joint in self.joints if joint.apart is not None)
 
     def _pairs(self, bodies: tuple[Body, ...], statics: tuple[Static, ...], value: Value) -> tuple[Pair, ...]:
-        """As ``world.all_pairs`` has them: first what is against statics, then what is against later bodies."""
+        """Return the pairs in the order of ``world.all_pairs``: against statics, then against later bodies."""
         laws = {(i, j): self.law(self.parts[i].name, self.parts[j].name, value) for i, j in self.collision_pairs}
         sides = [[Side(i, k) for k in range(len(body.shapes))] for i, body in enumerate(bodies)]
         sides += [[Side(None, k)] for k in range(len(statics))]
@@ -204,7 +204,7 @@ class ParametricWorld:
         return Law(**found)
 
     def sources(self, a: str, b: str) -> dict[str, list[tuple[str, float, bool]]]:
-        """By coefficient: who states it for the two (a pair, [contact], one surface or both), what, if a parameter."""
+        """Map coefficients to who states them (a pair, [contact], surfaces), the value, and if it is a parameter."""
         pair = self.pair(a, b)
         found: dict[str, list[tuple[str, float, bool]]] = {}
         for key, number in vars(self.contact).items():

@@ -49,7 +49,7 @@ class Faults:
             self.issues.append(issue)
 
     def origin(self, place: Place) -> SourceLocation:
-        """Where what is at a place was written."""
+        """Return where the value at a place was written."""
         found = self.origins.get(tuple(place[:2]))
         if found is None:
             return SourceLocation(self.file, self.data, place)

@@ -63,7 +63,7 @@ def report(error: ValidationError, model: type[BaseModel], faults: Faults, prefi
 
 
 def message(finding: Finding, model: type[BaseModel]) -> str:
-    """What is wrong and what would be valid."""
+    """Say what is wrong and what would be valid."""
     kind = finding["type"]
     if kind == "extra_forbidden":
         key = str(finding["loc"][-1])

@@ -135,7 +135,7 @@ def step(node: Any, rest: str, top: bool) -> tuple[str | int, str | None]:
 
 
 def entry_names(entry: object, index: int) -> Sequence[str]:
-    """What a table of a list may be called: its name, for a pair ``a-b``, and always its index."""
+    """Return the keys of a table of a list: its name, for a pair ``a-b``, and always its index."""
     names = [str(index)]
     if isinstance(entry, dict):
         between = entry.get("between")

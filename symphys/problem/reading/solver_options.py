@@ -120,7 +120,7 @@ def made_model(cls: type[Any]) -> type[BaseModel]:
 
 
 def option_descriptions(cls: type[Any]) -> dict[str, str]:
-    """What each option means, from the ``Attributes:`` of the docstrings; those of the class itself count first."""
+    """Map options to their meaning, from ``Attributes:`` of the docstrings; those of the class itself count first."""
     found: dict[str, str] = {}
     for each in (each for each in cls.__mro__ if is_dataclass(each)):
         _, _, listed = cleandoc(each.__doc__ or "").partition("Attributes:\n")
@@ -132,7 +132,7 @@ def option_descriptions(cls: type[Any]) -> dict[str, str]:
 
 
 def documentation(cls: type[Any]) -> str:
-    """What a dataclass says of its options, then what those say from which it has some."""
+    """Yield the docstrings of a dataclass and of those from which it has options."""
     return "\n\n".join(cleandoc(each.__doc__ or "") for each in cls.__mro__ if is_dataclass(each))
 
 

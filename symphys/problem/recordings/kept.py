@@ -22,7 +22,7 @@ def plain_text(content: bytes) -> str | None:
 
 
 def recorded_appendix(files: Iterable[RecordedFile]) -> str:
-    """What a problem's text needs to be read again from elsewhere: small files whole, of others where they are."""
+    """Return what a problem's text needs elsewhere: the content of small files, the paths of others."""
     parts = []
     for each in files:
         place = "" if each.text is not None else f"path = {quoted(each.path)}\n"

@@ -49,7 +49,7 @@ class Identified:
     identify: IdentifySettings = field(default_factory=IdentifySettings)
 
     def fields(self) -> dict[str, Any]:
-        """Those of the problem."""
+        """Return the recordings of the problem."""
         return {"recordings": self.recordings, "recorded_files": self.recorded_files, "identify": self.identify}
 
 
@@ -126,7 +126,7 @@ def with_duration(document: Document, faults: Faults) -> Document:
 
 
 def read_frame(index: int, table: RecordingTable, faults: Faults) -> MeasurementFrame | None:
-    """Where the measurement system lies; None: as the world."""
+    """Return the frame of the measurement system; None if it is that of the world."""
     if table.frame is None:
         return None
     place = ("recording", index, "frame", "orientation")
@@ -145,7 +145,7 @@ def check_unused(document: Document, faults: Faults) -> None:
 
 
 def check_starts(recordings: Sequence[Recording], variables: Sequence[Variable], faults: Faults) -> None:
-    """What recordings set at the start, no variable sets for all of them together."""
+    """Check that no variable sets for all recordings what each sets at the start."""
     given = {name: each.table for each in recordings for name in each.start}
     for index, variable in enumerate(variables):
         for slot in variable.slots:
@@ -157,7 +157,7 @@ def check_starts(recordings: Sequence[Recording], variables: Sequence[Variable],
 def check_inputs(
     tables: Sequence[RecordingTable], recordings: Sequence[Recording], variables: Sequence[Variable], faults: Faults
 ) -> None:
-    """What recordings drive, no variable sets, and all tables state the same delay of it."""
+    """Check that no variable sets what recordings drive, and that all tables state the same delay."""
     driven = {name: each.table for each in recordings for name in each.inputs}
     for index, variable in enumerate(variables):
         for slot in variable.slots:

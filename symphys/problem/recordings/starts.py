@@ -28,7 +28,7 @@ class RecordedJoint:
 
 
 def joint_starts(joints: Sequence[ParametricJoint]) -> dict[str, RecordedJoint]:
-    """By name what recordings may set of rigid joints with one coordinate that close no loop."""
+    """Map names to what recordings may set of rigid joints with one coordinate that close no loop."""
     tree, found = spanning_tree(joints), dict[str, RecordedJoint]()
     for joint in joints:
         if joint.name in tree[joint.first] and len(joint.kind.coordinates) == 1:
@@ -49,7 +49,7 @@ class Starts:
         self._tree = spanning_tree(joints)
 
     def complete(self, given: Mapping[str, Array]) -> State:
-        """What a recording sets, and the states of all bodies that joints carry with these, by names of ``initial``.
+        """Return what a recording sets, and the states of all bodies carried by joints, by names of ``initial``.
 
         A joint has the coordinate and the rate that are given, else those of the file. A body that is given itself is
         not carried by others. Poses say nothing of whole turns: ``hinge.unwrapped`` is an angle that is given.
@@ -76,7 +76,7 @@ class Starts:
         return {f"{body}.{field}": state[f"{body}.{field}"] for body in group for field in FIELDS} | near
 
     def coordinates(self, given: Mapping[str, Array]) -> dict[str, Array]:
-        """Of joints what a recording sets, by the names with which variables set it: ``hinge.start`` [rad] or [m]."""
+        """Return what a recording sets of joints, by the names of variables: ``hinge.start`` [rad] or [m]."""
         found = {}
         for name, each in self.of_joints.items():
             if name in given:
@@ -141,7 +141,7 @@ def turn_on(joint: ParametricJoint, body: str, rate: float, state: State) -> Non
 
 
 def casadi_state(state: State) -> dict[str, ca.DM]:
-    """The same numbers."""
+    """Return the numbers unchanged."""
     return {name: ca.DM(value) for name, value in state.items()}
 
 

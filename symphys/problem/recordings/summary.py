@@ -17,7 +17,7 @@ WHOLE = 1e-6
 
 
 def recording_lines(problem: ProblemData) -> list[str]:
-    """For each [[recording]] table how many motions and samples it has, of what, how many are missing or held back.
+    """Summarize each [[recording]] table: motions, samples, columns, missing and held-back samples.
 
     Also where surfaces overlap at a start that a recording sets, and whether samples lie between time steps.
     """
@@ -28,7 +28,7 @@ def recording_lines(problem: ProblemData) -> list[str]:
 
 
 def table_lines(problem: ProblemData, table: str, own: Sequence[Recording]) -> list[str]:
-    """Those of one table."""
+    """Summarize one table."""
     dt = problem.simulation.dt
     counts = [len(each.time) for each in own]
     held = sum(each.held_back for each in own)
@@ -62,7 +62,7 @@ def table_lines(problem: ProblemData, table: str, own: Sequence[Recording]) -> l
 
 
 def deepest_start(problem: ProblemData, own: Sequence[Recording]) -> tuple[float, Recording]:
-    """How deep surfaces overlap [m] where recordings set the start, and in which recording most; below 0: nowhere."""
+    """Return the deepest overlap [m] at the starts of recordings and its recording; negative without overlap."""
     starts, found = StartValues(), list[tuple[float, Recording]]()
     for each in own:
         state = starts.of(problem.parametric, {**problem.initial, **problem.parameters, **each.start})

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import floor
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from symphys.expression import Formula, FormulaError, parse
 from symphys.expression.units import unit_of
@@ -28,18 +31,170 @@ from symphys.problem.recordings.csv_file import read_csv
 from symphys.problem.recordings.files import ARRAYS, FileFinder
 from symphys.problem.recordings.magnitude import check_lengths
 from symphys.problem.recordings.npz_file import read_npz
-from symphys.problem.recordings.set_columns import (
-    InputColumns,
-    StartColumns,
-    read_input_columns,
-    read_start_columns,
-)
-from symphys.problem.recordings.splits import held_back, pieces
 from symphys.problem.recordings.starts import Starts
 from symphys.problem.recordings.times import check_ends, read_times, time_column
-from symphys.problem.recordings.types import Measured, Recording
-from symphys.problem.schema.recording import ColumnsTable, MeasuredTable, RecordingTable
+from symphys.problem.recordings.types import Measured, RecordedInput, Recording
+from symphys.problem.schema.recording import ColumnsTable, InputTable, MeasuredTable, RecordingTable, leaves
+from symphys.suggest import hint, quote
 from symphys.types import Array
+
+
+@dataclass(frozen=True)
+class StartColumns:
+    """A quantity that the first row sets: its name, its columns and their units, how many numbers, and the unit."""
+
+    quantity: str
+    table: ColumnsTable
+    size: int
+
+    def first_row(self, rows: RecordedColumns, frame: MeasurementFrame | None) -> Array:
+        """(size,): what the first row of a recording has; RecordingFault where a number is missing."""
+        key = ("start", self.quantity)
+        rows.require(self.table.columns, key)
+        value: Array = convert(rows.part(0, 1), self.table.columns, self.table, self.quantity, self.size, frame, key)[0]
+        if not np.isfinite(value).all():
+            raise RecordingFault(key, f"{rows.where(0)}: the first row lacks a number of {self.quantity}")
+        return value
+
+
+@dataclass(frozen=True)
+class InputColumns:
+    """An input that was recorded: its name, its columns with their units, and how many numbers it has."""
+
+    name: str
+    table: InputTable
+    size: int
+
+    def over_time(self, rows: RecordedColumns, time: Array, frame: MeasurementFrame | None) -> RecordedInput:
+        """The input of a recording with times (n,) [s]; RecordingFault where no row has its numbers."""
+        key = ("inputs", self.name)
+        values = convert(rows, self.table.columns, self.table, self.name, self.size, frame, key)[: len(time)]
+        known = np.isfinite(values).all(axis=1)
+        if not known.any():
+            raise RecordingFault(key, f"{rows.where(0)}: no row from this one on has the numbers of {self.name}")
+        return RecordedInput(
+            time[known], values[known], self.table.interpolation, self.table.delay, int(np.sum(~known))
+        )
+
+
+def read_input_columns(table: RecordingTable, sizes: Mapping[str, int], units: Mapping[str, str]) -> list[InputColumns]:
+    """Read ``inputs``; ``sizes`` of all inputs by name."""
+    found = list[InputColumns]()
+    for name, columns in table.input_tables.items():
+        key = ("inputs", name)
+        if name not in sizes:
+            text = f"a recording cannot drive {quote(name)}, but forces and torques on bodies and commands of motors"
+            raise RecordingFault(key, f"{text}; {hint(name, sizes)}")
+        check_table(columns, units.get(name, ""), name, key)
+        found.append(InputColumns(name, columns, sizes[name]))
+    return found
+
+
+def read_start_columns(
+    table: RecordingTable, sample: Mapping[str, Any], units: Mapping[str, str], starts: Starts
+) -> list[StartColumns]:
+    """Read ``start``, with the units that the same columns have in ``measured``."""
+    known = {name: value.size for name, value in starts.initial.items()}
+    known |= dict.fromkeys(starts.of_joints, 1)
+    found = list[StartColumns]()
+    for quantity, given in leaves(table.start):
+        key = ("start", quantity)
+        if quantity not in known:
+            text = f"a recording cannot set {quote(quantity)} at the start; {hint(quantity, known)}"
+            raise RecordingFault(key, text)
+        try:
+            columns = ColumnsTable.model_validate(given if isinstance(given, Mapping) else {"columns": given})
+        except ValidationError as error:
+            text = str(error.errors(include_url=False)[0]["msg"])
+            raise RecordingFault(
+                key, f'{text}; write "position", ["x", "y", "z"] or {{ columns = "x", unit = "mm" }}'
+            ) from None
+        if not isinstance(given, Mapping):
+            columns = next((as_columns(each) for each in table.measured if each.columns == columns.columns), columns)
+        check_table(columns, units.get(quantity, ""), quantity, key)
+        found.append(StartColumns(quantity, columns, known[quantity]))
+    return found
+
+
+def as_columns(table: ColumnsTable) -> ColumnsTable:
+    """Its columns and units alone."""
+    return ColumnsTable(**{key: getattr(table, key) for key in ColumnsTable.model_fields})
+
+
+MOST = 100_000
+"""Recordings of one table."""
+
+
+def pieces(columns: RecordedColumns, starts: Array | None, split: str | None) -> list[tuple[int, int]]:
+    """The first row of each recording and that after its last one.
+
+    Args:
+        columns: of a file.
+        starts: (K + 1,) first rows, and the number of all rows; None: not given.
+        split: a column whose value differs from recording to recording; None: one recording.
+    """
+    if starts is not None:
+        edges = first_rows(columns, starts)
+    elif split is not None:
+        values = columns.numbers(split, "split")
+        missing = np.flatnonzero(np.isnan(values))
+        if missing.size:
+            raise RecordingFault("split", f"{columns.where(int(missing[0]), split)}: there is no number")
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0) + 1, [columns.count]])
+    else:
+        edges = np.array([0, columns.count])
+    if len(edges) - 1 > MOST:
+        key = "rows" if starts is not None else "split"
+        raise RecordingFault(key, f"{columns.label} makes {len(edges) - 1:,} recordings; at most {MOST:,} are allowed")
+    return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
+
+
+def first_rows(columns: RecordedColumns, starts: Array) -> NDArray[np.intp]:
+    """(K + 1,): the rows as integers, in order, and within the file."""
+    label, n = columns.label, columns.count
+    if starts.ndim != 1 or starts.size < 2 or not np.all(starts == np.round(starts)):
+        raise RecordingFault("rows", f"{label}: first rows must be two or more whole numbers, such as [0, 80, 210]")
+    edges = starts.astype(np.intp)
+    if edges[0] < 0 or edges[-1] > n or np.any(np.diff(edges) <= 0):
+        text = f"first rows must increase, from 0 or more to {n}, the number of rows; they are {shown(edges)}"
+        raise RecordingFault("rows", f"{label}: {text}")
+    return edges
+
+
+def shown(edges: NDArray[np.intp]) -> str:
+    """The first and the last of some whole numbers."""
+    few = edges.tolist()
+    return str(few) if len(few) <= 6 else f"[{', '.join(map(str, few[:3]))}, ..., {few[-1]}]"
+
+
+def held_back(wanted: bool | float | Sequence[int | str], names: Sequence[Sequence[str]]) -> list[bool]:
+    """Return the held-back recordings.
+
+    Args:
+        wanted: all or none, a share that is spread evenly over them, or numbers from 0 and names.
+        names: by what each recording is known: its own name, its file.
+    """
+    count = len(names)
+    if isinstance(wanted, bool):
+        return [wanted] * count
+    if isinstance(wanted, float):
+        held = [floor((k + 1) * wanted + 1e-9) > floor(k * wanted + 1e-9) for k in range(count)]
+        if 0 < wanted < 1 and len(set(held)) == 1:
+            text = f"{wanted:g} of {count} recordings is {'all' if held[0] else 'none'} of them; give a list"
+            raise RecordingFault("held_back", text)
+        return held
+    chosen = [False] * count
+    for each in wanted:
+        own = [k for k in range(count) if (each == k if isinstance(each, int) else each in names[k])]
+        if not own and isinstance(each, int):
+            raise RecordingFault("held_back", f"there is no recording {each}; they are counted from 0 to {count - 1}")
+        if not own:
+            valid = [name for known in names for name in known[:1]]
+            raise RecordingFault("held_back", f"there is no recording {quote(str(each))}; {hint(str(each), valid)}")
+        for k in own:
+            chosen[k] = True
+    return chosen
+
 
 SMALLEST = 1e-30
 """Of a noise: squares of what is divided by it are numbers."""

@@ -114,5 +114,5 @@ def steps_until(end: float, dt: float) -> int:
 
 
 def steps_apart(time: Array, dt: float) -> float:
-    """How many time steps lie between samples, in the median."""
+    """Return the median number of time steps between samples."""
     return float(np.median(np.diff(time))) / dt

@@ -36,7 +36,7 @@ class Measured:
 
     @property
     def missing(self) -> int:
-        """How many of the n samples lack a number."""
+        """Return how many of the ``n`` samples lack a number."""
         return int(np.isnan(self.values).any(axis=1).sum())
 
 
@@ -95,7 +95,7 @@ class Recording:
 
     @property
     def samples(self) -> int:
-        """How many numbers it has that are not missing."""
+        """Return how many numbers are not missing."""
         return sum(int(np.isfinite(each.values).sum()) for each in self.measured)
 
 

@@ -33,7 +33,7 @@ def fault(message: str) -> PydanticCustomError:
 
 
 def is_number(value: object, bound: bool = False) -> TypeGuard[int | float]:
-    """Whether the value is a finite number; ``bound`` lets infinities through."""
+    """Tell whether the value is a finite number; ``bound`` allows infinities."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     try:
@@ -58,7 +58,7 @@ def identifier(value: object) -> str:
 
 
 def prefix(value: object) -> str:
-    """What can begin a name, or nothing."""
+    """Return the longest start that is a valid name; empty if there is none."""
     return "" if value == "" else identifier(value)
 
 

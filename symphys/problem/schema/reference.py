@@ -133,7 +133,7 @@ def row(name: str, key: Schema, titles: Mapping[str, str], fallback: str) -> str
 
 
 def text_of_table(key: Schema, titles: Mapping[str, str]) -> str:
-    """What stands for the meaning of a key without a description: its table says it."""
+    """Return the meaning of a key without a description, which its table gives."""
     name = definition_of(key)
     return f"see `{titles[name]}`" if name is not None and name in titles else ""
 
@@ -167,7 +167,7 @@ def with_code(text: str) -> str:
 
 
 def text_of(definition: Schema) -> str:
-    """What a table's docstring says, paragraph after paragraph."""
+    """Return the paragraphs of a table's docstring."""
     paragraphs = str(definition.get("description", "")).split("\n\n")
     return "\n\n".join(with_code(" ".join(part.split())) for part in paragraphs)
 

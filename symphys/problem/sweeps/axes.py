@@ -113,7 +113,7 @@ def shortest(value: float) -> float:
 
 
 def sign(value: object) -> str:
-    """The same for equal values alone: for 2 and 2.0, but not for 1 and true."""
+    """Return a key that equal values share: 2 and 2.0 do, 1 and true do not."""
     return repr(float(value)) if isinstance(value, int | float) and not isinstance(value, bool) else repr(value)
 
 

@@ -28,7 +28,7 @@ class Sweep:
         return self.samples.count or product(self.grid())
 
     def words(self) -> str:
-        """What it is, on a line: ``30 points, a grid of ball.mass, ground.friction``."""
+        """Describe the sweep in a line: ``30 points, a grid of ball.mass, ground.friction``."""
         keys = ", ".join(axis.key for axis in self.axes)
         if self.samples.count:
             return f"{self.samples.count} points, {self.samples.kind} samples of {keys}"
@@ -71,7 +71,7 @@ class Sweep:
             yield point
 
     def too_many(self) -> str:
-        """What to say where two samples are the same."""
+        """Return the message for two equal samples."""
         text = f"{self.samples.count} samples are more than these axes can tell apart"
         if any(isinstance(axis, Interval) for axis in self.axes):
             return f"{text}; take fewer"

@@ -8,13 +8,29 @@ import numpy as np
 
 from symphys.model.shapes import Shape
 from symphys.model.shapes.inertia import centring, off_centre
-from symphys.problem.checks.inertia import inertia_fault
 from symphys.problem.checks.magnitude import check_magnitudes
 from symphys.problem.parametric.parts import COMBINE, ParametricBody
 from symphys.problem.reading.faults import Faults
 from symphys.problem.schema.physics import BodyTable, MemberTable, SurfaceTable
 from symphys.problem.tables.shapes import read_orientation, read_shape
 from symphys.types import Array
+
+ROUNDING = 1e-9
+"""Relative slack for symmetry and the triangle inequality, which flat and thin bodies meet with equality."""
+
+
+def inertia_fault(value: float | Sequence[float] | Sequence[Sequence[float]]) -> str:
+    """Why no rigid body has this inertia; empty if one has."""
+    given = np.asarray(value, float)
+    if given.ndim == 2 and not np.allclose(given, given.T, rtol=ROUNDING, atol=ROUNDING * np.abs(given).max()):
+        return "the matrix must be symmetric"
+    moments = np.sort(np.linalg.eigvalsh(given) if given.ndim == 2 else np.broadcast_to(given, 3))
+    listed = ", ".join(f"{moment:.6g}" for moment in moments)
+    if moments[0] <= 0:
+        return f"the principal moments must be positive; they are {listed}"
+    if moments[0] + moments[1] < moments[2] * (1 - ROUNDING):
+        return f"no principal moment may exceed the sum of the other two; they are {listed}"
+    return ""
 
 
 def read_body(index: int, table: BodyTable, faults: Faults) -> ParametricBody:

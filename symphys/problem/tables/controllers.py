@@ -131,7 +131,7 @@ class ControllerReader:
         return tuple(found)
 
     def senses(self) -> int:
-        """How many numbers are sensed."""
+        """Return how many numbers the sensors read."""
         total = 0
         for name in self.table.senses:
             if name not in self.widths:
@@ -150,7 +150,7 @@ class ControllerReader:
         return None
 
     def law(self, kind: str, senses: int, outputs: int) -> ControlLaw | None:
-        """How outputs follow; None where it cannot be."""
+        """Read the law of a controller; None after a fault."""
         table = self.table
         if kind == "function":
             return self.function(senses, outputs)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -13,13 +13,59 @@ import numpy as np
 
 from symphys.expression import Formula, FormulaError, parse
 from symphys.expression.units import unit_of
-from symphys.problem.model import Constraint, Cost, Output, Phase, Simulation, Target
+from symphys.problem.model import ALIVE, Constraint, Cost, Output, Phase, Simulation, Target, Termination
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document
 from symphys.problem.schema.checks import OF_PHASE
 from symphys.problem.schema.objectives import ConstraintTable, CostTable, OutputTable, TargetTable
 from symphys.problem.tables.simulation import check_moment, find_phase
 from symphys.types import Array
+
+
+def read_termination(
+    document: Document, sample: Mapping[str, Any], inputs: Collection[str], faults: Faults
+) -> Termination | None:
+    """The termination; None without one, or with a faulty formula.
+
+    Args:
+        document: the file, with one of the two tables or none.
+        sample: every name that a sensor may read, with its value at the start of the guess.
+        inputs: names of forces, torques and commands, which are not of the state.
+        faults: gets what is wrong.
+    """
+    key, table = document.ending
+    if table is None:
+        return None
+    place = (key, "margin")
+    try:
+        formula = parse(table.margin)
+        value = ca.DM(formula.evaluate({k: v for k, v in sample.items() if k != "time" and k not in inputs}))
+    except FormulaError as error:
+        faults.add(place, str(error))
+        return None
+    if value.shape[0] != 1:
+        faults.add(place, f"must be a number, but is a vector of {value.shape[0]}; min(a, b) is the smaller one")
+    elif not float(value) >= 0:
+        faults.add(place, f"is {float(value):.4g} at the start of the guess, so it would be over at once; 0 or more")
+    return Termination(formula)
+
+
+def with_termination_cost(document: Document, costs: tuple[Cost, ...], faults: Faults) -> tuple[Cost, ...]:
+    """The costs, running ones until the termination, and that of the time which is left; it is called as the table."""
+    key, table = document.ending
+    if table is None:
+        return costs
+    for index, cost in enumerate(costs):
+        if cost.name == key:
+            faults.add(("cost", index, "name"), f'"{key}" is the name of the cost that [{key}] adds; choose another')
+    left = Cost(key, parse(f"1 - {ALIVE}"), "always", table.cost, squares=True)
+    return (*map(until_termination, costs), *([left] if table.cost > 0 else []))
+
+
+def until_termination(cost: Cost) -> Cost:
+    """A running cost that stops at the termination."""
+    return replace(cost, formula=parse(f"({cost.formula.text}) * {ALIVE}")) if cost.at == "always" else cost
+
 
 NO_PHASES: Mapping[str, Phase] = MappingProxyType({})
 
@@ -82,7 +128,7 @@ class ObjectiveReader:
         self.phases: dict[str, Phase] = {}
 
     def moment(self, table: CostTable | ConstraintTable, place: Place) -> tuple[str | float, Phase | None]:
-        """When a formula is evaluated, and the phase in which it always is."""
+        """Return when a formula is evaluated, and the phase within which it always is."""
         if table.during is None:
             return self.instant(table.at, place), None
         if "at" in table.model_fields_set:

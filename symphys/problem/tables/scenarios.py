@@ -64,7 +64,7 @@ class ScenarioReader:
         taken: Taken,
         faults: Faults,
     ) -> None:
-        """Nothing is read yet."""
+        """Prepare to read the tables."""
         self.known, self.parametric, self.simulation, self.taken, self.faults = (
             known,
             parametric,
@@ -128,7 +128,7 @@ class ScenarioReader:
     def check_physical(
         self, place: Place, slots: Sequence[VariableSlot], shift: Array, lower: Array, upper: Array
     ) -> None:
-        """What is added must not lead beyond what is physical."""
+        """Check that shifts do not lead beyond what is physical."""
         for slot, low, high in zip(slots, lower, upper, strict=True):
             nominal = self.known[slot.name].nominal[list(slot.components)]
             if np.any(shift > 0) and (np.any(nominal - shift < low) or np.any(nominal + shift > high)):

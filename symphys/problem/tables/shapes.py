@@ -79,7 +79,7 @@ def solid(
 
 
 def wanted(given: Sequence[str]) -> str:
-    """What to say where not exactly one shape is given."""
+    """Return the message for a table without exactly one shape."""
     return f"has {' and '.join(given)}; give only" if given else "give"
 
 

@@ -80,7 +80,7 @@ def find_phase(name: str, phases: Mapping[str, Phase], place: Place, faults: Fau
 def read_sets(
     tables: Sequence[PhaseTable], parametric: ParametricWorld, faults: Faults
 ) -> dict[str, dict[str, tuple[float, ...]]]:
-    """By the name of a phase, the numbers that hold in it alone; notes what cannot change from step to step."""
+    """Read the numbers that hold in each phase alone; note those that cannot change from step to step."""
     nominal, able = parametric.parameters(), changing(parametric)
     found: dict[str, dict[str, tuple[float, ...]]] = {table.name: {} for table in tables}
     for index, table in enumerate(tables):
@@ -172,7 +172,7 @@ def read_phases(
 
 
 def read_time(document: Document, faults: Faults) -> tuple[Simulation, RecedingHorizon | None]:
-    """How time passes, in the problem and in the horizon of its controller."""
+    """Read the time step of the problem and of its controller's horizon."""
     simulation = read_simulation(document.simulation, faults)
     return simulation, read_mpc(document.mpc, simulation, faults)
 

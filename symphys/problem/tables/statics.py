@@ -74,7 +74,7 @@ class FormulaHeight:
 
 
 def flat(x: Any, y: Any) -> Any:
-    """What stands in for a terrain that cannot be read."""
+    """Return a placeholder for a terrain that cannot be read."""
     return 0 * x * y
 
 

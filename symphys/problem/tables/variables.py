@@ -67,7 +67,7 @@ class VariableReader:
         return variable
 
     def slots(self) -> tuple[VariableSlot, ...]:
-        """What is set; empty after a fault."""
+        """Read the slots of a variable; empty after a fault."""
         found = []
         for text in self.table.sets:
             try:
@@ -177,7 +177,7 @@ class VariableReader:
                 self.add("guess", "a quaternion must not be zero; [1, 0, 0, 0] is no rotation")
 
     def where(self, mask: Bools) -> str:
-        """Which component, if there are several."""
+        """Return the suffix that names the component, if there are several."""
         k = int(np.argmax(mask))
         component = f" in component {k % self.count}" if self.count > 1 else ""
         return component + (f" at knot {k // self.count}" if self.table.knots > 1 else "")
