@@ -23,7 +23,7 @@ def inline(world: World, arguments: Sequence[Expr], reduces: bool = True) -> Inl
 
 
 def context_of(world: World, scheme: Scheme | None, inputs: Sequence[str], arguments: Sequence[Expr]) -> StepContext:
-    """Of a step with these arguments."""
+    """Make the symbols of a step with these arguments."""
     return make_context(world, scheme, tuple(inputs), arguments[1], arguments[3])
 
 

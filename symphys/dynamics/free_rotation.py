@@ -83,7 +83,7 @@ def splitting(inertia: Expr) -> Splitting:
 
 
 def _principal(moments: Sequence[Expr], axes: Expr) -> Splitting:
-    """Of principal moments about the columns of ``axes``."""
+    """Return the inertia of principal moments about the columns of ``axes``."""
     inverse = [1 / moment for moment in moments]
     near = [ca.fabs(inverse[k - 2] - inverse[k - 1]) for k in range(3)]
     odd_0 = ca.logic_and(near[0] <= near[1], near[0] <= near[2])
@@ -100,7 +100,7 @@ def _principal(moments: Sequence[Expr], axes: Expr) -> Splitting:
 
 
 def _factors(tensor: Expr) -> Splitting:
-    """Of a tensor of symbols, whose axes are not known: J = L D L', a rotation for each column of L."""
+    """Factor a tensor of symbols without known axes: J = L D L', one rotation for each column of L."""
     inverse, columns = ca.inv_minor(tensor), list[tuple[Expr, Expr]]()
     for k in range(3):
         column = inverse[:, k] / inverse[k, k]

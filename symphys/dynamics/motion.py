@@ -85,7 +85,7 @@ class PredictedMotion(PredictedPath):
 
     @property
     def counted_mass(self) -> Expr:
-        """As its tree counts it [kg]."""
+        """Return the mass as its tree counts it [kg]."""
         return ca.SX(0) if self.massless else self.mass
 
     def predicted_path(self) -> PredictedPath:
@@ -101,7 +101,7 @@ class PredictedMotion(PredictedPath):
 
     @traced
     def at_start(self) -> PredictedMotion:
-        """The same with the inertia of t = 0 at any time: for impulses there."""
+        """Return a copy with the inertia of t = 0 at any time, for impulses there."""
         if self.inverse_rate is None:
             return self
         inverse = inverse_inertia(self.inertia, self.rotation)
@@ -186,7 +186,7 @@ def motion_from(
     dt: Expr,
     jointed: bool = True,
 ) -> PredictedMotion:
-    """The same from what ``state`` stands for, ``turning``: its rotation (3, 3) and angular velocity."""
+    """Predict the motion with a rotation (3, 3) and an angular velocity, ``turning``, in place of ``state``'s."""
     turned, w = turning
     acceleration = gravity + state.force / mass
     mid_momentum = state.angular_momentum + dt / 2 * state.torque

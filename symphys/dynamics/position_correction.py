@@ -153,7 +153,7 @@ def close_gaps(
 def _start(
     context: StepContext, trees: KinematicTrees, fixed: PositionPass, along: tuple[TreeDisplacement, ...]
 ) -> Pushed:
-    """What the pass starts from: where contacts share bodies, with all of their gaps closed together."""
+    """Return the start of the pass: where contacts share bodies, all of their gaps are closed together."""
     contacts = [each for each, _, _ in fixed.rigid]
     pushes = [
         replace(each, constraint=Push(each.constraint, contact, lasts, fixed.share, _jacobians(fixed, each)))

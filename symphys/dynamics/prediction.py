@@ -34,7 +34,7 @@ def along_paths(
     motions: Sequence[PredictedMotion],
     duration: Expr,
 ) -> list[T]:
-    """What ``look`` finds of two surfaces on their bodies' paths: one for each pair."""
+    """Apply ``look`` to the two surfaces of each pair, on their bodies' paths."""
     found: list[T] = []
     for (first, second), _ in groupby(context.world.pairs, key=lambda pair: (pair.first, pair.second)):
         surfaces = context.world.surface(first), context.world.surface(second)

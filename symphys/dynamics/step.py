@@ -71,7 +71,7 @@ def _normalised(orientation: Expr) -> Expr:
 
 
 def splits_of(world: World, scheme: Scheme) -> int:
-    """How often a step is split; never where all contacts are central and no body has two pairs."""
+    """Return how often a step is split: 0 if all contacts are central and no body has two pairs."""
     sides = Counter(i for pair in world.pairs for i in {pair.first.body, pair.second.body} if i is not None)
     if not scheme.time_of_impact or not (eccentric_bodies(world) & set(sides) or max(sides.values(), default=0) > 1):
         return 0

@@ -216,7 +216,7 @@ def _resumed(constraint: ContactConstraint, kick: Expr, force: Expr, torque: Exp
 
 
 def _split(impulse: Expr, n: Expr) -> tuple[Expr, Expr]:
-    """What points along n, and the rest."""
+    """Split an impulse into its part along n and the rest."""
     along = ca.dot(n, impulse)
     return along, impulse - n * along
 
@@ -257,7 +257,7 @@ def _persistent(
 
 
 def _lagging(context: StepContext, x: State, bodies: Sequence[int]) -> tuple[tuple[Expr, Expr], ...]:
-    """See ``Conditions``; with joints motions are predicted under what lasts."""
+    """Return the persistent impulses of ``Conditions``, under which motions with joints are predicted."""
     names = () if context.world.joints else tuple(context.world.bodies[i].name for i in bodies)
     return tuple((x[f"{name}.reaction_force"], x[f"{name}.reaction_torque"]) for name in names)
 
@@ -332,7 +332,7 @@ def _free_pose(
 
 @traced
 def _end_momentum(motion: PredictedMotion, momentum: Momentum, reactions: tuple[Expr, Expr]) -> Momentum:
-    """At the end of the substep."""
+    """Return the pose at the end of the substep."""
     half, (force, torque) = motion.dt / 2, reactions
     return Momentum(
         momentum.velocity + half * (motion.acceleration + force / motion.mass),

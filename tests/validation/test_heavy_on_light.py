@@ -11,7 +11,7 @@ import pytest
 from tools.repeats import few, thorough
 
 from symphys.dynamics.functions import step_function
-from symphys.dynamics.line_search import clusters
+from symphys.dynamics.pgs import clusters
 from symphys.dynamics.prediction import bodies_of
 from symphys.dynamics.unknowns import PlacedConstraint
 from symphys.model.shapes import Box, Plane

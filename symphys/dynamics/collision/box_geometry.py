@@ -48,7 +48,7 @@ class MovingBox:
     gravity: Expr | None
 
     def reach(self, direction: Expr, t: Expr) -> Expr:
-        """How far it extends from its centre along a vector, times the vector's length."""
+        """Return the support along a vector: the extent from the centre times the vector's length."""
         total: Expr = sum(
             h * ca.fabs(ca.dot(axis.at(t), direction)) for h, axis in zip(self.halves, self.axes, strict=True)
         )
@@ -166,7 +166,7 @@ def nearing(
 
 
 def tolerances(a: MovingBox, b: MovingBox, directions: list[Parabola]) -> list[Expr]:
-    """For each direction the overlap [m] up to which boxes do not count as overlapping along it."""
+    """Return for each direction the overlap [m] that is tolerated along it."""
     gravity = a.gravity if a.gravity is not None else b.gravity
     if gravity is None:
         return [ca.SX(FLUSH)] * len(directions)
@@ -206,7 +206,7 @@ def places(
     apart: Expr,
     radius: Expr,
 ) -> list[tuple[Expr, Expr]]:
-    """For each direction the distance between the centres at time t and the distance below which boxes overlap [m].
+    """Return for each direction the distance of the centres at time t, and that below which boxes overlap [m].
 
     ``apart``: (3,) from the second centre to the first then [m].
     """

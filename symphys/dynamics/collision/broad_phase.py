@@ -33,7 +33,7 @@ FEWEST = 12
 
 
 def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
-    """For each pair 1 if it may act within the step, 0 if it is far; empty where nothing is looked at.
+    """Return for each pair 1 if it may act within the step, else 0; empty without a broad phase.
 
     Smoothed contacts act from afar, so with smoothing all are near.
     """
@@ -69,7 +69,7 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
 
 
 def _sights(context: StepContext, x: State) -> tuple[list[Sight], Expr]:
-    """Of all bodies, and the greatest speed of a point of any [m/s]."""
+    """Return the bounds of all bodies, and the greatest speed of a point of any [m/s]."""
     world = context.world
     bodies = [_sight(x, body, context, can_measure(body)) for body in world.bodies]
     fastest: Expr = ca.SX(0)
@@ -79,7 +79,7 @@ def _sights(context: StepContext, x: State) -> tuple[list[Sight], Expr]:
 
 
 def _sight(x: State, body: Body, context: StepContext, turned: bool) -> Sight:
-    """Of a body; a frame without mass counts as one of 1 kg, as in ``PredictedMotion``."""
+    """Bound the motion of a body; a frame without mass counts as 1 kg, as in ``PredictedMotion``."""
     position, velocity = x[f"{body.name}.position"], x[f"{body.name}.velocity"]
     forces, torques = (
         (x[f"{body.name}.reaction_{kind}"], ca.SX.zeros(3) if push is None else push)
@@ -111,7 +111,7 @@ def _turned(
 
 
 def _radius(world: World, side: Side, held: set[int]) -> float | None:
-    """Of the sphere around a surface, about the centre of mass of its body [m]; None: it has none, or may change."""
+    """Return the radius of a surface about its body's centre of mass [m]; None if unbounded or variable."""
     surface = world.surface(side)
     if side.body is None:
         return 0.0 if isinstance(surface, Plane) else None
@@ -122,7 +122,7 @@ def _radius(world: World, side: Side, held: set[int]) -> float | None:
 
 
 def _arm(body: Body) -> float:
-    """How far from the centre of mass of a body the farthest point of its shapes is [m]."""
+    """Return the distance from a body's centre of mass to the farthest point of its shapes [m]."""
     sizes = [(shape.centre, shape.sizes) for shape in body.shapes]
     return max((hypot(*shape.centre) + shape.extent for shape in body.shapes), default=0.0) if is_number(sizes) else 0.0
 

@@ -23,7 +23,7 @@ class Frame:
     arms: tuple[Expr, Expr]
 
     def flipped(self) -> Frame:
-        """The same with the sides exchanged."""
+        """Return the contact with its sides exchanged."""
         return Frame(-self.normal, (self.arms[1], self.arms[0]))
 
 
@@ -84,11 +84,11 @@ class FlippedGeometry:
     geometry: ContactGeometry
 
     def frame(self, t: Expr) -> Frame:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.frame``."""
         return self.geometry.frame(t).flipped()
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.gap_after``."""
         return self.geometry.gap_after(second, first)
 
 

@@ -34,11 +34,11 @@ class OnPlane:
     centre: Expr
 
     def frame(self, t: Expr) -> Frame:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.frame``."""
         return Frame(self.normal, (self.arm.at(t) - self.radius * self.normal, ca.SX.zeros(3)))
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.gap_after``."""
         return ca.dot(self.normal, first.moved(self.centre, self.arm.start)) - self.offset - self.radius
 
 

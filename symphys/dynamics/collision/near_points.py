@@ -73,13 +73,13 @@ class Travel:
     fastest: Expr
 
     def of_centres(self, a: Sight, b: Sight | None) -> Expr:
-        """Of the centres of mass of two bodies, or of one from a plane [m]."""
+        """Return the distance of two centres of mass, or of one from a plane [m]."""
         if b is None:
             return self.dt * (a.speed + self.fastest)
         return self.dt * (length(a.velocity - b.velocity) + a.gained + b.gained + self.fastest)
 
     def of_points(self, a: Sight, b: Sight | None, arms: tuple[float, float]) -> Expr:
-        """Of points that are up to ``arms`` from these [m]."""
+        """Bound the distance of points that are up to ``arms`` from the centres [m]."""
         turning = a.swing(arms[0]) + (0 if b is None else b.swing(arms[1]))
         return self.of_centres(a, b) + self.dt * turning
 
@@ -109,7 +109,7 @@ def near_points(
     reach: Travel,
     smoothing: Expr,
 ) -> tuple[tuple[Expr], ...]:
-    """For each point of a pair 1 if it may act within the step; each lies by itself.
+    """Return for each point of a pair 1 if it may act within the step, each as a vector of its own.
 
     Args:
         shapes: which are ``measured``.
@@ -133,7 +133,7 @@ def _measured(
 
 
 def _arm(shape: Surface) -> float:
-    """How far from its body's centre of mass turning moves a shape's surface [m]."""
+    """Return the distance from the centre of mass within which rotation moves a shape's surface [m]."""
     if not isinstance(shape, SolidShape):
         return 0.0
     return hypot(*shape.centre) + shape.extent - (float(shape.radius) if isinstance(shape, Sphere | Capsule) else 0.0)
@@ -168,7 +168,7 @@ def _capsules(first: Capsule, second: Capsule, a: Sight, b: Sight) -> list[Expr]
 
 
 def _to_segment(point: Expr, capsule: Capsule, b: Sight) -> Expr:
-    """How far a point is from the axis of a capsule [m]."""
+    """Return the distance of a point from the axis of a capsule [m]."""
     away, axis = point - b.point(capsule.centre), b.axes(capsule)[2]
     along = ca.fmin(ca.fmax(ca.dot(away, axis), -capsule.half_length), capsule.half_length)
     return length(away - along * axis)
@@ -183,7 +183,7 @@ def _ball_and_box(ball: Sphere, box: Box, a: Sight, b: Sight) -> list[Expr]:
 
 
 def _to_box(point: Expr, box: Box, b: Sight) -> Expr:
-    """How far a point is from a box [m]; below 0 inside."""
+    """Return the signed distance of a point from a box [m], negative inside."""
     away = point - b.point(box.centre)
     return BoxField(box.half_sizes).distance(ca.vertcat(*(ca.dot(axis, away) for axis in b.axes(box))))
 
@@ -197,7 +197,7 @@ def _capsule_and_box(capsule: Capsule, box: Box, a: Sight, b: Sight) -> list[Exp
 
 
 def _apart(a: Sight, shape: SolidShape, halves: Sequence[Expr], b: Sight, box: Box) -> Expr:
-    """At least how far the sum of segments ``halves`` about a shape's centre is from a box, along its faces [m]."""
+    """Bound from below the distance of the sum of segments ``halves`` from a box, along its faces [m]."""
     away = a.point(shape.centre) - b.point(box.centre)
     found = [
         ca.fabs(ca.dot(away, axis)) - half - sum(ca.fabs(ca.dot(each, axis)) for each in halves)

@@ -122,7 +122,7 @@ class StillPath(PredictedPath):
     """The path of a body that is looked at in one instant: its velocities are zero."""
 
     def arm(self, offset: Sequence[Any]) -> Parabola:
-        """See ``PredictedPath``; the same without products with zero."""
+        """Implement ``PredictedPath.arm`` without products with zero."""
         if all(is_zero(c) for c in offset):
             return STAYS
         return Parabola(ca.mtimes(self.rotation, ca.vertcat(*offset)), STAYS.velocity, STAYS.acceleration)

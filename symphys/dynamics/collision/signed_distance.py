@@ -22,7 +22,7 @@ class Field(Protocol):
     """Distances from a shape at the origin. Implementations are frozen dataclasses."""
 
     def distance(self, point: Expr) -> Expr:
-        """From a point (3,) to the surface [m]; negative inside."""
+        """Return the signed distance of a point (3,) from the surface [m], negative inside."""
         ...
 
     def normal(self, point: Expr) -> Expr:
@@ -55,7 +55,7 @@ class InField:
         return self.field.distance(self._inside(self.path.at(t), t)) - self.radius
 
     def frame(self, t: Expr) -> Frame:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.frame``."""
         apart = self.path.at(t)
         point = self._inside(apart, t)
         normal = self._outside(self.field.normal(point), t)
@@ -63,7 +63,7 @@ class InField:
         return Frame(normal, (self.arms[0].at(t) - self.radius * normal, self.arms[1].at(t) + foot))
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.gap_after``."""
         ball = first.moved(self.starts[0], self.arms[0].start)
         centre = second.moved(self.starts[1], self.arms[1].start)
         apart = ball - centre - ca.cross(second.angular, ball - centre)

@@ -47,20 +47,20 @@ class Paraboloid:
     bend: Expr
 
     def surface(self, xy: Expr) -> tuple[Expr, Expr, Expr]:
-        """See ``Surface``."""
+        """Implement ``Surface.surface``."""
         d = xy - self.place
         turn = ca.mtimes(self.bend, d)
         return self.height + ca.dot(self.slope, d) + ca.dot(d, turn) / 2, self.slope + turn, self.bend
 
     def distance(self, point: Expr) -> Expr:
-        """See ``Field``."""
+        """Implement ``Field.distance``."""
         xy = nearest(self.surface, point)
         height, slope, _ = self.surface(xy)
         line = point - ca.vertcat(xy, height)
         return ca.dot(line, upwards(slope))
 
     def normal(self, point: Expr) -> Expr:
-        """See ``Field``."""
+        """Implement ``Field.normal``."""
         return upwards(self.surface(nearest(self.surface, point))[1])
 
 
@@ -98,7 +98,7 @@ def nearest(surface: Surface, point: Expr) -> Expr:
 
 
 def determinant(m: Expr) -> Expr:
-    """Of a (2, 2) matrix."""
+    """Return the inverse of a (2, 2) matrix."""
     return m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
 
 

@@ -40,13 +40,13 @@ class Witness:
         return ca.dot(self._direction(t), (self.points[0] - self.points[1]).at(t)) - self.radii[0] - self.radii[1]
 
     def frame(self, t: Expr) -> Frame:
-        """See ``ContactGeometry``. Both arms go to one point, midway between the surfaces, which adds no spin."""
+        """Implement ``ContactGeometry.frame``; both arms end midway between the surfaces, which adds no spin."""
         n, (a, b), (r_a, r_b) = self._direction(t), self.points, self.radii
         half = ((a - b).at(t) - (r_a + r_b) * n) / 2
         return Frame(n, (self.arms[0].at(t) - r_a * n - half, self.arms[1].at(t) + r_b * n + half))
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.gap_after``."""
         (a, b), (arm_a, arm_b) = self.points, self.arms
         apart = first.moved(a.start, arm_a.start) - second.moved(b.start, arm_b.start)
         gap = ca.dot(self._direction(self.end), apart) - self.radii[0] - self.radii[1]

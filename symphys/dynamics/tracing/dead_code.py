@@ -41,7 +41,7 @@ class _Trimming:
             used[slot.number] = (1 << slot.size) - 1
 
     def calls(self) -> tuple[TracedCall, ...]:
-        """Those of which something is read."""
+        """Return the calls of which some result is read."""
         found, used = list[TracedCall](), self._used
         for call, needed in zip(self._calls, reversed(self._needed_by_call), strict=True):
             given = tuple([used[slot.number] for slot in call.outputs])

@@ -23,7 +23,7 @@ class Tracing(Protocol):
     """What traces the calls of a step."""
 
     def guard(self, word: Any) -> None:
-        """Where ``word`` is 0, what depends on it may be left out."""
+        """Allow calls that depend on ``word`` to be left out where it is 0."""
         ...
 
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
@@ -31,11 +31,11 @@ class Tracing(Protocol):
         ...
 
     def section(self, word: Any) -> None:
-        """The same for all calls together that depend on ``word``."""
+        """Allow all calls that depend on ``word`` to be jumped over together."""
         ...
 
     def gathered(self, tree: T) -> T:
-        """The same, its numbers side by side."""
+        """Store a tree contiguously."""
         ...
 
     def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
@@ -68,7 +68,7 @@ def traced(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def guard(word: T) -> T:
-    """The same word, 0 or 1, marked: a compiled kernel leaves out the calls that are without effect where it is 0.
+    """Mark a predicate, 0 or 1: a kernel skips calls that have no effect where it is 0.
 
     All that it depends on comes before what is left out.
     """
@@ -79,7 +79,7 @@ def guard(word: T) -> T:
 
 
 def section(word: T) -> T:
-    """The same word, 0 or 1, marked: a compiled kernel jumps over what is without effect where it is 0."""
+    """Mark a predicate, 0 or 1: a kernel jumps over a section that has no effect where it is 0."""
     tracer = _TRACER.get()
     if tracer is not None:
         tracer.section(word)
@@ -87,7 +87,7 @@ def section(word: T) -> T:
 
 
 def gathered(tree: T) -> T:
-    """The same tree; between calls its numbers lie side by side, so that they can stand for results of a call."""
+    """Return the tree, stored contiguously between calls so that it can substitute results of a call."""
     tracer = _TRACER.get()
     return tree if tracer is None else tracer.gathered(tree)
 

@@ -55,7 +55,7 @@ class _Same:
     start: int = 0
 
     def of(self, inputs: Sequence[TracedVector]) -> Part:
-        """The same of the vectors of a call."""
+        """Return what the results of a call equal, as parts of its vectors."""
         return Part(None if self.argument is None else inputs[self.argument], self.start)
 
 
@@ -114,7 +114,7 @@ class _Search:
                 self._readers.setdefault(vector.number, []).append(k)
 
     def implied(self, guards: Sequence[TracedVector]) -> dict[int, list[int]]:
-        """For each guard, by the numbers of their vectors, the others that are 0 where it is."""
+        """Return for each guard the other guards that are 0 wherever it is."""
         numbers = {word.number for word in guards}
         found: dict[int, list[int]] = {}
         for word in guards:
@@ -210,7 +210,7 @@ class _Search:
         weaker: Collection[int],
         standing: Collection[int],
     ) -> tuple[Part | None, ...] | None:
-        """What stands for the results of a call; None if one of them is needed and has to be computed.
+        """Return the substitutes of the results of a call; None if a needed result must be computed.
 
         ``left`` and ``weaker`` are the calls that are left out, ``standing`` what stands for their results.
         """
@@ -245,7 +245,7 @@ class _Search:
         return all(self._disregarded[key][i] for i, vector in enumerate(call.inputs) if vector.number == number)
 
     def _simplified(self, word: TracedVector, start: int, until: Collection[int] = ()) -> dict[int, list[Simplified]]:
-        """For each call that reads something known what its results are, as far as they are known; in order.
+        """Return for each call with known arguments what is known of its results, in order.
 
         Where there are numbers in ``until``, only calls that give vectors with such numbers are followed.
         """
@@ -273,7 +273,7 @@ class _Search:
         return any(vector.number in numbers for vector in self._calls[k].outputs)
 
     def _results(self, call: TracedCall, zeros: Pattern) -> list[Simplified]:
-        """What is known of each result; nothing of what is needed anyway, nor where few of many arguments are known."""
+        """Return what is known of each result; nothing if it is needed anyway, or few of many arguments are known."""
         function = call.function
         if call.outputs[0].name or len(zeros) > max(MANY, 2 * sum(map(bool, zeros))):
             return [(None, 0)] * len(call.outputs)
@@ -289,7 +289,7 @@ class _Search:
 
 
 def _with_zeros(function: ca.Function, zeros: Pattern) -> tuple[dict[int, tuple[int, int]], list[Expr]]:
-    """Where symbols lie, by their hashes, (argument, entry), and the results of these symbols and zeros."""
+    """Map hashes of symbols to (argument, entry), and return the results of these symbols and zeros."""
     homes, arguments = dict[int, tuple[int, int]](), list[Expr]()
     for i, known in enumerate(zeros):
         entries: list[Expr] = ca.SX.sym("a", function.numel_in(i)).nonzeros()
@@ -311,7 +311,7 @@ class _Disregarded:
         self._found: dict[int, bool] = dict.fromkeys((homes[e.element_hash()][0] for e in read), False)
 
     def __getitem__(self, argument: int) -> bool:
-        """Of an argument; symbols tell of most that it counts, the others are tried with numbers."""
+        """Tell whether an argument matters; symbols decide most cases, numbers the others."""
         if argument not in self._found:
             random, given = np.random.default_rng(0), list[NDArray[np.float64]]()
             for i, known in enumerate(self._zeros):
@@ -333,7 +333,7 @@ def _entry(expression: Expr, homes: dict[int, tuple[int, int]]) -> Any:
 
 
 def _part(entries: Sequence[Any]) -> _Same | None:
-    """What a result equals: zeros, or neighbouring entries of one argument; None if it has to be computed."""
+    """Return what a result equals: zeros, or adjacent entries of one argument; None if it must be computed."""
     if all(entry == 0 for entry in entries):
         return _Same(None)
     if any(entry is None or entry == 0 for entry in entries):

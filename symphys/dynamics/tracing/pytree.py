@@ -47,7 +47,7 @@ class TracedMatrix:
 
     @property
     def codes(self) -> tuple[Code, ...]:
-        """Of its entries."""
+        """Return the keys of its entries."""
         slots = self._slots
         if slots is not None:
             self._codes = tuple([c if isinstance(c, float) else (slots[c[0]], c[1]) for c in self._codes])
@@ -114,7 +114,7 @@ def dismantle(tree: Any, leaves: list[Expr]) -> Hashable:
 
 @cache
 def field_names(kind: type) -> tuple[str, ...] | None:
-    """Of a dataclass; None for other types."""
+    """Return the fields of a dataclass; None for other types."""
     return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else None
 
 
@@ -141,7 +141,7 @@ def leaves_of(shape: Any, found: list[Leaf]) -> None:
 
 
 def slots_of(shape: Any) -> list[int]:
-    """For each matrix of a tree, from its shape, in order: in which slot it lies.
+    """Return for each matrix of a tree, in order, the slot that its entries lie in.
 
     Members of a tuple that are trees themselves have slots of their own, all else lies together.
     """

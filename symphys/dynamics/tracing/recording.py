@@ -48,7 +48,7 @@ class Recorder(Tracer):
     """Records the calls of a step."""
 
     def __init__(self) -> None:
-        """Nothing yet."""
+        """Start without calls."""
         super().__init__()
         self.calls: list[TracedCall] = []
         self.guards: list[TracedVector] = []
@@ -63,19 +63,19 @@ class Recorder(Tracer):
         self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
 
     def guard(self, word: Any) -> None:
-        """See ``decorator.guard``; what is known already guards nothing."""
+        """Implement ``decorator.guard``; a constant guards nothing."""
         (code,) = word.codes if isinstance(word, TracedMatrix) else self._codes(word)
         if not isinstance(code, float):
             self.guards.append(self._slots[code[0]])
 
     def section(self, word: Any) -> None:
-        """See ``decorator.section``."""
+        """Implement ``decorator.section``."""
         (code,) = word.codes if isinstance(word, TracedMatrix) else self._codes(word)
         if not isinstance(code, float):
             self.sections.append((self._slots[code[0]], code[1]))
 
     def gathered(self, tree: T) -> T:
-        """The same tree; each part of it that has a slot lies in a slot of its own."""
+        """Return the tree with each of its parts in a slot of its own."""
         leaves: list[Expr] = []
         shape = dismantle(tree, leaves)
         columns: dict[int, list[tuple[int, int]]] = {}
@@ -111,7 +111,7 @@ class Recorder(Tracer):
         return self._slots[given]
 
     def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
-        """See ``Tracer``; as soon as it repeats itself its calls are copied."""
+        """Implement ``Tracer.repeat``; once a round repeats itself its calls are copied."""
         before, template = state, list[TracedCall]()
         for _ in range(count):
             slots = self._alike(before, state) if template else None
@@ -140,7 +140,7 @@ class Recorder(Tracer):
         return given
 
     def _alike(self, before: Any, after: Any) -> dict[int, int] | None:
-        """Which slot of ``after`` stands where one of ``before`` stood; None if they do not lie alike."""
+        """Map the slots of ``before`` to those of ``after``; None if their layouts differ."""
         (old, old_slots), (new, new_slots) = map(self._structures.of, (before, after))
         return dict(zip(old_slots, new_slots, strict=True)) if old == new else None
 

@@ -45,7 +45,7 @@ def capsule_in_field(
 def nearest_share(
     capsule: Capsule, shape: SolidShape, field: Field, a: PredictedPath, b: PredictedPath, t: Expr
 ) -> tuple[Expr, Expr]:
-    """Where on the axis, from -1 to 1, the shape is nearest at time t; and 1 if that is between the ends."""
+    """Return the nearest place on the axis at time t, from -1 to 1, and 1 if it lies between the ends."""
     own = [axis.at(t) for axis in axes(b, shape)]
 
     def inside(vector: Expr) -> Expr:

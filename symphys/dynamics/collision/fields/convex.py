@@ -34,12 +34,12 @@ class TriangleField:
     corners: tuple[Expr, Expr, Expr]
 
     def distance(self, point: Expr) -> Expr:
-        """See ``Field``."""
+        """Implement ``Field.distance``."""
         height, within, away = self._foot(point)
         return ca.if_else(within, height, ca.sqrt(ca.dot(away, away) + TINY_SQUARE))
 
     def normal(self, point: Expr) -> Expr:
-        """See ``Field``."""
+        """Implement ``Field.normal``."""
         _, within, away = self._foot(point)
         square = ca.dot(away, away)
         apart = ca.logic_and(ca.logic_not(within), square > TINY_SQUARE)
@@ -66,7 +66,7 @@ class TriangleField:
 
 
 def squared_distances(triangles: NDArray[np.float64], point: Expr) -> list[Expr]:
-    """Of a point (3,) from each of (m, 3, 3) triangles [m^2]."""
+    """Return the squared distance of a point (3,) from each of (m, 3, 3) triangles [m^2]."""
     planes = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     planes /= np.linalg.norm(planes, axis=1, keepdims=True)
     height = ca.mtimes(ca.DM(planes), point) - ca.DM((planes * triangles[:, 0]).sum(axis=1))

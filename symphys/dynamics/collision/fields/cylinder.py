@@ -30,13 +30,13 @@ class CylinderField:
     half_length: Expr
 
     def distance(self, point: Expr) -> Expr:
-        """See ``Field``."""
+        """Implement ``Field.distance``."""
         side, end = self._over(point)
         out_side, out_end = ca.fmax(side, 0), ca.fmax(end, 0)
         return ca.sqrt(out_side * out_side + out_end * out_end + TINY_SQUARE) + ca.fmin(ca.fmax(side, end), 0)
 
     def normal(self, point: Expr) -> Expr:
-        """See ``Field``."""
+        """Implement ``Field.normal``."""
         side, end = self._over(point)
         out_side, out_end = ca.fmax(side, 0), ca.fmax(end, 0)
         square = out_side * out_side + out_end * out_end
@@ -53,7 +53,7 @@ class CylinderField:
         return ca.vertcat(point[0] + ca.if_else(on_axis, NO_LENGTH, 0), point[1], 0)
 
     def _over(self, point: Expr) -> tuple[Expr, Expr]:
-        """How far the point is beyond the side and beyond the nearer end."""
+        """Return how far the point is beyond the side and beyond the nearer end [m]."""
         return distance(self._from_axis(point)) - self.radius, ca.fabs(point[2]) - self.half_length
 
 

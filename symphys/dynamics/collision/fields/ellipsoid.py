@@ -33,12 +33,12 @@ class EllipsoidField:
     radii: tuple[Expr, ...]
 
     def distance(self, point: Expr) -> Expr:
-        """See ``Field``."""
+        """Implement ``Field.distance``."""
         multiplier, parts = self._foot(point)
         return multiplier * length(parts)
 
     def normal(self, point: Expr) -> Expr:
-        """See ``Field``."""
+        """Implement ``Field.normal``."""
         parts = self._foot(point)[1]
         upright = ca.if_else(ca.dot(parts, parts) > TINY_SQUARE, 0, 1) * ca.SX([0, 0, 1])
         return (parts + upright) / length(parts + upright)

@@ -50,7 +50,7 @@ class BoxApproach:
     far: Expr
 
     def contact(self, points: tuple[Parabola, Parabola], normal: Parabola, on: Expr, radius: Expr = 0.0) -> Contact:
-        """Of two points."""
+        """Return the midpoint of two points."""
         arms = points[0] - self.bodies[0].centre(), points[1] - self.bodies[1].centre()
         met = contact_of(Witness(points, arms, normal, (radius, 0.0), ca.logic_not(on), self.far, self.bodies[0].dt))
         return replace(met, hit=ca.logic_and(met.hit, ca.logic_not(self.apart)))
@@ -61,7 +61,7 @@ class BoxApproach:
 
 
 def approach_of(near: Nearing, bodies: tuple[PredictedPath, PredictedPath], size: Expr) -> BoxApproach:
-    """Of two boxes of a size."""
+    """Make the geometry of two boxes."""
     return BoxApproach(bodies, near.direction, near.time, near.apart, ca.fmax(near.distance, 0) + size)
 
 
@@ -98,7 +98,7 @@ def held(x: Expr, half: Expr) -> Expr:
 
 
 def edges_across(corners: list[Parabola], ground: Face, approach: BoxApproach, radius: Expr = 0.0) -> list[Contact]:
-    """Where the edges between corners, a closed polygon or a single edge, enter and leave the region over a face."""
+    """Return where edges, of a closed polygon or single, enter and leave the region over a face."""
     flat = [seen_along(corner.at(approach.time), ground, approach) for corner in corners]
     found = []
     for k in range(len(corners) if len(corners) > 2 else 1):
@@ -116,7 +116,7 @@ def edges_across(corners: list[Parabola], ground: Face, approach: BoxApproach, r
 
 
 def seen_along(point: Expr, ground: Face, approach: BoxApproach) -> tuple[Expr, Expr]:
-    """Where a point lies on a face's plane, seen along the normal of the approach."""
+    """Project a point on a face's plane along the normal of the approach."""
     t, n = approach.time, approach.normal.at(approach.time)
     away, upright = point - ground.centre.at(t), ground.normal.at(t)
     down = away - n * (ca.dot(upright, away) / ca.dot(upright, n))

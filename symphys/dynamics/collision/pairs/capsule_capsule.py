@@ -58,7 +58,7 @@ def crossing(first: Capsule, second: Capsule, a: PredictedPath, b: PredictedPath
 
 
 def nearest(apart: Expr, one: Expr, other: Expr) -> tuple[Expr, Expr]:
-    """Where two lines are nearest, along each from its centre [m]; ``apart``: from the other's centre to the one's."""
+    """Return where two lines are nearest, along each from its centre [m]; ``apart``: between the centres."""
     cosine = ca.dot(one, other)
     square = ca.fmax(1 - cosine * cosine, PARALLEL / 2)
     along, along_other = ca.dot(apart, one), ca.dot(apart, other)

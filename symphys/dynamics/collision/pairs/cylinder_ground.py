@@ -57,12 +57,12 @@ class RimOnPlane:
         return ca.dot(self.normal, self.centre.at(t) + self.radius * down) - self.offset
 
     def frame(self, t: Expr) -> Frame:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.frame``."""
         down = downhill(self.normal, self.axis.at(t), self.side.at(t))
         return Frame(self.normal, (self.arm.at(t) + self.radius * down, ca.SX.zeros(3)))
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.gap_after``."""
         normal, centre = turned_back(self.normal, first), first.moved(self.centre.start, self.arm.start)
         down = downhill(normal, self.axis.start, self.side.start)
         return ca.dot(self.normal, centre) + self.radius * ca.dot(normal, down) - self.offset

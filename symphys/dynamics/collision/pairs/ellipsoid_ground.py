@@ -34,7 +34,7 @@ class MovingEllipsoid:
         return sum(along) / self.reach(normal, t)
 
     def reach(self, normal: Expr, t: Expr) -> Expr:
-        """How far it extends from its centre along a vector, times the vector's length."""
+        """Return the support along a vector: the extent from the centre times the vector's length."""
         return length(
             ca.vertcat(*(r * ca.dot(axis.at(t), normal) for r, axis in zip(self.radii, self.axes, strict=True)))
         )
@@ -64,12 +64,12 @@ class EllipsoidOnPlane:
         return ca.dot(self.normal, self.solid.centre.at(t)) - self.offset - self.solid.reach(self.normal, t)
 
     def frame(self, t: Expr) -> Frame:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.frame``."""
         arm = self.solid.arm.at(t) - self.solid.support(self.normal, t)
         return Frame(self.normal, (arm, ca.SX.zeros(3)))
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.gap_after``."""
         centre = first.moved(self.solid.centre.start, self.solid.arm.start)
         reach = self.solid.reach(turned_back(self.normal, first), ca.SX(0))
         return ca.dot(self.normal, centre) - self.offset - reach
@@ -92,12 +92,12 @@ class EllipsoidOnTerrain:
         return self._apart(self.solid, t, self._place(self.solid, t))
 
     def frame(self, t: Expr) -> Frame:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.frame``."""
         normal = upwards(self.ground.surface(self._place(self.solid, t))[1])
         return Frame(normal, (self.solid.arm.at(t) - self.solid.support(normal, t), ca.SX.zeros(3)))
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
-        """See ``ContactGeometry``: over the tangent plane where it touches at the start."""
+        """Implement ``ContactGeometry.gap_after`` over the tangent plane at the first point of touch."""
         place = self._place(self.solid, ca.SX(0))
         height, slope, _ = self.ground.surface(place)
         normal = upwards(slope)

@@ -36,13 +36,13 @@ class BoxField:
     endless: tuple[Expr, ...] = ()
 
     def distance(self, point: Expr) -> Expr:
-        """See ``Field``."""
+        """Implement ``Field.distance``."""
         over = self._over(point)
         outside = ca.fmax(over, 0)
         return ca.sqrt(ca.dot(outside, outside) + TINY_SQUARE) + ca.fmin(ca.fmax(ca.fmax(over[0], over[1]), over[2]), 0)
 
     def normal(self, point: Expr) -> Expr:
-        """See ``Field``."""
+        """Implement ``Field.normal``."""
         over = self._over(point)
         outside = ca.fmax(over, 0)
         square = ca.dot(outside, outside)
@@ -75,7 +75,7 @@ def ball_at_box(offset: Offset, radius: Expr, box: Box, a: PredictedPath, b: Pre
 
 
 def rolls_onto(offset: Offset, radius: Expr, box: Box, a: PredictedPath, b: PredictedPath) -> tuple[Expr, ...]:
-    """For each axis of the box: 1 if a ball moves over a rim across it, at the height of a top by its true velocity."""
+    """Return for each axis of the box 1 if a ball passes over a rim across it, at the height of a face."""
     gravity = a.gravity if a.gravity is not None else b.gravity
     if gravity is None:
         return ()

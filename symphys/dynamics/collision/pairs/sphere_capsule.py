@@ -41,7 +41,7 @@ class BallAtCapsule:
         return distance(self._from_segment(self.path.at(t), self.axis.at(t))) - self.radii[0] - self.radii[1]
 
     def frame(self, t: Expr) -> Frame:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.frame``."""
         apart = self.path.at(t)
         away = self._from_segment(apart, self.axis.at(t))
         normal, foot = direction(away), apart - away
@@ -49,7 +49,7 @@ class BallAtCapsule:
         return Frame(normal, arms)
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.gap_after``."""
         ball = first.moved(self.starts[0], self.arms[0].start)
         centre = second.moved(self.starts[1], self.arms[1].start)
         apart = ball - centre - ca.cross(second.angular, ball - centre)

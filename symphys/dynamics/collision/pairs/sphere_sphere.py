@@ -26,13 +26,13 @@ class OnSphere:
     radii: tuple[Expr, Expr]
 
     def frame(self, t: Expr) -> Frame:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.frame``."""
         (a, b), (arm_a, arm_b), (r_a, r_b) = self.paths, self.arms, self.radii
         normal = direction((a - b).at(t))
         return Frame(normal, (arm_a.at(t) - r_a * normal, arm_b.at(t) + r_b * normal))
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
-        """See ``ContactGeometry``."""
+        """Implement ``ContactGeometry.gap_after``."""
         (a, b), (arm_a, arm_b) = self.paths, self.arms
         apart = first.moved(a.start, arm_a.start) - second.moved(b.start, arm_b.start)
         return distance(apart) - self.radii[0] - self.radii[1]
