@@ -6,9 +6,9 @@ Where a heavy body rests on a light one, steps of the sweeps are lengthened. Gau
 a geometric series, of ratio 1 - m/M where a mass M rests on m: a thousand sweeps where the masses are a thousand to
 one. All of the series points one way. So now and then the change of the last sweep is repeated as often as lowers the
 kinetic energy most (less the work that targets ask for), which the answer minimises: an exact line search along the
-last change, as in the conjugate gradients of Renouf and Alart, Conjugate gradient type algorithms for frictional multi-contact
-problems (Comput. Methods Appl. Mech. Engrg. 194, 2005). No normal impulse may become negative on the way. Deviation:
-plain sweeps in between, which project and go round less.
+last change, as in the conjugate gradients of Renouf and Alart, Conjugate gradient type algorithms for frictional
+multi-contact problems (Comput. Methods Appl. Mech. Engrg. 194, 2005). No normal impulse may become negative on the
+way. Deviation: plain sweeps in between, which project and go round less.
 """
 
 from __future__ import annotations
