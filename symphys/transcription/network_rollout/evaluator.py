@@ -205,7 +205,8 @@ class LargeEvaluator(WithoutResiduals):
 def stacked(parts: Sequence[Shared]) -> Shared:
     """Put the values of all robots together, without gradients."""
     names = ("merit", "objective", "errors", "outputs", *(("alive",) if parts[0].alive is not None else ()))
-    return Shared(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+    whole: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return Shared(**whole)
 
 
 def _values(found: Shared) -> Values:
