@@ -64,7 +64,7 @@ def limited_along(heights: Array, slopes: Array) -> Array:
 
 
 def range_of_cells(heights: Array, across: int, along: int) -> tuple[Array, Array]:
-    """How far the least and the largest height of the cell on one side are from each height; infinite without one."""
+    """Return how far the extremes of the cell on one side are from each height; infinite without a cell."""
     corners = np.array([heights[:-1, :-1], heights[:-1, 1:], heights[1:, :-1], heights[1:, 1:]])
     ends = ((1, 0), (0, 1))
     pad = [ends[along > 0], ends[across > 0]]
@@ -74,7 +74,7 @@ def range_of_cells(heights: Array, across: int, along: int) -> tuple[Array, Arra
 
 
 def off_triangles(fine: Array, corners: Array, finer: int) -> float:
-    """How far heights are from triangles on a grid of corners, whichever way its squares are cut [m].
+    """Return how far heights are from triangles on a grid, for both ways to cut its squares [m].
 
     ``fine``: the heights at ``finer`` parts of each spacing.
     """

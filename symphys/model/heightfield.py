@@ -86,7 +86,7 @@ class Heightfield:
         return np.asarray(sum(found, np.zeros((len(rows), len(columns)))))
 
     def off_triangles(self, heights: Array | None = None) -> float:
-        """How far it is from the triangles between heights over the same area, whichever way squares are cut [m].
+        """Return how far it is from triangles over the same area, for both ways to cut the squares [m].
 
         ``heights``: (m, n) [m], rows along y; None: its own.
         """
@@ -115,7 +115,7 @@ class Heightfield:
 
     @cached_property
     def _added(self) -> Slopes:
-        """What makes the slopes of the spline those that keep the range of the heights; exactly 0 where it does."""
+        """Return the correction of the slopes that keeps the range of the heights; exactly 0 if they keep it."""
         (rows, columns), spline = self._values.shape, self._coefficients
         y, x = ({kind: banded(count, kind) for kind in (VALUE, SLOPE)} for count in (rows, columns))
         x_slope, y_slope, twist = ((VALUE, SLOPE), (SLOPE, VALUE), (SLOPE, SLOPE))

@@ -130,7 +130,7 @@ def initial_state(world: World, values: Mapping[str, Any] = NOTHING) -> Any:
 
 
 def input_sizes(world: World) -> dict[str, int]:
-    """What may act on a world from outside, and how many numbers each has: forces and torques, commands of motors."""
+    """Map the inputs of a world to their sizes: forces and torques on bodies, commands of motors."""
     forces = {f"{body.name}.{field}": 3 for body in world.bodies for field in INPUT_FIELDS}
     commands = {f"{joint.name}.command": len(joint.kind.coordinates) for joint in world.joints if joint.driven}
     return forces | commands | {name: 1 for name, _ in world.scheduled}
@@ -142,7 +142,7 @@ def input_names(world: World) -> list[str]:
 
 
 def input_size(world: World, name: str) -> int:
-    """How many numbers an input has; KeyError if there is none of that name."""
+    """Return the size of an input; KeyError for an unknown name."""
     sizes = input_sizes(world)
     if name not in sizes:
         raise KeyError(f"no input is called {name!r}; there are {', '.join(sorted(sizes))}")
@@ -150,7 +150,7 @@ def input_size(world: World, name: str) -> int:
 
 
 def input_columns(world: World, inputs: Sequence[str]) -> dict[str, slice]:
-    """Where each of these inputs lies in u, which stacks them; KeyError for a name that is none."""
+    """Map inputs to their columns of u, which stacks them; KeyError for an unknown name."""
     columns, start, sizes = dict[str, slice](), 0, input_sizes(world)
     for name in inputs:
         stop = start + (sizes[name] if name in sizes else input_size(world, name))
@@ -166,5 +166,5 @@ def input_symbols(world: World, inputs: Sequence[str]) -> Any:
 
 
 def inputs_size(world: World, inputs: Sequence[str]) -> int:
-    """How many numbers u has, which stacks these inputs."""
+    """Return the size of u, which stacks these inputs."""
     return max((part.stop for part in input_columns(world, inputs).values()), default=0)

@@ -130,7 +130,7 @@ class World:
 
     @property
     def start(self) -> dict[str, Any]:
-        """Where bodies begin that say so, by names such as ``ball.position``; see ``Body.start``."""
+        """Map names such as ``ball.position`` to the start of bodies that state one; see ``Body.start``."""
         return {f"{body.name}.{key}": value for body in self.bodies for key, value in body.start.items()}
 
     def surface(self, side: Side) -> Surface:

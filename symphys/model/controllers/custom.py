@@ -18,19 +18,19 @@ class Custom:
 
     @property
     def senses(self) -> int:
-        """See ``ControlLaw``."""
+        """Implement ``ControlLaw.senses``."""
         return int(self.function.numel_in(0))
 
     @property
     def outputs(self) -> int:
-        """See ``ControlLaw``."""
+        """Implement ``ControlLaw.outputs``."""
         return int(self.function.numel_out(0))
 
     @property
     def sizes(self) -> Mapping[str, int]:
-        """See ``ControlLaw``."""
+        """Implement ``ControlLaw.sizes``."""
         return {"weights": int(self.function.numel_in(2))}
 
     def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
-        """See ``ControlLaw``."""
+        """Implement ``ControlLaw.act``."""
         return self.function(sensed, time, numbers["weights"])

@@ -19,11 +19,11 @@ class Linear:
 
     @property
     def sizes(self) -> Mapping[str, int]:
-        """See ``ControlLaw``."""
+        """Implement ``ControlLaw.sizes``."""
         return {"gains": self.outputs * self.senses, "offsets": self.outputs}
 
     def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
-        """See ``ControlLaw``."""
+        """Implement ``ControlLaw.act``."""
         return rows_times(numbers["gains"], sensed, self.outputs) + numbers["offsets"]
 
 

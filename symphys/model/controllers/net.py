@@ -58,18 +58,18 @@ class Net:
 
     @property
     def sizes(self) -> Mapping[str, int]:
-        """See ``ControlLaw``."""
+        """Implement ``ControlLaw.sizes``."""
         layers = tuple(self.layers())
         return {"weights": layers[-1].biases.stop + (self.outputs * self.senses if self.skip else 0)}
 
     @property
     def straight(self) -> slice:
-        """Where the straight matrix lies; empty without one."""
+        """Return the slice of the skip matrix among the weights; empty without one."""
         end = self.sizes["weights"]
         return slice(end - (self.outputs * self.senses if self.skip else 0), end)
 
     def layers(self) -> Iterator[Layer]:
-        """From what is sensed to the outputs."""
+        """Return the layers from the sensor readings to the outputs."""
         start, widths = 0, (self.senses, *self.hidden, self.outputs)
         for k, (inputs, outputs) in enumerate(pairwise(widths)):
             middle = start + inputs * outputs
@@ -79,7 +79,7 @@ class Net:
             start = end
 
     def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
-        """See ``ControlLaw``."""
+        """Implement ``ControlLaw.act``."""
         weights, value = numbers["weights"], sensed
         for layer in self.layers():
             value = activated(layer.activation, raw(layer, weights, value))

@@ -24,12 +24,12 @@ class Periodic:
 
     @property
     def sizes(self) -> Mapping[str, int]:
-        """See ``ControlLaw``."""
+        """Implement ``ControlLaw.sizes``."""
         count = self.outputs * self.harmonics
         return {"frequency": 1, "offsets": self.outputs, "sines": count, "cosines": count}
 
     def act(self, sensed: Expr, time: Expr, numbers: Mapping[str, Expr]) -> Expr:
-        """See ``ControlLaw``."""
+        """Implement ``ControlLaw.act``."""
         result = numbers["offsets"]
         for h in range(self.harmonics):
             phase = 2 * ca.pi * (h + 1) * numbers["frequency"] * time

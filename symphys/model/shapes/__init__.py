@@ -71,7 +71,7 @@ class Fixture:
 
     @property
     def surface(self) -> Shape:
-        """What bodies may touch."""
+        """Return the surface that bodies may touch."""
         return self.shape
 
     @property
@@ -99,7 +99,7 @@ POINTS: dict[tuple[type, type], int] = {
 
 
 def surface(static: Static) -> Surface:
-    """What a static part of the world is made of."""
+    """Return the surface of a static part of the world."""
     return static.surface
 
 
@@ -109,5 +109,5 @@ def contact_points(a: Surface, b: Surface) -> int:
 
 
 def points_of_kinds(a: type[Surface], b: type[Surface]) -> int:
-    """The same for two kinds of surfaces."""
+    """Return the number of contact points of two kinds of surfaces."""
     return POINTS.get((a, b)) or POINTS.get((b, a)) or 0

@@ -43,7 +43,7 @@ class Box(SolidShape):
 
     @classmethod
     def from_sizes(cls, sizes: Mapping[str, Any], centre: tuple[Scalar, ...], orientation: tuple[Scalar, ...]) -> Self:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.from_sizes``."""
         return cls(tuple(length / 2 for length in sizes["size"]), centre, orientation, sizes.get("edge", 0.0))
 
     @property
@@ -61,13 +61,13 @@ class Box(SolidShape):
 
     @property
     def moments(self) -> tuple[Scalar, Scalar, Scalar]:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.moments``."""
         a, b, c = (half * half / 3 for half in self.half_sizes)
         return b + c, a + c, a + b
 
     @property
     def extent(self) -> float:
-        """From the centre to the farthest point [m]."""
+        """Return the distance from the centre to the farthest point [m]."""
         return hypot(*(half - self.edge for half in self.half_sizes)) + float(self.edge)
 
     @property
@@ -83,7 +83,7 @@ class Box(SolidShape):
 
     @property
     def flatness(self) -> str:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.flatness``."""
         least, most = 2 * min(self.half_sizes), 2 * max(self.half_sizes)
         if least >= FLATTEST * most:
             return ""
@@ -94,7 +94,7 @@ class Box(SolidShape):
 
     @property
     def optional_fault(self) -> str:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.optional_fault``."""
         sizes = (*self.half_sizes, self.edge)
         if not all(isinstance(size, int | float) for size in sizes) or 0 <= self.edge < min(self.half_sizes):
             return ""

@@ -44,12 +44,12 @@ class Capsule(SolidShape):
 
     @classmethod
     def from_sizes(cls, sizes: Mapping[str, Any], centre: tuple[Scalar, ...], orientation: tuple[Scalar, ...]) -> Self:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.from_sizes``."""
         return cls(sizes["radius"], sizes["length"] / 2, centre, orientation)
 
     @property
     def sizes(self) -> dict[str, Any]:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.sizes``."""
         return {"radius": self.radius, "length": 2 * self.half_length}
 
     @property
@@ -60,7 +60,7 @@ class Capsule(SolidShape):
 
     @property
     def moments(self) -> tuple[Scalar, Scalar, Scalar]:
-        """See ``SolidShape``: a cylinder and two half balls, whose share in the mass is ``ends``."""
+        """Implement ``SolidShape.moments``: a cylinder and two half balls, whose share in the mass is ``ends``."""
         r, h = self.radius, self.half_length
         ball = SOLID_SPHERE * r * r
         ends = 2 * r / (2 * r + 3 * h)
@@ -69,7 +69,7 @@ class Capsule(SolidShape):
 
     @property
     def extent(self) -> float:
-        """From the centre to the farthest point [m]."""
+        """Return the distance from the centre to the farthest point [m]."""
         return float(self.radius + self.half_length)
 
     @property
@@ -85,7 +85,7 @@ class Capsule(SolidShape):
 
     @property
     def flatness(self) -> str:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.flatness``."""
         least, most = sorted((2 * self.radius, 2 * self.half_length))
         if least >= FLATTEST * most:
             return ""

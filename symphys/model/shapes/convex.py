@@ -48,7 +48,7 @@ class Convex(SolidShape):
 
     @classmethod
     def from_sizes(cls, sizes: Mapping[str, Any], centre: tuple[Scalar, ...], orientation: tuple[Scalar, ...]) -> Self:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.from_sizes``."""
         return cls(sizes["points"], centre, orientation)
 
     @property
@@ -61,16 +61,16 @@ class Convex(SolidShape):
 
     @property
     def sizes(self) -> dict[str, Any]:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.sizes``."""
         return {"points": self.points}
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """None: its points are no variables."""
+        """Return no parameters: its points cannot vary."""
         return {}
 
     def resized(self, sizes: Mapping[str, Any]) -> Self:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.resized``."""
         return self.from_sizes({**self.sizes, **sizes}, self.centre, self.orientation)
 
     @property
@@ -81,25 +81,25 @@ class Convex(SolidShape):
 
     @property
     def moments(self) -> tuple[Scalar, Scalar, Scalar]:
-        """See ``SolidShape``: the diagonal of its tensor; see ``products``."""
+        """Implement ``SolidShape.moments``: the diagonal of its tensor; see ``products``."""
         xx, yy, zz = np.diag(self.hull.tensor).tolist()
         return xx, yy, zz
 
     @property
     def products(self) -> tuple[Scalar, Scalar, Scalar]:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.products``."""
         tensor = self.hull.tensor.tolist()
         return tensor[1][2], tensor[0][2], tensor[0][1]
 
     @property
     def centroid(self) -> tuple[Scalar, ...]:
-        """See ``SolidShape``; the origin of points in a plane."""
+        """Implement ``SolidShape.centroid``; the origin for points in a plane."""
         found = hull_of(self.points)
         return (0.0, 0.0, 0.0) if found is None else tuple(found.centroid.tolist())
 
     @property
     def extent(self) -> float:
-        """From the centre to the farthest point [m]."""
+        """Return the distance from the centre to the farthest point [m]."""
         return float(np.linalg.norm(np.array(self.points, float), axis=1).max())
 
     @property
@@ -109,10 +109,10 @@ class Convex(SolidShape):
 
     @property
     def mjcf_size(self) -> tuple[Scalar, ...]:
-        """None: MuJoCo has the points in a mesh."""
+        """Return no sizes: MuJoCo has the points in a mesh."""
         return ()
 
     @property
     def flatness(self) -> str:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.flatness``."""
         return FLAT if hull_of(self.points) is None else ""

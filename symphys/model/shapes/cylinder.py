@@ -39,12 +39,12 @@ class Cylinder(SolidShape):
 
     @classmethod
     def from_sizes(cls, sizes: Mapping[str, Any], centre: tuple[Scalar, ...], orientation: tuple[Scalar, ...]) -> Self:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.from_sizes``."""
         return cls(sizes["radius"], sizes["length"] / 2, centre, orientation)
 
     @property
     def sizes(self) -> dict[str, Any]:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.sizes``."""
         return {"radius": self.radius, "length": 2 * self.half_length}
 
     @property
@@ -54,14 +54,14 @@ class Cylinder(SolidShape):
 
     @property
     def moments(self) -> tuple[Scalar, Scalar, Scalar]:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.moments``."""
         square = self.radius * self.radius
         across = square / 4 + self.half_length * self.half_length / 3
         return across, across, square / 2
 
     @property
     def extent(self) -> float:
-        """From the centre to the farthest point [m]."""
+        """Return the distance from the centre to the farthest point [m]."""
         return hypot(self.radius, self.half_length)
 
     @property
@@ -78,7 +78,7 @@ class Cylinder(SolidShape):
 
     @property
     def flatness(self) -> str:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.flatness``."""
         least, most = sorted((2 * self.radius, 2 * self.half_length))
         if least >= FLATTEST * most:
             return ""

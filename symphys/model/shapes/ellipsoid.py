@@ -37,12 +37,12 @@ class Ellipsoid(SolidShape):
 
     @classmethod
     def from_sizes(cls, sizes: Mapping[str, Any], centre: tuple[Scalar, ...], orientation: tuple[Scalar, ...]) -> Self:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.from_sizes``."""
         return cls(tuple(sizes["radii"]), centre, orientation)
 
     @property
     def sizes(self) -> dict[str, Any]:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.sizes``."""
         return {"radii": self.radii}
 
     @property
@@ -53,13 +53,13 @@ class Ellipsoid(SolidShape):
 
     @property
     def moments(self) -> tuple[Scalar, Scalar, Scalar]:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.moments``."""
         a, b, c = (radius * radius / 5 for radius in self.radii)
         return b + c, a + c, a + b
 
     @property
     def extent(self) -> float:
-        """From the centre to the farthest point [m]."""
+        """Return the distance from the centre to the farthest point [m]."""
         return float(max(self.radii))
 
     @property
@@ -78,7 +78,7 @@ class Ellipsoid(SolidShape):
 
     @property
     def flatness(self) -> str:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.flatness``."""
         least, most = min(self.radii), max(self.radii)
         if least >= FLATTEST * most:
             return ""

@@ -36,7 +36,7 @@ class Plane:
 
     @property
     def surface(self) -> Plane:
-        """What bodies may touch."""
+        """Return the surface that bodies may touch."""
         return self
 
     @property

@@ -85,7 +85,7 @@ class SolidShape(ABC):
     @property
     @abstractmethod
     def sizes(self) -> dict[str, Any]:
-        """By the names of ``size_keys`` [m]: a number, a tuple of three, or points; optional ones if not 0."""
+        """Return sizes [m] by the names of ``size_keys``: a number, three, or points; optional ones if not 0."""
 
     @property
     @abstractmethod
@@ -105,7 +105,7 @@ class SolidShape(ABC):
     @property
     @abstractmethod
     def rounded_hull(self) -> RoundedHull:
-        """What pictures draw."""
+        """Return the outline that pictures draw."""
 
     @property
     @abstractmethod

@@ -36,12 +36,12 @@ class Sphere(SolidShape):
 
     @classmethod
     def from_sizes(cls, sizes: Mapping[str, Any], centre: tuple[Scalar, ...], orientation: tuple[Scalar, ...]) -> Self:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.from_sizes``."""
         return cls(sizes["radius"], centre)
 
     @property
     def sizes(self) -> dict[str, Any]:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.sizes``."""
         return {"radius": self.radius}
 
     @property
@@ -51,13 +51,13 @@ class Sphere(SolidShape):
 
     @property
     def moments(self) -> tuple[Scalar, Scalar, Scalar]:
-        """See ``SolidShape``."""
+        """Implement ``SolidShape.moments``."""
         moment = SOLID_SPHERE * self.radius * self.radius
         return moment, moment, moment
 
     @property
     def extent(self) -> float:
-        """From the centre to the farthest point [m]."""
+        """Return the distance from the centre to the farthest point [m]."""
         return float(self.radius)
 
     @property

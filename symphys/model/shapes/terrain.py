@@ -25,7 +25,7 @@ class Terrain:
 
     @property
     def surface(self) -> Terrain:
-        """What bodies may touch."""
+        """Return the surface that bodies may touch."""
         return self
 
     @property
