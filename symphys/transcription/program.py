@@ -152,7 +152,7 @@ def _rollout_program(
     asked = terms(samples)
     formulas = {each: places.recorded(*each) for each in samples.series}
     series = {name: places.recorded(formula, shift) for name, formula in recorded.items()}
-    body = [*_knot_calls(places), *control_calls(rollout, places), *step_calls(places, exact)]
+    body = [*_knot_calls(places), *step_calls(places, exact)]
     epilogue, outputs = _epilogue(places, samples, asked, formulas)
     alive = _alive(places)
     if alive is not None:
@@ -181,7 +181,10 @@ def program_identity(problem: Problem, exact: bool) -> str | None:
 
 
 def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
-    """The calls of one time step, from ``x`` and ``u`` to the ``x`` after."""
+    """Return the calls of one time step, from ``x`` and ``given`` to the ``x`` after: controllers, laws, then physics.
+
+    Every program with time steps in it has these calls as its body: rollouts, ``Stage``, slopes, policies.
+    """
     from symphys.dynamics.functions import trace_step
 
     rollout = samples.rollout
@@ -190,7 +193,7 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.smoothing}
     after = samples.x.later() if rollout.termination is None else samples.layout.take(rollout.memory.size - 1)
     places: dict[TracedVector, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
-    calls, zeros = list[FunctionCall](), None
+    calls, zeros = control_calls(rollout, samples), None
     if widest := _most_zeros(recording.calls):
         zeros = samples.layout.take(widest)
         calls.append(FunctionCall(ca.Function("zeros", [], [ca.DM.zeros(widest)]), (), (zeros,)))

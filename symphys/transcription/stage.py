@@ -15,7 +15,6 @@ import numpy as np
 from symphys.codegen import FunctionCall, Kernel, MemoryLayout, Place, Program
 from symphys.codegen.backends import build_kernel
 from symphys.expression import Formula
-from symphys.transcription.feedback.controller_calls import control_calls
 from symphys.transcription.program import dense, step_calls
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array, Expr
@@ -97,7 +96,7 @@ class Stage:
     def program(self, exact: bool) -> Program:
         """The program, whose vector is a row and whose parameter is the smoothing."""
         places = StagePlaces(self.rollout, sum(self.sizes))
-        body = [*control_calls(self.rollout, places), *step_calls(places, exact)]
+        body = step_calls(places, exact)
         after, last, found = places.x.later().still(), list[FunctionCall](), list[Place]()
         outputs = {"after": after, "sensed": places.layout.take(int(self._sense.size1_out(0)))}
         last.append(FunctionCall(self._sense, (after, places.p, places.time.later().still()), (outputs["sensed"],)))

@@ -29,7 +29,6 @@ from symphys.codegen import (
 )
 from symphys.codegen.backends import PRECISIONS
 from symphys.shooting import AffinePolicy
-from symphys.transcription.feedback.controller_calls import control_calls
 from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.linearized_step import LinearizedStep
@@ -211,7 +210,6 @@ def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts
             (*decided, *(policy[name] for name in SERIES[1:])),
             (places.v, places.inputs, places.held.later()),
         ),
-        *control_calls(step.rollout, places),
         *step_calls(places, step.exact),
     ]
     epilogue: tuple[FunctionCall, ...] = ()

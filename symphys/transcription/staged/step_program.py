@@ -11,7 +11,6 @@ import numpy as np
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.transcription.decision_variables import start_of
-from symphys.transcription.feedback.controller_calls import control_calls
 from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout, call
 from symphys.transcription.staged.tangent import Tangent
@@ -103,7 +102,7 @@ def step_program(arguments: StepArguments, exact: bool, tangent: bool) -> Progra
     state after the step is from the one that is given. Without ``tangent`` d and e are left out of the step.
     """
     places = TangentStepPlaces(arguments)
-    body = [*control_calls(arguments.rollout, places), *step_calls(places, exact)]
+    body = step_calls(places, exact)
     after, outputs, epilogue = places.x.later().still(), dict[str, Place](), tuple[FunctionCall, ...]()
     if tangent:
         outputs["off"] = places.layout.take(arguments.tangent.size)
