@@ -19,7 +19,7 @@ class BudgetUse:
     """
 
     def __init__(self, options: object, smoothing: Sequence[float]) -> None:
-        """Nothing is used.
+        """Start with an unused budget.
 
         Args:
             options: of the solver; what none of them bounds has a share of nan.
@@ -47,7 +47,7 @@ class BudgetUse:
 
     @property
     def share(self) -> float:
-        """Of the budget that is used, 0 to 1, that of the bound that comes first; nan where nothing bounds it."""
+        """Return the used share, 0 to 1, of the bound that is nearest; nan without a bound."""
         if self._row is None:
             return 0.0 if math.isfinite(min(self._most, *self._limits.values())) else math.nan
         stages = len(self._smoothing) or 1
@@ -77,7 +77,7 @@ class BudgetUse:
         return self._smoothing.index(self._row.smoothing) if known and self._row else 0
 
     def _bounds(self, row: TraceRow) -> list[tuple[str, float, float]]:
-        """Of each bound of a stage: the number of a row that it is of, how much is used, the limit."""
+        """Yield for each bound of a stage the column of the row, the used amount and the limit."""
         return [
             (number, getattr(row, number) - self._begin[number], self._limits[key])
             for key, number in BOUNDED.items()

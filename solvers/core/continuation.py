@@ -90,7 +90,7 @@ def exact_best(
 
 
 def _rated(evaluator: CountingEvaluator, rate: Rate, candidates: Sequence[Array]) -> list[Point]:
-    """At smoothing 0; [] where that fails, or where the candidates are all the same."""
+    """Evaluate candidates at smoothing 0; [] if that fails or all candidates are equal."""
     if all(np.array_equal(each, candidates[0]) for each in candidates):
         return []
     try:

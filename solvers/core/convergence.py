@@ -51,7 +51,7 @@ class Progress:
 
 
 def stationary(evaluator: CountingEvaluator, z: Array, merit: float) -> StopReason:
-    """Whether to believe a gradient that vanishes at z: two rollouts show whether the merit levels out there.
+    """Check a gradient that vanishes at z: two rollouts show whether the merit levels out there.
 
     CONVERGED, or STALLED where the merit still has a slope along a fixed direction.
     """

@@ -80,7 +80,7 @@ def adam(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeight
 
 
 def spectral(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeights) -> tuple[Array, DirectionMemory]:
-    """As long as the last change of the gradient suggests; the first step has the length ``rate``."""
+    """Return a step as long as the last change of the gradient suggests; the first has the length ``rate``."""
     length = memory.length or rate / max(float(np.linalg.norm(g)), 1 / LONGEST)
     return -length * g, replace(memory, length=length)
 

@@ -83,7 +83,7 @@ MakeGains = Callable[[ShootingProblem, Array, float], Mapping[str, Array]]
 
 
 def without_feedback(problem: ShootingProblem, z: Array, smoothing: float) -> Mapping[str, Array]:
-    """Of solvers that find no feedback."""
+    """Return no gains, for solvers that find no feedback."""
     return {}
 
 
@@ -120,7 +120,7 @@ def make_solver(
         log: Log | None = None,
         keep: Keep | None = None,
     ) -> Outcome:
-        """See ``interface.Solve``."""
+        """Solve as ``interface.Solve`` has it."""
         check(options)
 
         def run_stage(
@@ -172,7 +172,7 @@ class Driver:
         stage: Callable[[StageContext, dict[str, object] | None, IterationRecorder], StopReason],
         rate: Rate,
     ) -> None:
-        """Nothing is evaluated yet."""
+        """Prepare a solve."""
         problem = request.problem
         self._request, self._stage, self._rate = request, stage, rate
         self._evaluator = CountingEvaluator(
@@ -219,7 +219,7 @@ class Driver:
             return {}
 
     def commit(self, iteration: Iteration[Any]) -> None:
-        """See ``IterationRecorder``."""
+        """Implement ``IterationRecorder.commit``."""
         point, evaluator, names = iteration.point, self._evaluator, self._request.problem.output_names
         if point is None:
             return
@@ -237,13 +237,13 @@ class Driver:
             self._request.monitor(row)
 
     def spent(self) -> StopReason | None:
-        """See ``IterationRecorder``."""
+        """Implement ``IterationRecorder.spent``."""
         row = self._trace.last
         reason = self._request.options.spent(row) if row else None
         return reason and replace(reason, whole=True)
 
     def distribute(self, work: Counts, first: int) -> None:
-        """See ``IterationRecorder``."""
+        """Implement ``IterationRecorder.distribute``."""
         self._trace.distribute(work, first)
         self._evaluator.counter.add(work)
         if self._checkpoint:
@@ -251,12 +251,12 @@ class Driver:
             self._checkpoint = replace(self._checkpoint, counts=counts_of(last))
 
     def multipliers(self, found: Mapping[str, Array]) -> None:
-        """See ``IterationRecorder``."""
+        """Implement ``IterationRecorder.multipliers``."""
         self._multipliers = found
 
     @property
     def rows(self) -> int:
-        """See ``IterationRecorder``."""
+        """Implement ``IterationRecorder.rows``."""
         return len(self._trace)
 
     def _run_stages(self) -> tuple[StopReason, Array]:
@@ -282,7 +282,7 @@ class Driver:
         return reason, z
 
     def _resume(self) -> tuple[Array, dict[str, object] | None]:
-        """Where the next stage begins, and the saved state of its method where the solve goes on."""
+        """Return the start of the next stage, and the saved state of its method if the solve is resumed."""
         request = self._request
         if not request.checkpoint:
             return self._start, None

@@ -157,5 +157,5 @@ class CountingEvaluator:
         return points
 
     def violation(self, errors: Array) -> float:
-        """See ``Point``."""
+        """Implement ``Point.violation``."""
         return self.problem.violation(errors) if self.constraints else 0.0

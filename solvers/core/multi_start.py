@@ -147,17 +147,17 @@ class BatchedEvaluator:
     batcher: EvaluationBatcher
 
     def value(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.value``."""
         return self.batcher.ask(PendingEvaluation("value", Z, smoothing))
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.gradient``."""
         return self.batcher.ask(PendingEvaluation("gradient", Z, smoothing))
 
     def residuals(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.residuals``."""
         return self.batcher.ask(PendingEvaluation("residuals", Z, smoothing))
 
     def jacobian(self, Z: Array, smoothing: float) -> Values:
-        """See ``Evaluator``."""
+        """Implement ``Evaluator.jacobian``."""
         return self.batcher.ask(PendingEvaluation("jacobian", Z, smoothing))

@@ -65,7 +65,7 @@ class Point:
 
     @property
     def rank(self) -> tuple[int, bool, float, float]:
-        """What is judged, the lower the better: met before not met, then the violation, then the merit."""
+        """Return the sort key, lower is better: met before unmet, then the violation, then the merit."""
         return self.failed_samples, not self.met, self.violation, self.merit
 
 

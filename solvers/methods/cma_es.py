@@ -80,7 +80,7 @@ class CmaOptions(SolverOptions):
         at_least(1, samples=self.samples, every=self.every)
 
     def batch(self, seed: int) -> ValidationBatch:
-        """For validation, where there is a scenario."""
+        """Set up validation if there is a scenario."""
         return ValidationBatch(self.validation, self.validation_width, seed)
 
 
@@ -92,7 +92,7 @@ class CmaEs(Method[CmaState]):
     """
 
     def __init__(self, context: StageContext, options: CmaOptions) -> None:
-        """For one stage."""
+        """Set up one stage."""
         self.evaluator: CountingEvaluator = context.evaluator
         self.start, self.seed, self.options = context.start, context.seed, options
         self.held = not np.any(self.evaluator.lower < self.evaluator.upper)
@@ -129,19 +129,19 @@ class CmaEs(Method[CmaState]):
         return Iteration(strategy.state(), best, step=strategy.sigma)
 
     def terminate(self, state: CmaState) -> StopReason | None:
-        """Whether the budget is used up or one of pycma's criteria holds."""
+        """Stop if the budget is used up or one of pycma's criteria holds."""
         if self.held:
             return converged(self.evaluator)
         reason = self._reason(self._strategy(state))
         return None if reason is None else self.conclude(state, reason)
 
     def conclude(self, state: CmaState, reason: StopReason) -> StopReason:
-        """See ``Method``: the last mean may be kept."""
+        """Implement ``Method.conclude``: the last mean may be kept."""
         self.candidates.keep(self._strategy(state).centre, len(state.merits), due=True)
         return self.candidates.conclude(reason, state.start)
 
     def resume(self, saved: dict[str, Any]) -> CmaState:
-        """See ``Method``."""
+        """Implement ``Method.resume``."""
         if self.held:
             return self._held_state()
         try:

@@ -107,7 +107,7 @@ class PycmaStrategy:
         self.merits, self._reasons = (*self.merits, merits), None
 
     def stopped(self) -> set[str]:
-        """Which of pycma's own criteria hold; pycma is asked once a generation."""
+        """Return which of pycma's own criteria hold; pycma is asked once a generation."""
         if self._reasons is None:
             with pycma():
                 reasons = set(self.es.stop())
@@ -116,7 +116,7 @@ class PycmaStrategy:
         return self._reasons
 
     def state(self) -> CmaState:
-        """What it can be replayed from."""
+        """Return the data that a replay needs."""
         return CmaState(self.start, self.merits, self.es.mean.copy(), self.sigma)
 
     def replay(self, state: CmaState) -> None:
@@ -168,7 +168,7 @@ def single(cma: Any) -> Any:
 
 
 def rescale(scaling: Any, index: int, value: float) -> None:
-    """What pycma's ``DiagonalDecoding.set_i`` does."""
+    """Do what pycma's ``DiagonalDecoding.set_i`` does."""
     scaling.is_identity = False
     scaling.scaling[index] = value
 

@@ -49,7 +49,7 @@ class EvolutionStrategy(Descent[EvolutionOptions]):
     """Along differences of values at antithetic pairs."""
 
     def estimate(self, state: DescentState, samples: ScenarioSamples) -> GradientEstimate | StopReason:
-        """See ``Descent``."""
+        """Implement ``Descent.estimate``."""
         options, evaluator = self.options, self.evaluator
         stream = np.random.default_rng([self.seed, NOISE, state.iteration])
         found = evolution(evaluator.sample_values, state.z, options.sigma * self.scale, samples, stream)

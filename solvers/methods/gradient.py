@@ -129,7 +129,7 @@ class GradientDescent(Method[GradientState]):
     """The method, see ``interface.Method``. Nothing is drawn: the seed acts through the start alone."""
 
     def __init__(self, context: StageContext, options: GradientOptions) -> None:
-        """For one stage."""
+        """Set up one stage."""
         self.evaluator: CountingEvaluator = context.evaluator
         self.start, self.options = context.start, options
 
@@ -160,7 +160,7 @@ class GradientDescent(Method[GradientState]):
         return self._iteration(point, following, float(np.linalg.norm(z - state.z)))
 
     def terminate(self, state: GradientState) -> StopReason | None:
-        """Whether the state is stationary, the budget used up, or the descent gets nowhere."""
+        """Stop if the state is stationary, the budget used up, or the descent stalls."""
         options, merit = self.options, state.merits[-1]
         if self.evaluator.stationarity(state.z, state.gradient) <= options.tolerance * (1 + abs(merit)):
             return stationary(self.evaluator, state.z, merit)
@@ -169,7 +169,7 @@ class GradientDescent(Method[GradientState]):
         return StopReason(Status.STALLED, SLOW) if state.progress.quiet >= (options.patience or math.inf) else None
 
     def resume(self, saved: dict[str, Any]) -> GradientState:
-        """See ``Method``."""
+        """Implement ``Method.resume``."""
         return revive(GradientState, saved, DirectionMemory, Progress)
 
     def _iteration(self, point: Point, state: GradientState, step: float) -> Iteration[GradientState]:

@@ -180,7 +180,7 @@ def arguments(evaluator: CountingEvaluator, z: Array) -> dict[str, Any]:
 
 
 def work(stats: dict[str, Any], constrained: bool) -> Counts:
-    """What IPOPT evaluated; objective and constraints are separate rollouts."""
+    """Return the work of IPOPT; objective and constraints are separate rollouts."""
     called = {name: int(stats.get(f"n_call_nlp_{name}", 0)) for name in ("f", "g", "grad_f", "jac_g", "hess_l")}
     rollouts = called["f"] + (called["g"] if constrained else 0)
     return Counts(rollouts, called["grad_f"], called["jac_g"] if constrained else 0, called["hess_l"])
@@ -220,11 +220,11 @@ class Watch(ca.Callback):
         return int(ca.nlpsol_n_out())
 
     def get_n_out(self) -> int:
-        """Whether to stop."""
+        """Tell IPOPT whether to stop."""
         return 1
 
     def get_sparsity_in(self, index: int) -> Any:
-        """By the name of the argument."""
+        """Return the value of an argument by its name."""
         n, m = self.evaluator.problem.n, len(self.evaluator.problem.constraint_lower)
         sizes = {"x": n, "lam_x": n, "f": 1, "g": m, "lam_g": m, "lam_p": 1}
         return ca.Sparsity.dense(sizes[ca.nlpsol_out(index)], 1)

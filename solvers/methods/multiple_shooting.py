@@ -247,11 +247,11 @@ class ShootingWatch:
 
     @property
     def ended(self) -> bool:
-        """See ``IterateWatch``."""
+        """Implement ``IterateWatch.ended``."""
         return self.error is not None or self.spent is not None or self.turned
 
     def iterate(self, w: Array, bound_duals: Array, row_duals: Array) -> bool:
-        """See ``IterateWatch``."""
+        """Implement ``IterateWatch.iterate``."""
         nlp, before = self.nlp, self.state
         z, shots = self.evaluator.clip(nlp.unpack(w)[0]), nlp.shots(w)
         turns = shots.turns

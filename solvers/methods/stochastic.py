@@ -78,7 +78,7 @@ class StochasticDescent(Descent[StochasticOptions]):
     """Along the mean of shortened gradients."""
 
     def estimate(self, state: DescentState, samples: ScenarioSamples) -> GradientEstimate | StopReason:
-        """See ``Descent``."""
+        """Implement ``Descent.estimate``."""
         options = self.options
         horizon = options.horizon(state.iteration)
         values = self.evaluator.sample_gradients(state.z, samples, options.adjoint_discount, horizon)

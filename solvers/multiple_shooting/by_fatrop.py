@@ -53,14 +53,14 @@ class SlopesNotFinite(Exception):
 
 
 def finite(nonzeros: Array) -> Array:
-    """The same; SlopesNotFinite where they are not."""
+    """Return nonzeros unchanged; SlopesNotFinite unless all are finite."""
     if not np.isfinite(nonzeros).all():
         raise SlopesNotFinite
     return nonzeros
 
 
 def solve_by_fatrop(request: LibraryRequest, watch: IterateWatch) -> tuple[str, LibraryResult]:
-    """How FATROP ended in IPOPT's words, and what it returned."""
+    """Return FATROP's status in IPOPT's words, and its results."""
     parts = FatropParts(request, watch)
     most = max(request.iterations - 1, 0)  # it makes one more than it is told
     warm = {"mu_init": request.barrier, "bound_push": PUSH, "bound_frac": PUSH} if request.row_duals.size else {}

@@ -28,7 +28,7 @@ class IpoptIterates(ca.Callback):
     """IPOPT's iterates, the start left out."""
 
     def __init__(self, nlp: MultipleShootingNlp, watch: IterateWatch) -> None:
-        """Nothing is recorded yet."""
+        """Start without iterations."""
         ca.Callback.__init__(self)
         size, rows = nlp.layout.size, nlp.layout.rows
         self.sizes = {"x": size, "lam_x": size, "f": 1, "g": rows, "lam_g": rows, "lam_p": 1}
@@ -40,11 +40,11 @@ class IpoptIterates(ca.Callback):
         return int(ca.nlpsol_n_out())
 
     def get_n_out(self) -> int:
-        """Whether to stop."""
+        """Tell IPOPT whether to stop."""
         return 1
 
     def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        """By the name of the argument."""
+        """Return the value of an argument by its name."""
         return ca.Sparsity.dense(self.sizes[ca.nlpsol_out(index)], 1)
 
     def eval(self, arguments: Sequence[Any]) -> list[Any]:

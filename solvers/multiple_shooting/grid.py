@@ -44,7 +44,7 @@ class IntervalGrid:
         return len(self.knots)
 
     def node_size(self, stage: int) -> int:
-        """How many entries of a local vector are the tangent of the node: none at node 0."""
+        """Return how many entries of a local vector are the tangent of the node: none at node 0."""
         return self.tangent_size if stage else 0
 
     def local_size(self, stage: int) -> int:
@@ -53,12 +53,12 @@ class IntervalGrid:
         return self.node_size(stage) + knots + len(self.statics)
 
     def static_part(self, stage: int) -> slice:
-        """Where the static entries are in a local vector."""
+        """Return the slice of the static entries of a local vector."""
         size = self.local_size(stage)
         return slice(size - len(self.statics), size)
 
     def knot_part(self, stage: int) -> slice:
-        """Where the knots are in a local vector."""
+        """Return the slice of the knots of a local vector."""
         return slice(self.node_size(stage), self.local_size(stage) - len(self.statics))
 
     def states(self, stage: int) -> range:

@@ -115,11 +115,11 @@ class NlpPart(ca.Callback):
         return len(self.outputs)
 
     def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        """Of an input."""
+        """Return the sparsity of an input."""
         return self.inputs[index]
 
     def get_sparsity_out(self, index: int) -> ca.Sparsity:
-        """Of an output."""
+        """Return the sparsity of an output."""
         return self.outputs[index]
 
     def eval(self, arguments: Sequence[Any]) -> list[Any]:

@@ -33,7 +33,7 @@ class NlpMultipliers:
     barrier: float
 
     def by_name(self, nlp: MultipleShootingNlp) -> dict[str, Array]:
-        """By what they belong to; empty where there are none."""
+        """Map multipliers to what they belong to; empty if there are none."""
         if not self.rows.size:
             return {}
         layout = nlp.layout
@@ -47,7 +47,7 @@ class NlpMultipliers:
 
 
 def fitted(nlp: MultipleShootingNlp, saved: Mapping[str, Array]) -> NlpMultipliers | None:
-    """What ``by_name`` has returned, in the layout of this program; None for other nodes or limits.
+    """Arrange the result of ``by_name`` in the layout of this program; None if nodes or limits differ.
 
     Steps may be shorter or longer: nodes are compared as shares of the duration.
     """

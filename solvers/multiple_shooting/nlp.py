@@ -113,12 +113,12 @@ class MultipleShootingNlp:
         return self._shots
 
     def largest_defect(self, z: Array) -> float:
-        """With all nodes at their references."""
+        """Start with all nodes at their references."""
         nodes = np.zeros(self.layout.nodes.shape)
         return float(np.abs(self.shots(self.pack(z, nodes)).defects).max())
 
     def objective(self, w: Array) -> float:
-        """At w."""
+        """Return the objective at w."""
         return self.shots(w).measured[0]
 
     def constraints(self, w: Array) -> Array:

@@ -108,7 +108,7 @@ class Shots:
 
     @cached_property
     def expansion(self) -> Expansion:
-        """Of the objective alone."""
+        """Return the value of the objective."""
         none = np.zeros(len(self.plan.problem.lower))
         return self.plan.problem.expand(self.motion, none, none)
 
@@ -119,7 +119,7 @@ class Shots:
 
     @cached_property
     def slopes(self) -> list[StageSlopes]:
-        """Of all stages."""
+        """Return the slopes of all stages."""
         linearized = self.plan.problem.linearize(self.motion)
         transport = transported(self.plan.problem, self.plan.reference, self.ends, self.plan.curved)
         return [
@@ -129,7 +129,7 @@ class Shots:
 
     @cached_property
     def gradients(self) -> list[Array]:
-        """Of the objective by the local vector of each stage."""
+        """Return the gradient of the objective by the local vector of each stage."""
         e, grid, found = self.expansion, self.plan.grid, []
         for stage, slopes in enumerate(self.slopes):
             states, steps = list(grid.states(stage)), slice(grid.starts[stage], grid.starts[stage] + len(slopes.inputs))

@@ -62,7 +62,7 @@ def average(values: Values, scale: Array, clip: float, fallen: float) -> Gradien
 
 
 def mean(numbers: Array) -> float:
-    """Of those that there are."""
+    """Return the mean of the numbers that are finite."""
     return float(numbers.mean()) if numbers.size else np.nan
 
 

@@ -53,18 +53,18 @@ class NominalCandidates:
         self.evaluator = evaluator
 
     def rate(self, Z: Sequence[Array], generation: int) -> list[Point]:
-        """See ``Candidates``."""
+        """Implement ``Candidates.rate``."""
         return self.evaluator.values(Z)
 
     def keep(self, z: Array, generation: int, due: bool = False) -> None:
-        """See ``Candidates``."""
+        """Implement ``Candidates.keep``."""
 
     def converged(self) -> StopReason:
-        """See ``Candidates``."""
+        """Implement ``Candidates.converged``."""
         return converged(self.evaluator)
 
     def conclude(self, reason: StopReason, start: Array) -> StopReason:
-        """See ``Candidates``."""
+        """Implement ``Candidates.conclude``."""
         return reason
 
 
@@ -85,7 +85,7 @@ class SampledCandidates:
         self.validation = Validation(evaluator, batch, log)
 
     def rate(self, Z: Sequence[Array], generation: int) -> list[Point]:
-        """See ``Candidates``: means; a candidate with one motion that is not finite is none."""
+        """Implement ``Candidates.rate``: means; a candidate with a motion that is not finite is not finite."""
         scenario, batch, each = self.evaluator.scenario, self.validation.batch, self.rollouts
         stream = np.random.default_rng([batch.seed, SAMPLES, generation])
         drawn = scenario.draw(stream, each, self.width, generation % len(scenario.grids))
@@ -109,14 +109,14 @@ class SampledCandidates:
         ]
 
     def keep(self, z: Array, generation: int, due: bool = False) -> None:
-        """See ``Candidates``."""
+        """Implement ``Candidates.keep``."""
         if due or generation % self.every == 0:
             self.validation.keep(self.evaluator.clip(z))
 
     def converged(self) -> StopReason:
-        """See ``Candidates``."""
+        """Implement ``Candidates.converged``."""
         return StopReason(Status.CONVERGED)
 
     def conclude(self, reason: StopReason, start: Array) -> StopReason:
-        """See ``Candidates``."""
+        """Implement ``Candidates.conclude``."""
         return self.validation.conclude(reason, start)

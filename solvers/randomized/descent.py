@@ -77,7 +77,7 @@ class DescentOptions(SolverOptions):
         return self.rate * min(1.0, max(self.last, left))
 
     def batch(self, seed: int) -> ValidationBatch:
-        """For validation."""
+        """Set up validation."""
         return ValidationBatch(self.validation, self.validation_width, seed)
 
     def validates(self, iteration: int) -> bool:
@@ -172,13 +172,13 @@ class Descent(Method[DescentState], Generic[OptionsT]):
         return self.conclude(state, StopReason(Status.BUDGET, DONE))
 
     def conclude(self, state: DescentState, reason: StopReason) -> StopReason:
-        """See ``Method``: the last point may be kept, and so it is validated, unless it was."""
+        """Implement ``Method.conclude``: the last point may be kept, so it is validated, unless it was."""
         if state.iteration and not self.options.validates(state.iteration):
             self.validation.keep(state.z)
         return self.validation.conclude(reason, self.start)
 
     def resume(self, saved: dict[str, Any]) -> DescentState:
-        """See ``Method``."""
+        """Implement ``Method.resume``."""
         return revive(DescentState, saved, DirectionMemory)
 
     def draw(self, iteration: int) -> ScenarioSamples:
