@@ -77,7 +77,7 @@ class BudgetUse:
         return self._smoothing.index(self._row.smoothing) if known and self._row else 0
 
     def _bounds(self, row: TraceRow) -> list[tuple[str, float, float]]:
-        """Yield for each bound of a stage the column of the row, the used amount and the limit."""
+        """Return for each bound of a stage the column of the row, the used amount and the limit."""
         return [
             (number, getattr(row, number) - self._begin[number], self._limits[key])
             for key, number in BOUNDED.items()

@@ -149,7 +149,7 @@ def build(evaluator: CountingEvaluator, options: IpoptOptions, iterations: int, 
     """The nlpsol over x = z / scale, with the smoothing as its parameter."""
     if evaluator.problem.nlp.expression is None:
         raise SymphysError(
-            "IPOPT needs expressions, which nets this large and bodies this many do not have; take gradient or cma"
+            "IPOPT needs expressions, which nets this large do not have; take gradient or cma"
         )
     nlp, derivatives = functions(evaluator.problem.nlp, evaluator.scale, options.hessian == "exact")
     own = {

@@ -62,7 +62,7 @@ def average(values: Values, scale: Array, clip: float, fallen: float) -> Gradien
 
 
 def mean(numbers: Array) -> float:
-    """Return the mean of the numbers that are finite."""
+    """Return the mean; nan without numbers."""
     return float(numbers.mean()) if numbers.size else np.nan
 
 
