@@ -13,8 +13,8 @@ from symphys.export.moving.trial import tried_model
 from symphys.export.sources import c_files
 from symphys.problem import Problem, require_solvable
 from symphys.problem.loading import Source, load
-from symphys.transcription import transcribe
 from symphys.transcription.network_rollout import require_small_nets
+from symphys.transcription.transcribe import transcribe_whole
 from symphys.version import __version__
 
 
@@ -87,7 +87,7 @@ def contents_of(problem: Problem, kinds: list[str]) -> Iterator[tuple[str, dict[
     if "c" in kinds or "casadi" in kinds:
         require_solvable(problem)
         require_small_nets(problem, "export")
-        transcription = transcribe(problem, backend="casadi")
+        transcription = transcribe_whole(problem, exact=False, backend="casadi", threads=None)
     if "c" in kinds:
         yield "c", c_files(transcription, __version__)
     if "casadi" in kinds:
