@@ -53,12 +53,12 @@ def link_freedoms(start: StartState, reference: StartState, link: Link, body: in
         return [Freedom(element, np.array([1.0, 0, 0, 0]), turned.T @ spin)]
     found = []
     turned = link.sign * reference.axes(body).T
-    directions, values, now = reference.directions(joint), reference.values(joint), start.values(joint)
+    values, now = reference.values(joint), start.values(joint)
     rates = plain(start.readings[joint.name].rate)
-    for k, direction in enumerate(directions):
+    for k, (slide, turn) in enumerate(reference.motions(joint)):
         turns = joint.kind.coordinates[k].turns
         attributes = {"name": names(joint)[k], "type": "hinge" if turns else "slide", "pos": place}
-        attributes["axis"] = text(tidy(turned @ direction))
+        attributes["axis"] = text(tidy(turned @ (turn if turns else slide)))
         if values[k]:
             attributes["ref"] = text(values[[k]])
         found.append(Freedom(Element("joint", attributes | acting(joint)), now[[k]], rates[[k]]))

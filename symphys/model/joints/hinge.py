@@ -17,9 +17,4 @@ def angle(placed: PlacedFrames) -> Expr:
     return angle_of(sin, cos)
 
 
-def axis(placed: PlacedFrames) -> Expr:
-    """X of the second side."""
-    return placed.b[:, 0]
-
-
-HINGE = Kind("hinge", turns=((0, 1), (0, 2)), coordinates=(Coordinate("angle", True, angle, axis),))
+HINGE = Kind("hinge", turns=((0, 1), (0, 2)), coordinates=(Coordinate("angle", angle),))

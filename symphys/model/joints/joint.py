@@ -134,4 +134,4 @@ class Joint:
     @property
     def locked(self) -> int:
         """How many rows it locks."""
-        return (3 if self.kind.slides is None else len(self.kind.slides)) + len(self.kind.turns)
+        return self.kind.locked

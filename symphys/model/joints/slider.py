@@ -13,9 +13,5 @@ def position(placed: PlacedFrames) -> Expr:
     return ca.dot(placed.apart, placed.b[:, 0])
 
 
-def axis(placed: PlacedFrames) -> Expr:
-    """X of the second side."""
-    return placed.b[:, 0]
-
-
-SLIDER = Kind("slider", (1, 2), ((0, 1), (1, 2), (2, 0)), (Coordinate("position", False, position, axis),))
+ALONG = Coordinate("position", position, turns=False, lead=1.0)
+SLIDER = Kind("slider", (1, 2), ((0, 1), (1, 2), (2, 0)), (ALONG,))

@@ -25,7 +25,7 @@ UNIVERSAL = Kind(
     "universal",
     turns=((0, 1),),
     coordinates=(
-        Coordinate("angle1", True, swing, lambda placed: placed.b[:, 1]),
-        Coordinate("angle2", True, twist, lambda placed: placed.a[:, 0], fixed_in_first=True),
+        Coordinate("angle1", swing, axis=1),
+        Coordinate("angle2", twist, axis=0, fixed_in_first=True),
     ),
 )

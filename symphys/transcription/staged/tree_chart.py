@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from symphys.dynamics.articulated import spatial
 from symphys.dynamics.articulated.forward_kinematics import HERE, JointStart, final_poses
 from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames_at
 from symphys.maths import rotation
@@ -98,8 +97,7 @@ class TreeChart:
                 velocity, spin = moving[body]
                 linear += sign * (velocity + ca.cross(spin, arm))
                 angular += sign * spin
-            for slide, turn in spatial.free_motions_of(joint, placed):
-                found.append(ca.dot(slide, linear) + ca.dot(turn, angular))
+            found += joint.kind.rates(placed, linear, angular)
         return ca.vertcat(ca.SX(0, 1), *found)
 
     def velocities(self, poses: Mapping[int, Pose], rates: Expr) -> dict[int, Moving]:
@@ -115,7 +113,7 @@ class TreeChart:
             above, mine = (arms[1], arms[0]) if link.sign > 0 else arms
             velocity, spin = (ca.SX.zeros(3), ca.SX.zeros(3)) if link.parent is None else found[link.parent]
             linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
-            for k, (slide, turn) in enumerate(spatial.free_motions_of(joint, frames.placed(NOW))):
+            for k, (slide, turn) in enumerate(joint.kind.motions(frames.placed(NOW))):
                 linear, angular = linear + own[k] * slide, angular + own[k] * turn
             after = spin + link.sign * angular
             at = velocity + ca.cross(spin, above) + link.sign * linear
@@ -168,11 +166,8 @@ class TreeChart:
         """The joint as it is: what it is off is part of how its sides are apart."""
         frames = self._frames(joint, poses)
         placed, arms = frames.placed(NOW), tuple(arm.at(NOW) for arm in frames.arms)
-        turning = [c.turns for c in joint.kind.coordinates] or [True] * link.count
-        free = spatial.free_motions_of(joint, placed)
-        axes = [turn if turns else slide for turns, (slide, turn) in zip(turning, free, strict=True)]
         ordered = (arms[1], arms[0]) if link.sign > 0 else (arms[0], arms[1])
-        return JointStart(ordered, placed.apart, ca.horzcat(ca.SX(3, 0), *axes), HERE.turn)
+        return JointStart(ordered, placed.apart, joint.kind.axes(placed), HERE.turn)
 
     def _turned(self, link: Link, before: Mapping[int, Pose], after: Mapping[int, Pose]) -> Expr:
         """(3,) rotation vector of a ball joint's first side against its second; see ``final_poses``."""
