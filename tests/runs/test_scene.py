@@ -205,7 +205,7 @@ def test_joints_are_told_with_all_that_a_report_needs(tmp_path: Path) -> None:
     assert (elbow["name"], elbow["kind"], elbow["first"], elbow["second"]) == ("elbow", "hinge", "lower", "upper")
     assert elbow["motor"] == {"kind": "servo", "gain": 20, "torque": 12, "velocity": 8}
     assert elbow["limits"] == [None, 2]
-    assert elbow["coordinates"] == [{"name": "angle", "turns": True}]
+    assert elbow["coordinates"] == [{"name": "angle", "turns": True, "side": 1, "axis": 0}]
     assert [frame["point"] for frame in elbow["sockets"]] == [[0, 0, 0.5], [0, 0, -0.5]]
     turned = Rotation.from_quat(np.roll(elbow["sockets"][0]["orientation"], -1))
     np.testing.assert_allclose(turned.apply([1, 0, 0]), [0, 1, 0], atol=1e-12)

@@ -9,8 +9,9 @@ the complement of S.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
@@ -94,10 +95,22 @@ class Kind:
         coordinates: what is left. Axes of the second frame come before those of the first.
     """
 
+    units: ClassVar[Mapping[str, str]] = {}
+    """The units of ``numbers``."""
+
     name: str
     slides: tuple[int, ...] | None = None
     turns: tuple[tuple[int, int], ...] = ()
     coordinates: tuple[Coordinate, ...] = ()
+
+    @property
+    def numbers(self) -> dict[str, Scalar]:
+        """Numbers of its own by their keys in problem files; variables may set them."""
+        return {}
+
+    def valued(self, numbers: Mapping[str, Scalar]) -> Kind:
+        """The same kind with other ``numbers``."""
+        return self
 
     @property
     def travels(self) -> bool:

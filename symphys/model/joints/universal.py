@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
 import casadi as ca
 
 from symphys.maths.smoothing import angle_of
+from symphys.model.joints.frames import two_axes
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
-from symphys.types import Expr
+from symphys.model.joints.specs import AXIS, MovingJoint, Vector
+from symphys.types import Array, Expr
 
 
 def swing(placed: PlacedFrames) -> Expr:
@@ -29,3 +34,40 @@ UNIVERSAL = Kind(
         Coordinate("angle2", twist, axis=0, fixed_in_first=True),
     ),
 )
+
+
+@dataclass(frozen=True)
+class UniversalJoint(MovingJoint):
+    """The second turns about two axes (Cardan).
+
+    Attributes:
+        axes: two of (3,), perpendicular to each other, as the bodies lie, world coordinates; the first stays with the
+            first body, the second with the second.
+    """
+
+    summary: ClassVar[str] = "turns about two axes"
+    example: ClassVar[str] = "{ axes = [[0, 1, 0], [1, 0, 0]] }"
+
+    axes: tuple[Vector, Vector] = field(
+        kw_only=True,
+        metadata={
+            "value": "directions",
+            "about": "two, perpendicular to each other: the first stays with the first body, the second with the "
+            f"second; each {AXIS}",
+        },
+    )
+
+    @property
+    def kind(self) -> Kind:
+        """What it leaves free."""
+        return UNIVERSAL
+
+    @property
+    def frame_axes(self) -> Array:
+        """See ``JointSpec``."""
+        return two_axes(self.axes)
+
+    @classmethod
+    def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
+        """See ``JointSpec``."""
+        return {"axes": [axes[:, 1].tolist(), axes[:, 0].tolist()]}
