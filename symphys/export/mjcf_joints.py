@@ -1,15 +1,18 @@
-"""Joints of trees as MJCF joints of the child, and the start as numbers of a keyframe."""
+"""Joints of trees as MJCF joints of the child, the start as numbers of a keyframe, and what ties coordinates."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from symphys.export.mjcf_bodies import NestedBody, StartState, plain, tidy
 from symphys.export.mjcf_surfaces import text
 from symphys.model.joints import Joint, Link
+from symphys.model.joints.coupling import JointCoupling
 from symphys.model.scalar import is_zero
 from symphys.types import Array
 
@@ -94,3 +97,22 @@ def names(joint: Joint) -> list[str]:
     """Of the coordinates."""
     coordinates = joint.kind.coordinates
     return [joint.name] if len(coordinates) == 1 else [f"{joint.name}.{c.name}" for c in coordinates]
+
+
+def joint_equalities(reference: StartState) -> Iterator[Element]:
+    """The equality constraints between coordinates: of every coupling."""
+    for coupling in reference.world.couplings:
+        yield coupled(reference, coupling)
+
+
+def coupled(reference: StartState, coupling: JointCoupling) -> Element:
+    """A coupling; MuJoCo counts coordinates from where they are in the file, and the polynomial with them."""
+    joints = [reference.world.joints[k] for k in (coupling.first, coupling.second) if k is not None]
+    shifts = [float(reference.values(joint)[0]) for joint in joints]
+    polynomial = Polynomial([float(c) for c in coupling.polynomial])
+    polynomial = polynomial(Polynomial([shifts[1], 1.0])) if len(shifts) > 1 else Polynomial([polynomial(0.0)])
+    numbers = np.zeros(5)
+    numbers[: len(polynomial.coef)] = polynomial.coef
+    numbers[0] -= shifts[0]
+    attributes = {f"joint{k + 1}": joint.name for k, joint in enumerate(joints)}
+    return Element("joint", {"name": coupling.name, **attributes, "polycoef": text(numbers)})

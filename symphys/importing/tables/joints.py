@@ -1,4 +1,4 @@
-"""Joints of a model as [[joint]] tables, with frames between several joints of one body."""
+"""Joints of a model as [[joint]] tables, with frames between several joints of one body, and their couplings."""
 
 from __future__ import annotations
 
@@ -57,6 +57,42 @@ def chain(reading: ModelReading, link: WeldedLink) -> tuple[list[dict[str, Any]]
     if parent is not None and len(indices) > 1:
         reading.apart.append((parent.name, link.name))
     return frames, joints
+
+
+def read_couplings(reading: ModelReading) -> list[dict[str, Any]]:
+    """The [[coupling]] tables, of the equality constraints of coordinates."""
+    model, found = reading.model, list[dict[str, Any]]()
+    for equality in range(model.neq):
+        if int(model.eq_type[equality]) == int(reading.library.mjtEq.mjEQ_JOINT) and reading.holds(equality):
+            table = coupling(reading, equality)
+            found += [table] if table else []
+    reading.rigid += len(found)
+    return found
+
+
+def coupling(reading: ModelReading, equality: int) -> dict[str, Any] | None:
+    """A coordinate that follows another; both are 0 at the reference pose, in MuJoCo too."""
+    model = reading.model
+    ids = [int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])]
+    used = [joint for joint in ids if joint >= 0]
+    known = all(joint in reading.joint_names for joint in used)
+    if not known or any(model.jnt_type[joint] not in (HINGE, SLIDE) for joint in used):
+        reading.note("left out", reading.called("equality", equality), "it must be between hinges and sliders")
+        return None
+    if len({root_of(reading, int(model.jnt_bodyid[joint])) for joint in used}) > 1:
+        text = "its joints hang on the world one by one, and coordinates are coupled within a robot only"
+        reading.note("left out", reading.called("equality", equality), text)
+        return None
+    name = reading.names.give("coupling", reading.name("equality", equality), "coupling")
+    polynomial = numbers(np.array(model.eq_data[equality][:5]))
+    return {"name": name, "joints": [reading.joint_names[joint] for joint in used], "polynomial": polynomial}
+
+
+def root_of(reading: ModelReading, body: int) -> int:
+    """The top body of the link from which all others of its tree hang."""
+    link = reading.links[body]
+    above = reading.links.get(int(reading.model.body_parentid[link.top]))
+    return link.top if above is None else root_of(reading, above.top)
 
 
 def screws_of(reading: ModelReading, joint: int) -> list[Screw]:
