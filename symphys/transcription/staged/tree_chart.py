@@ -120,13 +120,20 @@ class TreeChart:
             found[link.body] = at - ca.cross(after, mine), after
         return found
 
-    def held(self, poses: Mapping[int, Pose]) -> Expr:
-        """(7 a joint,) how the frames of each joint lie to each other: rotation (4), place in the second (3) [m]."""
+    def held(self, poses: Mapping[int, Pose], angles: Mapping[str, Expr]) -> Expr:
+        """(7 a joint,) how the frames of each joint lie to each other: rotation (4), place in the second (3) [m].
+
+        A screw has its coordinate beside, and the place less what its pitch makes of that. ``angles``: see
+        ``coordinates``.
+        """
         found = []
         for _, joint in self._links():
             if joint is not None:
                 (first, a), (second, b) = self._sides(joint, poses)
                 found += [rotation.multiply(inverse(b), a), rotation.rotate(inverse(b), first - second)]
+                if joint.kind.screws:
+                    found.append(self.coordinates(joint, poses, angles))
+                    found[-2] = found[-2] - _along(joint, found[-1])
         return ca.vertcat(ca.SX(0, 1), *found)
 
     def rebuilt(self, poses: Mapping[int, Pose], held: Expr) -> dict[int, Pose]:
@@ -137,6 +144,10 @@ class TreeChart:
                 found[link.body] = poses[link.body]
                 continue
             turn, apart = held[row : row + 4], held[row + 4 : row + 7]
+            row += 7
+            if joint.kind.screws:
+                apart = apart + _along(joint, held[row : row + link.count])
+                row += link.count
             own, other = joint.frames if link.sign > 0 else joint.frames[::-1]
             parent = HOME if link.parent is None else found[link.parent]
             place, q = _frame(parent, other)
@@ -147,7 +158,6 @@ class TreeChart:
                 place = place - rotation.rotate(q, apart)
             q = rotation.multiply(q, inverse(ca.vertcat(*own.orientation)))
             found[link.body] = place - rotation.rotate(q, ca.vertcat(*own.point)), q
-            row += 7
         return found
 
     def _sides(self, joint: Joint, poses: Mapping[int, Pose]) -> tuple[Pose, Pose]:
@@ -176,6 +186,12 @@ class TreeChart:
             parent = rotation.multiply(after[link.parent][1], inverse(before[link.parent][1]))
             own = rotation.multiply(inverse(parent), own)
         return link.sign * rotation.logarithm(own)
+
+
+def _along(joint: Joint, values: Expr) -> Expr:
+    """(3,) [m], second frame: how far coordinates (count,) move the first frame away."""
+    axes = ca.DM.eye(3)[:, [each.axis for each in joint.kind.coordinates]]
+    return joint.kind.transform(axes, values)[1]
 
 
 def _frame(pose: Pose, frame: JointFrame) -> Pose:
