@@ -38,7 +38,8 @@ def kinds_of_joints() -> type[SchemaTable]:
             for each in spec.own_fields()
         }
         name = f"{word.capitalize()}JointTable"
-        table = create_model(name, __base__=SchemaTable, __doc__=spec.summary, __module__=__name__, **keys)
+        about = f"{spec.summary[:1].upper()}{spec.summary[1:]}."
+        table = create_model(name, __base__=SchemaTable, __doc__=about, __module__=__name__, **keys)
         found[word] = (table | None, Field(default=None, description=f"{spec.example}: {spec.summary}"))
     return create_model("KindsOfJointsTable", __base__=HeldTable, __module__=__name__, **found)
 
