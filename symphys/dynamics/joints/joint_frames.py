@@ -94,6 +94,5 @@ def locked(joint: Joint, placed: PlacedFrames) -> Directions:
 
 
 def free(coordinate: Coordinate, placed: PlacedFrames) -> Directions:
-    """The direction of a coordinate: of a screw that of its torque."""
-    axis = coordinate.direction(placed).T
-    return Directions(ca.SX(0, 3), axis) if coordinate.turns else Directions(axis, ca.SX(0, 3))
+    """The direction of a coordinate."""
+    return Directions(*coordinate.along(placed))

@@ -82,6 +82,11 @@ class Coordinate:
         axis, none = self.direction(placed), ca.DM.zeros(3)
         return self.lead * axis if self.slides else none, axis if self.turns else none
 
+    def along(self, placed: PlacedFrames) -> tuple[Expr, Expr]:
+        """Rows (m, 3) of forces and (n, 3) of torques that act along the value; of a screw its torque."""
+        axis, none = self.direction(placed).T, ca.SX(0, 3)
+        return (none, axis) if self.turns else (axis, none)
+
 
 @dataclass(frozen=True)
 class Kind:
