@@ -81,7 +81,7 @@ class StartState:
         return zero if closed else self
 
     def motions(self, joint: Joint) -> list[tuple[Array, Array]]:
-        """Displacement and rotation (3,) of the first side by each coordinate, world frame."""
+        """Return displacement and rotation (3,) of the first side per unit of each coordinate, world frame."""
         poses = tuple((ca.SX(self.of(i, "position")), ca.SX(self.of(i, "orientation"))) for i in joint.bodies)
         placed = joint_frames_at(joint, poses).placed(ca.SX(0))
         return [(plain(slide), plain(turn)) for slide, turn in joint.kind.motions(placed)]

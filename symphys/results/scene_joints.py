@@ -13,7 +13,7 @@ from symphys.json_values import Text
 from symphys.types import Array
 
 AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
-"""``SceneJoint.axes`` by the kind of joint, for files that do not have them."""
+"""``SceneJoint.axes`` by the kind of joint, for files without them."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class SceneJoint:
 
     @property
     def axes(self) -> tuple[tuple[int, int], ...]:
-        """For each coordinate its side and which of the axes of that side's frame it goes about or along."""
+        """Return for each coordinate the side whose frame carries its axis, and which axis of it that is."""
         known = tuple((each.side, each.axis) for each in self.coordinates)
         whole = all(0 <= side < 2 and 0 <= axis < 3 for side, axis in known)
         return known if known and whole else AXES.get(self.kind, ())

@@ -68,7 +68,7 @@ class ModelReading:
         findings: what became of parts, in order.
         links: by the index of each body, the link that it belongs to; bodies that the world holds have none.
         joint_names: of joints, by index; of a free joint that of its body.
-        rigid: how many equality constraints were taken over.
+        rigid: number of equality constraints that were taken over.
         static_names: of what stands still, by the index of its geom.
         site_names: of sites, by index.
         key: the index of the keyframe that the robot begins at; None: the reference pose.

@@ -13,7 +13,7 @@ from symphys.model.joints.specs import JointSpec, MovingJoint
 from symphys.model.joints.universal import UNIVERSAL, UniversalJoint
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in (BALL, FIXED, HINGE, SLIDER, UNIVERSAL)}
-"""Those without numbers of their own."""
+"""Kinds without numbers of their own, by name."""
 JOINTS: dict[str, type[JointSpec]] = {
     "ball": BallJoint,
     "hinge": Hinge,
@@ -21,7 +21,7 @@ JOINTS: dict[str, type[JointSpec]] = {
     "universal": UniversalJoint,
     "fixed": FixedJoint,
 }
-"""All kinds, by their names in problem files."""
+"""Descriptions of all kinds, by their names in problem files."""
 
 __all__ = [
     "BALL",

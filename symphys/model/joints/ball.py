@@ -19,5 +19,5 @@ class BallJoint(JointSpec):
 
     @property
     def kind(self) -> Kind:
-        """What it leaves free."""
+        """Return the kind of joint."""
         return BALL

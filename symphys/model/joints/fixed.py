@@ -20,5 +20,5 @@ class FixedJoint(JointSpec):
 
     @property
     def kind(self) -> Kind:
-        """What it leaves free."""
+        """Return the kind of joint."""
         return FIXED

@@ -133,5 +133,5 @@ class Joint:
 
     @property
     def locked(self) -> int:
-        """How many rows it locks."""
+        """Return the number of locked rows."""
         return self.kind.locked

@@ -1,4 +1,4 @@
-"""A kind of joint as data: the screws that it leaves free, and what it locks.
+"""Kinds of joints as data: the screws that a kind leaves free, and the rows that it locks.
 
 Each side carries a frame, a point with three axes. ``a`` are the axes of the first side's frame, ``b`` those of the
 second's: columns of (3, 3), world frame. At coordinates 0 the frames coincide. Each coordinate is a screw about or
@@ -60,7 +60,7 @@ class Coordinate:
 
     @property
     def slides(self) -> bool:
-        """Whether the first side moves along the axis; a matter of structure."""
+        """Whether the first side moves along the axis; it depends on structure, not on a symbol's value."""
         return not is_zero(self.lead)
 
     @property
@@ -70,27 +70,27 @@ class Coordinate:
 
     @property
     def unit(self) -> str:
-        """The unit of the value."""
+        """Return the unit of the value."""
         return "rad" if self.turns else "m"
 
     def direction(self, placed: PlacedFrames) -> Expr:
-        """(3,) unit vector, world frame: the axis."""
+        """Return the axis, a unit vector (3,), world frame."""
         return (placed.a if self.fixed_in_first else placed.b)[:, self.axis]
 
     def motion(self, placed: PlacedFrames) -> tuple[Expr, Expr]:
-        """The displacement and the rotation (3,) of the first side by the value, world frame: a column of S."""
+        """Return a column of S: displacement and rotation (3,) of the first side per unit of the value, world frame."""
         axis, none = self.direction(placed), ca.DM.zeros(3)
         return self.lead * axis if self.slides else none, axis if self.turns else none
 
     def along(self, placed: PlacedFrames) -> tuple[Expr, Expr]:
-        """Rows (m, 3) of forces and (n, 3) of torques that act along the value; of a screw its torque."""
+        """Return rows (m, 3) of forces and (n, 3) of torques that act along the value; a screw has a torque."""
         axis, none = self.direction(placed).T, ca.SX(0, 3)
         return (none, axis) if self.turns else (axis, none)
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What a joint leaves free, and what it locks.
+    """The motions that a kind of joint leaves free, and those that it locks.
 
     Attributes:
         name: in problem files.
@@ -101,7 +101,7 @@ class Kind:
     """
 
     units: ClassVar[Mapping[str, str]] = {}
-    """The units of ``numbers``."""
+    """Units of ``numbers``."""
 
     name: str
     slides: tuple[int, ...] | None = None
@@ -110,11 +110,11 @@ class Kind:
 
     @property
     def numbers(self) -> dict[str, Scalar]:
-        """Numbers of its own by their keys in problem files; variables may set them."""
+        """Return the numbers of the kind by their keys in problem files; variables may set them."""
         return {}
 
     def valued(self, numbers: Mapping[str, Scalar]) -> Kind:
-        """The same kind with other ``numbers``."""
+        """Return this kind with other ``numbers``."""
         return self
 
     @property
@@ -124,22 +124,22 @@ class Kind:
 
     @property
     def screws(self) -> tuple[Coordinate, ...]:
-        """The coordinates that turn and move along their axis: each locks one of these to the other."""
+        """Return the coordinates that turn and slide at once; each adds a row that ties displacement to rotation."""
         return tuple(each for each in self.coordinates if each.is_screw)
 
     @property
     def held(self) -> int:
-        """How many of the locked rows are displacements; they come first."""
+        """Return the number of locked rows that are displacements; they come first."""
         return 3 if self.slides is None else len(self.slides) + len(self.screws)
 
     @property
     def locked(self) -> int:
-        """How many rows are locked."""
+        """Return the number of locked rows."""
         return self.held + len(self.turns)
 
     @property
     def free(self) -> int:
-        """How many motions are left, with coordinates or without."""
+        """Return the number of free motions, with coordinates or without."""
         return 6 - self.locked
 
     @property
@@ -149,37 +149,37 @@ class Kind:
 
     @property
     def turning(self) -> bool:
-        """Whether what is left are rotations, else displacements."""
+        """Whether the free motions are rotations, else displacements."""
         return not self.coordinates or self.coordinates[0].turns
 
     @property
     def quantity(self) -> str:
-        """What formulas call its coordinates: ``angle`` or ``position``."""
+        """Return the name of the coordinates in formulas, ``angle`` or ``position``."""
         return "angle" if self.turning else "position"
 
     def axes(self, placed: PlacedFrames) -> Expr:
-        """(3, free) unit vectors, world frame: of the coordinates; where there are none, the second frame's."""
+        """Return the axes of the free motions, unit vectors (3, free), world frame."""
         if not self.coordinates:
             return placed.b[:, : self.free]
         return ca.horzcat(*(each.direction(placed) for each in self.coordinates))
 
     def motions(self, placed: PlacedFrames) -> list[tuple[Expr, Expr]]:
-        """S: (displacement, rotation) (3,) each of the first side against the second, for each motion left free."""
+        """Return S: displacement and rotation (3,) of the first side against the second, for each free motion."""
         if self.coordinates:
             return [each.motion(placed) for each in self.coordinates]
         return [(ca.DM.zeros(3), axis) for axis in ca.horzsplit(self.axes(placed))] if self.free else []
 
     def rates(self, placed: PlacedFrames, linear: Expr, angular: Expr) -> list[Expr]:
-        """The rates of the free motions, as the first side moves against the second [m/s], [rad/s], world frame."""
+        """Return the rates of the free motions from velocity and angular velocity (3,) of the first side."""
         if self.coordinates:
             return [ca.dot(each.direction(placed), angular if each.turns else linear) for each in self.coordinates]
         return [ca.dot(turn, angular) for _, turn in self.motions(placed)]
 
     def transform(self, axes: Expr, moved: Expr) -> tuple[Expr, Expr]:
-        """X: the rotation (4,) and the displacement (3,) of the first side, its free motions going on by ``moved``.
+        """Compute X: rotation (4,) and displacement (3,) of the first side as its free motions go on by ``moved``.
 
         Args:
-            axes: (3, free) as they lie before.
+            axes: (3, free) of the free motions, where the motion begins.
             moved: (free,) [rad], [m].
         """
         if not self.coordinates:
@@ -196,11 +196,11 @@ class Kind:
         return ca.DM([1, 0, 0, 0]) if turn is None else turn, shift
 
     def locks(self, placed: PlacedFrames) -> tuple[Expr | None, Expr, Expr | None]:
-        """The complement of S: rows of what is locked, world frame.
+        """Return the locked rows, the complement of S, world frame.
 
         Returns:
-            (held, 3) along which no displacement is left, None: the world's three; (n, 3) about which no rotation is;
-            (held, 3) the rotations that displacements along the first rows go with, None: none.
+            (held, 3) axes along which displacement is locked, None: the world's three; (n, 3) axes about which
+            rotation is locked; (held, 3) shares of rotation in the rows of displacement, None: none.
         """
         turns = ca.vertcat(ca.DM(0, 3), *(ca.cross(placed.a[:, i], placed.b[:, j]).T for i, j in self.turns))
         if self.slides is None:
@@ -211,10 +211,10 @@ class Kind:
         return ca.vertcat(*rows, *axes), turns, ca.vertcat(ca.DM(len(rows), 3), *leads) if leads else None
 
     def errors(self, placed: PlacedFrames, near: Expr | None = None) -> Expr:
-        """(locked,): how far the joint is from what it locks [m], [rad].
+        """Compute the errors (locked,) of the locked rows [m], [rad].
 
-        ``near``: (k,) its coordinates to within half a turn, which tell how often a screw has turned; None: as often as
-        its displacement says.
+        ``near``: (k,) coordinates to within half a turn, which tell how often a screw has turned; None: its
+        displacement tells.
         """
         if self.slides is None:
             off = placed.apart
@@ -224,7 +224,7 @@ class Kind:
         return ca.vertcat(off, *(ca.dot(placed.a[:, i], placed.b[:, j]) for i, j in self.turns))
 
     def _off(self, k: int, placed: PlacedFrames, near: Expr | None) -> Expr:
-        """(1,), or (0,) of what is no screw: its displacement less that of its angle [m]."""
+        """Compute the displacement of a screw less that of its angle (1,) [m]; (0,) for other coordinates."""
         each = self.coordinates[k]
         if not each.is_screw:
             return ca.DM(0, 1)

@@ -47,15 +47,15 @@ class Slider(MovingJoint):
 
     @property
     def kind(self) -> Kind:
-        """What it leaves free."""
+        """Return the kind of joint."""
         return SLIDER
 
     @property
     def frame_axes(self) -> Array:
-        """See ``JointSpec``."""
+        """Return the axes (3, 3) of both frames as columns, as the bodies lie, world frame."""
         return single_axis(self.axis)
 
     @classmethod
     def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
-        """See ``JointSpec``."""
+        """Return the keys of its table in problem files."""
         return {"axis": axes[:, 0].tolist()}

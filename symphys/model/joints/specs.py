@@ -23,9 +23,9 @@ from symphys.types import Array
 Vector = Sequence[float] | Array
 """three of them"""
 AXIS = "[x, y, z], world coordinates at the start, any length but 0"
-"""What the schema of problem files says of an axis."""
+"""Description of an axis in the schema of problem files."""
 DIRECTION = {"value": "direction", "about": f"about or along which the second body moves: {AXIS}"}
-"""Metadata of a field that is the one axis of a kind."""
+"""Metadata of the field of a kind with one axis."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ class JointSpec:
     """
 
     summary: ClassVar[str]
-    """What the schema of problem files says of its table."""
+    """Description of its table in the schema of problem files."""
     example: ClassVar[str] = "{}"
-    """Its table in problem files."""
+    """An example of its table in problem files."""
     anywhere: ClassVar[bool] = False
     """Whether it needs no point."""
 
@@ -60,7 +60,7 @@ class JointSpec:
 
     @property
     def kind(self) -> Kind:
-        """What it leaves free."""
+        """Return the kind of joint."""
         raise NotImplementedError
 
     @property
@@ -70,12 +70,12 @@ class JointSpec:
 
     @classmethod
     def own_fields(cls) -> list[Field[Any]]:
-        """The fields that its table in problem files has as keys."""
+        """Return the fields that are keys of its table in problem files."""
         return [each for each in fields(cls) if "value" in each.metadata]
 
     @classmethod
     def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
-        """The keys of its table, from a kind of numbers and the axes (3, 3) of its frames where coordinates are 0."""
+        """Return the keys of its table from a kind of numbers and the axes (3, 3) of its frames at coordinates 0."""
         return {}
 
 

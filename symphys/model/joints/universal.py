@@ -59,15 +59,15 @@ class UniversalJoint(MovingJoint):
 
     @property
     def kind(self) -> Kind:
-        """What it leaves free."""
+        """Return the kind of joint."""
         return UNIVERSAL
 
     @property
     def frame_axes(self) -> Array:
-        """See ``JointSpec``."""
+        """Return the axes (3, 3) of both frames as columns, as the bodies lie, world frame."""
         return two_axes(self.axes)
 
     @classmethod
     def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
-        """See ``JointSpec``."""
+        """Return the keys of its table in problem files."""
         return {"axes": [axes[:, 1].tolist(), axes[:, 0].tolist()]}

@@ -59,7 +59,7 @@ class ParametricJoint:
         return f"{self.name}.anchor"
 
     def parameters(self) -> dict[str, Numbers]:
-        """Parameter names and values: those of kind, motor and spring, armature and friction if not 0, the anchor."""
+        """Return names and values of parameters: of kind, motor, spring, the anchor, armature and friction if not 0."""
         parts = [part for part in (self.motor, self.spring) if part is not None]
         found = {f"{self.name}.{key}": getattr(part, key) for part in parts for key in given(part)}
         found |= {f"{self.name}.{key}": number for key, number in self.kind.numbers.items()}

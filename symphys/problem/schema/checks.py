@@ -44,7 +44,7 @@ def is_number(value: object, bound: bool = False) -> TypeGuard[int | float]:
 
 
 def nonzero(value: object) -> float:
-    """A finite number but 0."""
+    """Return the value if it is a finite number but 0."""
     if not is_number(value) or value == 0:
         raise fault(f"must be a number but 0, not {shown(value)}")
     return float(value)

@@ -26,11 +26,11 @@ VALUES: dict[str, Any] = {
     "directions": Annotated[list[Vector], Field(min_length=2, max_length=2)],
     "nonzero": NonZero,
 }
-"""The values of keys of kinds of joints, by the metadata of ``JointSpec``."""
+"""Types of the keys of kinds of joints, by the metadata of ``JointSpec``."""
 
 
 def kinds_of_joints() -> type[SchemaTable]:
-    """A table with an optional table for each kind of joint, after what it holds together."""
+    """Make a table with an optional table for each kind of joint, after the keys of ``HeldTable``."""
     found: dict[str, Any] = {}
     for word, spec in JOINTS.items():
         keys: dict[str, Any] = {
@@ -45,7 +45,7 @@ def kinds_of_joints() -> type[SchemaTable]:
 
 
 class HeldTable(SchemaTable):
-    """What holds two bodies together, or a body to the world."""
+    """The name of a joint and the bodies that it connects."""
 
     name: Identifier = Field(description="how formulas, variables and settings refer to it")
     between: Annotated[list[str], Field(min_length=2, max_length=2)] = Field(

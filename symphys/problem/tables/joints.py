@@ -233,7 +233,7 @@ class JointReader:
                 self.add("between", f"no body is called {quote(name)}; {hint(name, known)}")
 
     def kind(self) -> str | None:
-        """The name of the one that is given."""
+        """Return the name of the kind that is given."""
         given = [name for name in JOINTS if getattr(self.table, name) is not None]
         if len(given) == 1:
             return given[0]

@@ -121,10 +121,9 @@ class TreeChart:
         return found
 
     def held(self, poses: Mapping[int, Pose], angles: Mapping[str, Expr]) -> Expr:
-        """(7 a joint,) how the frames of each joint lie to each other: rotation (4), place in the second (3) [m].
+        """Return how frames of joints lie to each other (7 a joint,): rotation (4), place in the second (3) [m].
 
-        A screw has its coordinate beside, and the place less what its pitch makes of that. ``angles``: see
-        ``coordinates``.
+        For a screw its coordinate follows, and the place is that at coordinate 0. ``angles``: see ``coordinates``.
         """
         found = []
         for _, joint in self._links():
@@ -189,7 +188,7 @@ class TreeChart:
 
 
 def _along(joint: Joint, values: Expr) -> Expr:
-    """(3,) [m], second frame: how far coordinates (count,) move the first frame away."""
+    """Return how far coordinates (count,) displace the first frame, (3,) [m], second frame."""
     axes = ca.DM.eye(3)[:, [each.axis for each in joint.kind.coordinates]]
     return joint.kind.transform(axes, values)[1]
 
