@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from symphys.export.mjcf_bodies import NestedBody, StartState, plain, tidy
+from symphys.export.mjcf_bodies import NestedBody, StartState, nesting_joints, plain, tidy
 from symphys.export.mjcf_surfaces import text
 from symphys.model.joints import Joint, Link
 from symphys.model.joints.coupling import JointCoupling
@@ -59,13 +59,22 @@ def link_freedoms(start: StartState, reference: StartState, link: Link, body: in
     values, now = reference.values(joint), start.values(joint)
     rates = plain(start.readings[joint.name].rate)
     for k, (slide, turn) in enumerate(reference.motions(joint)):
-        turns = joint.kind.coordinates[k].turns
-        attributes = {"name": names(joint)[k], "type": "hinge" if turns else "slide", "pos": place}
-        attributes["axis"] = text(tidy(turned @ (turn if turns else slide)))
-        if values[k]:
-            attributes["ref"] = text(values[[k]])
-        found.append(Freedom(Element("joint", attributes | acting(joint)), now[[k]], rates[[k]]))
+        coordinate = joint.kind.coordinates[k]
+        moves = [(names(joint)[k], "hinge" if coordinate.turns else "slide", 1.0, acting(joint))]
+        if coordinate.is_screw:
+            moves.append((slide_of(joint, k), "slide", float(coordinate.lead), {}))
+        for name, kind, share, parts in moves:
+            attributes = {"name": name, "type": kind, "pos": place}
+            attributes["axis"] = text(tidy(turned @ (turn if coordinate.turns else slide)))
+            if values[k]:
+                attributes["ref"] = text(share * values[[k]])
+            found.append(Freedom(Element("joint", attributes | parts), share * now[[k]], share * rates[[k]]))
     return found[:: link.sign]
+
+
+def slide_of(joint: Joint, k: int) -> str:
+    """Return the name of the slide that follows the hinge of a screw in MJCF."""
+    return f"{names(joint)[k]}.slide"
 
 
 def anchor(reference: StartState, link: Link, body: int) -> Array:
@@ -100,8 +109,15 @@ def names(joint: Joint) -> list[str]:
 
 
 def joint_equalities(reference: StartState) -> Iterator[Element]:
-    """The equality constraints between coordinates: of every coupling."""
-    for coupling in reference.world.couplings:
+    """Make the equality constraints between coordinates, of screws in trees and of couplings."""
+    world = reference.world
+    for joint in (world.joints[index] for index in sorted(nesting_joints(world))):
+        for k, coordinate in enumerate(joint.kind.coordinates):
+            if coordinate.is_screw:
+                tied = {"joint1": slide_of(joint, k), "joint2": names(joint)[k]}
+                numbers = text([0.0, float(coordinate.lead), 0.0, 0.0, 0.0])
+                yield Element("joint", {"name": f"{names(joint)[k]}.thread", **tied, "polycoef": numbers})
+    for coupling in world.couplings:
         yield coupled(reference, coupling)
 
 

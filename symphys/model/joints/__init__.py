@@ -3,6 +3,7 @@
 from symphys.model.joints.ball import BALL, BallJoint
 from symphys.model.joints.coupling import CouplingSpec, JointCoupling
 from symphys.model.joints.fixed import FIXED, FixedJoint
+from symphys.model.joints.helical import HelicalJoint, helical
 from symphys.model.joints.hinge import HINGE, Hinge
 from symphys.model.joints.joint import Joint, JointFrame, Limits, Spring
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
@@ -18,6 +19,7 @@ JOINTS: dict[str, type[JointSpec]] = {
     "ball": BallJoint,
     "hinge": Hinge,
     "slider": Slider,
+    "helical": HelicalJoint,
     "universal": UniversalJoint,
     "fixed": FixedJoint,
 }
@@ -36,6 +38,7 @@ __all__ = [
     "Coordinate",
     "CouplingSpec",
     "FixedJoint",
+    "HelicalJoint",
     "Hinge",
     "Joint",
     "JointCoupling",
@@ -56,6 +59,7 @@ __all__ = [
     "VelocityMotor",
     "carriers",
     "given_torque",
+    "helical",
     "kinematic_trees",
     "tree_joints",
 ]
