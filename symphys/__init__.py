@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         AffineMotor,
         BallJoint,
         FixedJoint,
+        HelicalJoint,
         Hinge,
         Servo,
         Slider,
@@ -76,6 +77,7 @@ __all__ = [
     "FixedJoint",
     "Fixture",
     "Heightfield",
+    "HelicalJoint",
     "Hinge",
     "Law",
     "Layout",
@@ -152,6 +154,7 @@ _HOMES = {
     "model.joints": (
         "BallJoint",
         "FixedJoint",
+        "HelicalJoint",
         "Hinge",
         "Slider",
         "UniversalJoint",

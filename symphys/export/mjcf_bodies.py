@@ -80,11 +80,11 @@ class StartState:
         closed = all(zero.gap(joint) <= APART for joint in world.joints if not joint.soft)
         return zero if closed else self
 
-    def directions(self, joint: Joint) -> list[Array]:
-        """(3,) of each coordinate: about which, or along which, the first side moves, world frame."""
+    def motions(self, joint: Joint) -> list[tuple[Array, Array]]:
+        """Return displacement and rotation (3,) of the first side per unit of each coordinate, world frame."""
         poses = tuple((ca.SX(self.of(i, "position")), ca.SX(self.of(i, "orientation"))) for i in joint.bodies)
         placed = joint_frames_at(joint, poses).placed(ca.SX(0))
-        return [plain(coordinate.axis(placed)) for coordinate in joint.kind.coordinates]
+        return [(plain(slide), plain(turn)) for slide, turn in joint.kind.motions(placed)]
 
 
 def tidy(numbers: Array) -> Array:

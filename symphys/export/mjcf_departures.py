@@ -9,6 +9,7 @@ from typing import Literal
 from symphys.export.folder import ExportError
 from symphys.export.mjcf_bodies import APART, StartState, loose_frames, nesting_joints
 from symphys.export.mjcf_equality import expressible_loop
+from symphys.export.mjcf_joints import joint_equalities
 from symphys.export.mjcf_terrain import deviation, window
 from symphys.model.heightfield import Heightfield
 from symphys.model.joints import Servo, VelocityMotor
@@ -140,5 +141,5 @@ def soft_departures(start: StartState) -> Iterator[Departure]:
     soft = tuple(joint.name for joint in closing if joint.soft)
     text = "a joint that gives way, as an equality constraint of the same frequency and damping ratio"
     yield Departure("approximated", soft, text)
-    coupled = tuple(coupling.name for coupling in world.couplings)
+    coupled = tuple(element.get("name", "") for element in joint_equalities(start.reference))
     yield Departure("approximated", coupled, "a coupling that is exact here and gives way there")

@@ -7,13 +7,12 @@ from math import pi
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from symphys.export.mjcf_bodies import StartState, nesting_joints
+from symphys.export.mjcf_joints import joint_equalities
 from symphys.export.mjcf_surfaces import text
 from symphys.maths import rotation
 from symphys.model.joints import Joint
-from symphys.model.joints.coupling import JointCoupling
 from symphys.model.world import World
 
 ARM = 0.05
@@ -35,8 +34,7 @@ def equalities(reference: StartState) -> Iterator[Element]:
     for k, joint in enumerate(world.joints):
         if k not in trees and expressible_loop(world, joint):
             yield from loop(world, joint)
-    for coupling in world.couplings:
-        yield coupled(reference, coupling)
+    yield from joint_equalities(reference)
 
 
 def loop(world: World, joint: Joint) -> Iterator[Element]:
@@ -66,16 +64,3 @@ def softness(joint: Joint) -> dict[str, str]:
     rate = 2 * pi * joint.frequency
     stiffness, damping = rate * rate, 2 * max(joint.damping, 1e-9) * rate
     return {"solref": text((-stiffness, -damping)), "solimp": text((IMPEDANCE, IMPEDANCE, 1.0, 0.5, 1.0))}
-
-
-def coupled(reference: StartState, coupling: JointCoupling) -> Element:
-    """A coupling; MuJoCo counts coordinates from where they are in the file, and the polynomial with them."""
-    joints = [reference.world.joints[k] for k in (coupling.first, coupling.second) if k is not None]
-    shifts = [float(reference.values(joint)[0]) for joint in joints]
-    polynomial = Polynomial([float(c) for c in coupling.polynomial])
-    polynomial = polynomial(Polynomial([shifts[1], 1.0])) if len(shifts) > 1 else Polynomial([polynomial(0.0)])
-    numbers = np.zeros(5)
-    numbers[: len(polynomial.coef)] = polynomial.coef
-    numbers[0] -= shifts[0]
-    attributes = {f"joint{k + 1}": joint.name for k, joint in enumerate(joints)}
-    return Element("joint", {"name": coupling.name, **attributes, "polycoef": text(numbers)})

@@ -1,15 +1,18 @@
-"""Joints of trees as MJCF joints of the child, and the start as numbers of a keyframe."""
+"""Joints of trees as MJCF joints of the child, the start as numbers of a keyframe, and what ties coordinates."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
-from symphys.export.mjcf_bodies import NestedBody, StartState, plain, tidy
+from symphys.export.mjcf_bodies import NestedBody, StartState, nesting_joints, plain, tidy
 from symphys.export.mjcf_surfaces import text
 from symphys.model.joints import Joint, Link
+from symphys.model.joints.coupling import JointCoupling
 from symphys.model.scalar import is_zero
 from symphys.types import Array
 
@@ -53,16 +56,25 @@ def link_freedoms(start: StartState, reference: StartState, link: Link, body: in
         return [Freedom(element, np.array([1.0, 0, 0, 0]), turned.T @ spin)]
     found = []
     turned = link.sign * reference.axes(body).T
-    directions, values, now = reference.directions(joint), reference.values(joint), start.values(joint)
+    values, now = reference.values(joint), start.values(joint)
     rates = plain(start.readings[joint.name].rate)
-    for k, direction in enumerate(directions):
-        turns = joint.kind.coordinates[k].turns
-        attributes = {"name": names(joint)[k], "type": "hinge" if turns else "slide", "pos": place}
-        attributes["axis"] = text(tidy(turned @ direction))
-        if values[k]:
-            attributes["ref"] = text(values[[k]])
-        found.append(Freedom(Element("joint", attributes | acting(joint)), now[[k]], rates[[k]]))
+    for k, (slide, turn) in enumerate(reference.motions(joint)):
+        coordinate = joint.kind.coordinates[k]
+        moves = [(names(joint)[k], "hinge" if coordinate.turns else "slide", 1.0, acting(joint))]
+        if coordinate.is_screw:
+            moves.append((slide_of(joint, k), "slide", float(coordinate.lead), {}))
+        for name, kind, share, parts in moves:
+            attributes = {"name": name, "type": kind, "pos": place}
+            attributes["axis"] = text(tidy(turned @ (turn if coordinate.turns else slide)))
+            if values[k]:
+                attributes["ref"] = text(share * values[[k]])
+            found.append(Freedom(Element("joint", attributes | parts), share * now[[k]], share * rates[[k]]))
     return found[:: link.sign]
+
+
+def slide_of(joint: Joint, k: int) -> str:
+    """Return the name of the slide that follows the hinge of a screw in MJCF."""
+    return f"{names(joint)[k]}.slide"
 
 
 def anchor(reference: StartState, link: Link, body: int) -> Array:
@@ -94,3 +106,29 @@ def names(joint: Joint) -> list[str]:
     """Of the coordinates."""
     coordinates = joint.kind.coordinates
     return [joint.name] if len(coordinates) == 1 else [f"{joint.name}.{c.name}" for c in coordinates]
+
+
+def joint_equalities(reference: StartState) -> Iterator[Element]:
+    """Make the equality constraints between coordinates, of screws in trees and of couplings."""
+    world = reference.world
+    for joint in (world.joints[index] for index in sorted(nesting_joints(world))):
+        for k, coordinate in enumerate(joint.kind.coordinates):
+            if coordinate.is_screw:
+                tied = {"joint1": slide_of(joint, k), "joint2": names(joint)[k]}
+                numbers = text([0.0, float(coordinate.lead), 0.0, 0.0, 0.0])
+                yield Element("joint", {"name": f"{names(joint)[k]}.thread", **tied, "polycoef": numbers})
+    for coupling in world.couplings:
+        yield coupled(reference, coupling)
+
+
+def coupled(reference: StartState, coupling: JointCoupling) -> Element:
+    """A coupling; MuJoCo counts coordinates from where they are in the file, and the polynomial with them."""
+    joints = [reference.world.joints[k] for k in (coupling.first, coupling.second) if k is not None]
+    shifts = [float(reference.values(joint)[0]) for joint in joints]
+    polynomial = Polynomial([float(c) for c in coupling.polynomial])
+    polynomial = polynomial(Polynomial([shifts[1], 1.0])) if len(shifts) > 1 else Polynomial([polynomial(0.0)])
+    numbers = np.zeros(5)
+    numbers[: len(polynomial.coef)] = polynomial.coef
+    numbers[0] -= shifts[0]
+    attributes = {f"joint{k + 1}": joint.name for k, joint in enumerate(joints)}
+    return Element("joint", {"name": coupling.name, **attributes, "polycoef": text(numbers)})

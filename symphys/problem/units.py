@@ -55,7 +55,7 @@ def quantity_unit(name: str, world: World) -> str | None:
 
 def joint_unit(joint: Joint, key: str) -> str | None:
     """Return the unit of a quantity of a joint; a command has the unit of what its motor follows."""
-    units = SLIDING if any(not coordinate.turns for coordinate in joint.kind.coordinates) else TURNING
+    units = {**(TURNING if joint.kind.turning else SLIDING), **joint.kind.units}
     if key == "gain" and isinstance(joint.motor, AffineMotor):  # force by command, which has any unit
         return None
     if key != "command":
@@ -66,7 +66,7 @@ def joint_unit(joint: Joint, key: str) -> str | None:
 
 def formula_units(world: World, names: Iterable[str], variables: Iterable[Variable]) -> dict[str, str]:
     """The units of those of the names in formulas that are known; of a variable, that of all that it sets."""
-    mixed = {joint.name for joint in world.joints if len({each.turns for each in joint.kind.coordinates}) > 1}
+    mixed = {joint.name for joint in world.joints if len({each.unit for each in joint.kind.coordinates}) > 1}
     known = {name: quantity_unit(name, world) for name in names if name.rpartition(".")[0] not in mixed}
     for variable in variables:
         units = {quantity_unit(slot.name, world) for slot in variable.slots}

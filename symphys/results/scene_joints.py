@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,9 @@ import numpy as np
 from symphys import json_values as values
 from symphys.json_values import Text
 from symphys.types import Array
+
+AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
+"""``SceneJoint.axes`` by the kind of joint, for files without them."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +41,18 @@ class SceneJointFrame:
 
 @dataclass(frozen=True)
 class SceneCoordinate:
-    """A coordinate of a joint: its name, and whether it is an angle [rad], else a displacement [m]."""
+    """A coordinate of a joint.
+
+    Attributes:
+        name: ``angle`` or ``position``; with a number where there are two.
+        turns: whether it is an angle [rad], else a displacement [m].
+        side, axis: which side's frame carries its axis, and which of that frame's axes it is; -1 in files without.
+    """
 
     name: str
     turns: bool
+    side: int = -1
+    axis: int = -1
 
 
 @dataclass(frozen=True)
@@ -108,6 +119,18 @@ class SceneJoint:
         """For each coordinate whether it is an angle."""
         return tuple(coordinate.turns for coordinate in self.coordinates)
 
+    @property
+    def axes(self) -> tuple[tuple[int, int], ...]:
+        """Return for each coordinate the side whose frame carries its axis, and which axis of it that is."""
+        known = tuple((each.side, each.axis) for each in self.coordinates)
+        whole = all(0 <= side < 2 and 0 <= axis < 3 for side, axis in known)
+        return known if known and whole else AXES.get(self.kind, ())
+
+    @property
+    def rotates(self) -> bool:
+        """Whether it leaves a rotation free."""
+        return any(self.turns) or not (self.turns or self.kind == "fixed")
+
     def to_json(self) -> dict[str, Any]:
         """One of ``joints``."""
         return {
@@ -116,7 +139,7 @@ class SceneJoint:
             "first": self.first,
             "second": self.second or None,
             "sockets": [frame.to_json() for frame in self.frames],
-            "coordinates": [{"name": each.name, "turns": each.turns} for each in self.coordinates],
+            "coordinates": [asdict(each) for each in self.coordinates],
             "limits": [bound if np.isfinite(bound) else None for bound in (self.lower, self.upper)],
             "motor": None if self.motor is None else self.motor.to_json(),
         }

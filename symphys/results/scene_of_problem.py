@@ -87,7 +87,10 @@ def make_joint(joint: Joint, bodies: Sequence[str]) -> SceneJoint:
         first=bodies[joint.first],
         second="" if joint.second is None else bodies[joint.second],
         frames=tuple(SceneJointFrame(plain(frame.point), plain(frame.orientation)) for frame in joint.frames),
-        coordinates=tuple(SceneCoordinate(each.name, each.turns) for each in joint.kind.coordinates),
+        coordinates=tuple(
+            SceneCoordinate(each.name, each.turns, 0 if each.fixed_in_first else 1, each.axis)
+            for each in joint.kind.coordinates
+        ),
         lower=bound(joint.limits.lower, -np.inf),
         upper=bound(joint.limits.upper, np.inf),
         motor=None if joint.motor is None else make_motor(joint.motor),

@@ -238,6 +238,25 @@ FEATURES: dict[str, Tables] = {
         coupling=[{"name": "thread", "joints": ["screw", "hinge"], "polynomial": [0, 0.05, 0.01]}],
         more=[{"name": "lifted", "value": "sumsqr(nut.position[2] - 1.5)"}],
     ),
+    "screw": swung(
+        varied("screw.pitch"),
+        {"name": "drive", "sets": "screw.command", "knots": 2, "guess": [0.3, -0.2]},
+        body=[ARM, {**ARM, "name": "nut", "position": [0.1, 2, 0.8]}],
+        joint=[
+            {**HINGE, "motor": SERVO},
+            {
+                "name": "screw",
+                "between": ["arm", "nut"],
+                "helical": {"axis": [0.2, 0.1, 1], "pitch": 0.3},
+                "point": [0.05, 2, 0.9],
+                "start": 0.4,
+                "motor": {"torque": {"torque": 2}},
+                "spring": {"stiffness": 0.5, "damping": 0.01},
+                "limits": [-9, 9],
+            },
+        ],
+        more=[{"name": "lifted", "value": "sumsqr(nut.position - [0, 2, 1.5]) + 0.01 * sumsqr(nut.velocity)"}],
+    ),
     "anchor and start of a joint": swung(varied("hinge.anchor[2]", 0.3), varied("hinge.start", 0.4)),
     "orientation": thrown(
         body=[{**DUMBBELL, "position": [0, 0, 0.22]}],

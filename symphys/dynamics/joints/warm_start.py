@@ -212,7 +212,7 @@ def on_bodies(
     placed, arms = frames.placed(now), frames.common_arms(now)
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for part, numbers in parts:
-        if part == "lock" and joint.kind.slides is None:
+        if part == "lock" and not joint.kind.travels:
             numbers = in_world(placed.a, numbers)
         along = [locked(joint, placed)] if part == "lock" else [free(c, placed) for c in joint.kind.coordinates]
         columns = [numbers] if part == "lock" else ca.vertsplit(numbers)

@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.joints.joint_frames import JointFrames, errors, free, joint_frames_at
+from symphys.dynamics.joints.joint_frames import JointFrames, free, joint_frames_at
 from symphys.model.joints import Coordinate, Joint, PlacedFrames
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
@@ -74,8 +74,10 @@ def _names(joint: Joint) -> list[str]:
     """In the order value, rate, torque; none without coordinates."""
     if not joint.kind.coordinates:
         return []
-    value = "angle" if joint.kind.coordinates[0].turns else "position"
-    return [f"{joint.name}.{field}" for field in (value, "rate", *(("torque",) if joint.motor is not None else ()))]
+    return [
+        f"{joint.name}.{field}"
+        for field in (joint.kind.quantity, "rate", *(("torque",) if joint.motor is not None else ()))
+    ]
 
 
 def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
@@ -83,11 +85,11 @@ def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
     poses = tuple((x[layout[f"{name}.position"]], x[layout[f"{name}.orientation"]]) for name in names)
     motions = [(x[layout[f"{name}.velocity"]], x[layout[f"{name}.angular_velocity"]]) for name in names]
     frames = joint_frames_at(joint, poses)
-    placed, held = frames.placed(ca.SX(0)), 3 if joint.kind.slides is None else len(joint.kind.slides)
-    off = errors(joint, placed)
+    placed, held = frames.placed(ca.SX(0)), joint.kind.held
     rates = [_rate(frames, placed, coordinate, motions) for coordinate in coordinates]
     torque = x[layout[f"{joint.name}.motor"]] if joint.driven else ca.SX.zeros(len(coordinates))
     near = ca.SX(0, 1) if joint.unwrapped is None else x[layout[joint.unwrapped]]
+    off = joint.kind.errors(placed, near)
     return Reading(
         value=ca.vertcat(ca.SX(0, 1), *(joint.value(k, placed, near) for k in range(len(coordinates)))),
         rate=ca.vertcat(ca.SX(0, 1), *rates),

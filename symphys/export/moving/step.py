@@ -83,10 +83,8 @@ def _freedoms(start: StartState, joint: int | None, body: int) -> Iterator[tuple
     if made.kind.name == "ball":
         yield from (("", k, np.concatenate([np.cross(point, row), row])) for k, row in enumerate(np.eye(3)))
         return
-    for number, direction in enumerate(start.directions(made)):
-        turns = made.kind.coordinates[number].turns
-        twist = [np.cross(point, direction), direction] if turns else [direction, np.zeros(3)]
-        yield made.name, number, np.concatenate(twist)
+    for number, (slide, turn) in enumerate(start.motions(made)):
+        yield made.name, number, np.concatenate([slide + np.cross(point, turn), turn])
 
 
 def _armature(joints: tuple[Joint, ...], owner: tuple[str, int] | None) -> float:

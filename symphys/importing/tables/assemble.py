@@ -11,7 +11,7 @@ from symphys.importing.options import ImportOptions
 from symphys.importing.source import Source
 from symphys.importing.tables.attached import read_loops, read_sites
 from symphys.importing.tables.contacts import read_contacts
-from symphys.importing.tables.joints import read_joints
+from symphys.importing.tables.joints import read_couplings, read_joints
 from symphys.importing.tables.links import body_table, read_links
 from symphys.importing.tables.motors import read_motors
 from symphys.importing.tables.pose import begin, keyframe, lift, reference_pose
@@ -50,7 +50,8 @@ def tables_of(source: Source, options: ImportOptions) -> tuple[dict[str, Any], t
             table["collide"] = True
     begin(reading, joints)
     sites = read_sites(reading)
-    loops, couplings = read_loops(reading, touching)
+    couplings = read_couplings(reading)
+    loops = read_loops(reading, touching)
     sensors = read_sensors(reading)
     nothing_of(reading)
     found = {

@@ -1,4 +1,4 @@
-"""Sites and equality constraints of a model as [[site]], [[joint]] and [[coupling]] tables."""
+"""Sites of a model as [[site]] tables, and its loops as [[joint]] tables."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from symphys.importing.tables.reading import HINGE, SLIDE, ModelReading, is_upright, numbers, quaternion
+from symphys.importing.tables.reading import ModelReading, is_upright, numbers, quaternion
 from symphys.types import Array
 
 MEET = 1e-6
@@ -46,59 +46,28 @@ def welded_bodies(reading: ModelReading) -> list[dict[str, Any]]:
     return tables
 
 
-def read_loops(
-    reading: ModelReading, touching: Container[tuple[str, ...]]
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """([[joint]] tables that close loops, [[coupling]] tables) of the equality constraints.
+def read_loops(reading: ModelReading, touching: Container[tuple[str, ...]]) -> list[dict[str, Any]]:
+    """[[joint]] tables that close loops, of the equality constraints but those of coordinates.
 
     Bodies that a loop holds together may touch as the model lets them: ``touching``, names in alphabetical order.
     """
     model, types = reading.model, reading.library.mjtEq
-    joints, couplings, rigid = list[dict[str, Any]](), list[dict[str, Any]](), 0
+    joints = list[dict[str, Any]]()
     for equality in range(model.neq):
         kind, what = int(model.eq_type[equality]), reading.called("equality", equality)
-        if not model.eq_active0[equality] or reading.off("EQUALITY"):
+        if not reading.holds(equality):
             reading.note("left out", what, "it is not active")
-        elif kind == int(types.mjEQ_JOINT):
-            table = coupling(reading, equality)
-            couplings += [table] if table else []
-            rigid += bool(table)
         elif kind in (int(types.mjEQ_CONNECT), int(types.mjEQ_WELD)):
             table = loop(reading, equality, kind == int(types.mjEQ_WELD))
             if table and tuple(sorted(table["between"])) in touching:
                 table["collide"] = True
             joints += [table] if table else []
-            rigid += bool(table)
-        else:
+            reading.rigid += bool(table)
+        elif kind != int(types.mjEQ_JOINT):
             reading.note("left out", what, "constraints of tendons and of flexible bodies have no counterpart")
-    if rigid:
-        reading.note("approximated", f"softness of {rigid} equality constraints", "they are rigid here")
-    return joints, couplings
-
-
-def coupling(reading: ModelReading, equality: int) -> dict[str, Any] | None:
-    """A coordinate that follows another; both are 0 at the reference pose, in MuJoCo too."""
-    model = reading.model
-    ids = [int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])]
-    used = [joint for joint in ids if joint >= 0]
-    known = all(joint in reading.joint_names for joint in used)
-    if not known or any(model.jnt_type[joint] not in (HINGE, SLIDE) for joint in used):
-        reading.note("left out", reading.called("equality", equality), "it must be between hinges and sliders")
-        return None
-    if len({root_of(reading, int(model.jnt_bodyid[joint])) for joint in used}) > 1:
-        text = "its joints hang on the world one by one, and coordinates are coupled within a robot only"
-        reading.note("left out", reading.called("equality", equality), text)
-        return None
-    name = reading.names.give("coupling", reading.name("equality", equality), "coupling")
-    polynomial = numbers(np.array(model.eq_data[equality][:5]))
-    return {"name": name, "joints": [reading.joint_names[joint] for joint in used], "polynomial": polynomial}
-
-
-def root_of(reading: ModelReading, body: int) -> int:
-    """The top body of the link from which all others of its tree hang."""
-    link = reading.links[body]
-    above = reading.links.get(int(reading.model.body_parentid[link.top]))
-    return link.top if above is None else root_of(reading, above.top)
+    if reading.rigid:
+        reading.note("approximated", f"softness of {reading.rigid} equality constraints", "they are rigid here")
+    return joints
 
 
 def loop(reading: ModelReading, equality: int, weld: bool) -> dict[str, Any] | None:

@@ -16,10 +16,6 @@ from symphys.results.scene_joints import SceneJoint
 from symphys.trajectory import Trajectory
 from symphys.types import Array
 
-AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
-"""Which axes of a joint are drawn: (side, axis of that side's frame)."""
-SQUARE = ("slider", "fixed")
-"""Kinds whose mark is a square."""
 BAR = 0.065
 """[in] half length of the bar along an axis"""
 
@@ -46,7 +42,7 @@ def position(trajectory: Trajectory, joint: SceneJoint, shot: int) -> Array:
 
 def axes_of(joint: SceneJoint) -> list[tuple[int, Array]]:
     """The axes that are drawn: the side that carries each, and its direction (3,) in that side's frame."""
-    return [(side, turn(joint.frames[side].orientation, np.eye(3)[k])) for side, k in AXES.get(joint.kind, ())]
+    return [(side, turn(joint.frames[side].orientation, np.eye(3)[k])) for side, k in joint.axes]
 
 
 def bones(trajectory: Trajectory, scene: Scene, shot: int) -> Iterator[tuple[int, Array]]:
@@ -72,8 +68,8 @@ def draw_joint_positions(axes: Axes, view: View, trajectory: Trajectory, scene: 
             half = BAR / scale * view.flat(on_side(trajectory, joint, side, direction, shot, False))
             bars += [place - half, place + half]
     draw_lines(axes, np.array(bars), style.INK, 0.8, 7)
-    for shape, square in (("o", False), ("s", True)):
-        chosen = [position(trajectory, joint, shot) for joint in joints if (joint.kind in SQUARE) == square]
+    for shape, rotates in (("o", True), ("s", False)):
+        chosen = [position(trajectory, joint, shot) for joint in joints if joint.rotates == rotates]
         if chosen:
             (mark,) = axes.plot(*view.flat(np.array(chosen)).T, shape, color="white", markersize=2.5, zorder=7.1)
             mark.set(markeredgecolor=style.INK, markeredgewidth=0.7)

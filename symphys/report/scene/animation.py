@@ -10,7 +10,7 @@ from symphys.report.charts.packed import pack_json
 from symphys.report.figures import style
 from symphys.report.pages.markup import PACKED, Html, dot, embedded, join, tag
 from symphys.report.robots.branches import colours, keys, linked, traced
-from symphys.report.robots.joint_positions import SQUARE, axes_of, drawable
+from symphys.report.robots.joint_positions import axes_of, drawable
 from symphys.report.scene.ghosts import MEASURED
 from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, reach, solids_of
 from symphys.results.polytope import Polytope
@@ -179,7 +179,7 @@ def joint_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
                 for name, frame in zip((joint.first, joint.second), joint.frames, strict=True)
             ],
             "axes": [[side, direction.round(6).tolist()] for side, direction in axes_of(joint)],
-            "square": joint.kind in SQUARE,
+            "square": not joint.rotates,
         }
         for joint in drawable(trajectory, scene)
     ]

@@ -14,6 +14,7 @@ from symphys import (
     BallJoint,
     Body,
     FixedJoint,
+    HelicalJoint,
     Hinge,
     Law,
     Plane,
@@ -53,6 +54,8 @@ def test_every_kind_begins_where_it_says() -> None:
         (Hinge("j", ("a", "b"), axis=(1, 2, 3), point=(0, 0, 0.6), start=0.7), [0.7]),
         (Hinge("j", ("b", "a"), axis=(1, 2, 3), point=(0, 0, 0.6), start=0.7), [0.7]),
         (Slider("j", ("a", "b"), axis=(1, 2, 3), start=-0.2), [-0.2]),
+        (HelicalJoint("j", ("a", "b"), axis=(1, 2, 3), pitch=0.3, point=(0, 0, 0.6), start=8.0), [8.0]),
+        (HelicalJoint("j", ("b", "a"), axis=(1, 2, 3), pitch=-0.3, point=(0, 0, 0.6), start=8.0), [8.0]),
         (
             UniversalJoint("j", ("a", "b"), axes=((0, 1, 0), (1, 0, 0)), point=(0, 0, 0.6), start=(0.5, -0.3)),
             [0.5, -0.3],
