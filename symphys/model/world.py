@@ -7,8 +7,8 @@ SI units; vectors are in world coordinates unless a field says "body frame".
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from math import inf, prod
 from types import MappingProxyType
 from typing import Any
@@ -64,9 +64,66 @@ class Law:
         return not is_zero(self.frequency)
 
     @property
+    def rubs(self) -> bool:
+        """Whether the contact has friction across its normal."""
+        return not is_zero(self.friction)
+
+    @property
     def spins(self) -> bool:
         """Whether the contact resists spinning or rolling."""
         return not (is_zero(self.torsion) and is_zero(self.rolling))
+
+    @property
+    def largest_friction(self) -> Scalar:
+        """The largest friction force per unit of normal force, in any direction."""
+        return self.friction
+
+    @classmethod
+    def of(cls, stated: Statements) -> Law:
+        """The law of two surfaces: what one table states holds, and what two state is combined."""
+        found = {}
+        for key, sources in stated.items():
+            numbers = [number for _, number in sources]
+            found[key] = numbers[0] if len(numbers) == 1 else COMBINE[key](numbers)
+        return cls(**found)
+
+    def mujoco_friction(self, normal: Vector | None) -> MujocoFriction:
+        """The friction of the contact as MuJoCo has it; ``normal``: (3,) of the contact, None where it changes."""
+        del normal  # friction is the same in all directions
+        rolls, twists = not is_zero(self.rolling), not is_zero(self.torsion)
+        directions = 6 if rolls else 4 if twists else 3 if self.rubs else 1
+        return MujocoFriction(directions, (self.friction, self.friction, self.torsion, self.rolling, self.rolling))
+
+
+Statements = Mapping[str, Sequence[tuple[str, Any]]]
+"""By coefficient: the tables that state it for two surfaces (a pair, [contact], one surface or both), and its value."""
+COMBINE: dict[str, Callable[[list[Any]], Any]] = {
+    each.name: each.metadata["combine"] for each in fields(Law) if "combine" in each.metadata
+}
+"""The coefficients that surfaces state, and what makes one of the numbers of two surfaces."""
+
+
+@dataclass(frozen=True)
+class MujocoFriction:
+    """Friction of a contact in MuJoCo.
+
+    Attributes:
+        directions: in how many a contact acts (condim): the normal, two across, about the normal, two rolling.
+        coefficients: (5,) along the two tangents of its contact frame, torsion [m], rolling [m] about both tangents.
+        departure: what differs there; empty if nothing does.
+    """
+
+    directions: int
+    coefficients: tuple[Scalar, ...]
+    departure: str = ""
+
+
+def contradictions(names: Sequence[str], stated: Statements) -> Iterator[tuple[str, str]]:
+    """What cannot hold at once for two surfaces: the coefficient that is at fault, and a message with the remedy."""
+    law, both = Law.of(stated), " and ".join(sorted(names))
+    if law.soft and law.restitution:
+        text = f"a contact is either soft (frequency {law.frequency:g} Hz) or has restitution ({law.restitution:g})"
+        yield "frequency", f"{both}: {text}; leave one out, or make one of them 0 for these two in a [[pair]] table"
 
 
 @dataclass(frozen=True)
