@@ -117,6 +117,15 @@ def test_several_laws_of_one_body_are_told() -> None:
     assert "friction of 1 pairs of bodies" in texts(findings, "approximated")
 
 
+def test_two_coefficients_of_a_pair_become_the_larger_and_are_told() -> None:
+    xml = """<worldbody><geom name="floor" type="plane" size="1 1 1"/>
+    <body name="b" pos="0 0 1"><freejoint/><geom name="g" size="0.1"/></body></worldbody>
+    <contact><pair geom1="floor" geom2="g" condim="3" friction="0.8 0.2 0 0 0"/></contact>"""
+    tables, findings = read(xml)
+    assert by_name(tables, "body")["b"]["friction"] == 0.8
+    assert "friction_direction" in texts(findings, "approximated")
+
+
 def test_shapes_without_a_rule_and_what_overlaps() -> None:
     xml = """<worldbody><geom type="plane" size="1 1 1"/>
     <body name="can" pos="0 0 2"><freejoint/><geom type="cylinder" size="0.1 0.2"/></body>

@@ -129,10 +129,11 @@ def geom_law(reading: ModelReading, one: int, other: int) -> Law:
 
 
 def pair_law(reading: ModelReading, pair: int) -> Law:
-    """Of an explicit pair; its two directions of friction are one here."""
+    """Of an explicit pair; of its two coefficients along the tangents of MuJoCo's contact the larger is taken."""
     friction = reading.model.pair_friction[pair]
     if friction[0] != friction[1]:
-        text = "friction is the same in all directions here; the larger one holds"
+        text = "friction along and across a tangent of MuJoCo's contact; the larger holds in all directions, unless a "
+        text += "[[pair]] with friction = [along, across] and a friction_direction says otherwise"
         reading.note("approximated", f"contact pair {pair}", text, f"{abs(friction[0] - friction[1]):g}")
     return law_of(max(friction[:2]), friction[2], max(friction[3:5]), int(reading.model.pair_dim[pair]))
 
