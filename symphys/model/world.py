@@ -27,6 +27,7 @@ from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Static, Surface, contact_points, surface
 from symphys.model.site import Site
 from symphys.suggest import hint, quote
+from symphys.types import Array
 
 Vector = Sequence[Any]
 """three of them"""
@@ -122,9 +123,7 @@ class Law:
         """The friction of the contact as MuJoCo has it.
 
         Args:
-            normal: (3,) unit vector of the contact; None where MuJoCo's contact frame turns with a body. The first
-                tangent of that frame is the part of the y axis across the normal, or of the z axis where the normal
-                is within 60 degrees of the y axis.
+            normal: (3,) unit vector of the contact; None where MuJoCo's contact frame turns with a body.
         """
         rolls, twists = not is_zero(self.rolling), not is_zero(self.torsion)
         directions = 6 if rolls else 4 if twists else 3 if self.rubs else 1
@@ -142,11 +141,21 @@ class Law:
         if normal is None or self.friction_side is not None:
             return None
         n, direction = np.array(normal, float), np.array(self.friction_direction, float)
-        first = np.array([0.0, 1.0, 0.0]) if abs(n[1]) < 0.5 else np.array([0.0, 0.0, 1.0])
-        tangents = [tangent - n * (n @ tangent) for tangent in (first, direction)]
-        size = float(np.linalg.norm(tangents[0]) * np.linalg.norm(tangents[1]))
-        cosine = abs(float(tangents[0] @ tangents[1])) / size if size > ROUNDING else ROUNDING**0.5
+        across = direction - n * (n @ direction)
+        size = float(np.linalg.norm(across))
+        cosine = abs(float(mujoco_tangent(n) @ across)) / size if size > ROUNDING else ROUNDING**0.5
         return False if cosine > 1 - ROUNDING else True if cosine < ROUNDING else None
+
+
+def mujoco_tangent(normal: Any) -> Array:
+    """(3,) unit vector: the first tangent of a contact in MuJoCo whose frame follows from its normal (3,) alone.
+
+    It is the part of the y axis across the normal; of the z axis where the normal is nearer than 60 degrees to y.
+    """
+    n = np.array(normal, float)
+    axis = np.array([0.0, 1.0, 0.0]) if abs(n[1]) < 0.5 else np.array([0.0, 0.0, 1.0])
+    across = axis - n * (n @ axis)
+    return np.asarray(across / np.linalg.norm(across))
 
 
 def _both(friction: Any) -> tuple[Any, Any]:
