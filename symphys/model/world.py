@@ -117,6 +117,8 @@ class Law:
             found[key] = numbers[0] if len(numbers) == 1 else COMBINE[key](numbers)
         if found.get("friction_direction") is not None and not _frame_is_stated(stated):
             found["friction_frame"] = stated["friction_direction"][0][0]
+        if not isinstance(found.get("friction"), tuple):  # one number, as a pair may state it, has no direction
+            found |= dict.fromkeys(("friction_direction", "friction_frame"))
         return cls(**found)
 
     def mujoco_friction(self, normal: Vector | None) -> MujocoFriction:
@@ -140,11 +142,11 @@ class Law:
             return False
         if normal is None or self.friction_side is not None:
             return None
-        n, direction = np.array(normal, float), np.array(self.friction_direction, float)
-        across = direction - n * (n @ direction)
-        size = float(np.linalg.norm(across))
-        cosine = abs(float(mujoco_tangent(n) @ across)) / size if size > ROUNDING else ROUNDING**0.5
-        return False if cosine > 1 - ROUNDING else True if cosine < ROUNDING else None
+        first = mujoco_tangent(normal)
+        one, other = (
+            abs(float(np.dot(tangent, self.friction_direction))) for tangent in (first, np.cross(normal, first))
+        )
+        return False if other < ROUNDING * one else True if one < ROUNDING * other else None
 
 
 def mujoco_tangent(normal: Any) -> Array:
@@ -212,7 +214,7 @@ def contradictions(names: Sequence[str], stated: Statements) -> Iterator[tuple[s
         text = f"a contact is either soft (frequency {law.frequency:g} Hz) or has restitution ({law.restitution:g})"
         yield "frequency", f"{both}{text}; leave one out, or make one of them 0 for these two in a [[pair]] table"
     owners = {key: [owner for owner, _ in sources] for key, sources in stated.items()}
-    directions = owners["friction_direction"] if law.friction_direction is not None else []
+    directions = [owner for owner, direction in stated["friction_direction"] if direction is not None]
     overridden = not {*owners["friction"]} <= {*names, *directions, "contact"}  # by a pair: what surfaces state waits
     if isinstance(law.friction, tuple) and not directions:
         yield "friction", f"{both}two numbers are friction along and across friction_direction; give that too"

@@ -230,7 +230,7 @@ def test_files_state_it_of_surfaces_pairs_and_all_contacts() -> None:
     framed = file(pair=[{**pair, "friction_frame": "b"}]).world().pairs[0].law
     assert (framed.friction_frame, framed.friction_side) == ("b", 0)
     plain = file(ground=TWO, pair=[{"between": ["b", "ground"], "friction": 0.2}]).world().pairs[0].law
-    assert plain.friction == 0.2
+    assert (plain.friction, plain.friction_direction) == (0.2, None)
 
 
 def test_variables_and_settings_set_both_coefficients() -> None:

@@ -5,9 +5,9 @@ gives the impulse of the set that is nearest to the one that would stop the slip
 that takes most power from the slip: the principle of maximal dissipation (Moreau, 1974).
 
 With one coefficient the set is a disc, with two, along and across a direction, an ellipse. All that the step knows of
-friction is here: constraints, Newton's method before the sweeps, the local solver of
-strongly coupled contacts and late impulses of soft ones ask a ``Friction``. Its coefficients, and how those of two
-surfaces make one, are fields of ``Law``.
+friction is here: constraints, Newton's method before the sweeps, the local solver of strongly coupled contacts and late
+impulses of soft ones ask a ``Friction``. Its coefficients, and how those of two surfaces make one, are fields of
+``Law``.
 """
 
 from __future__ import annotations
