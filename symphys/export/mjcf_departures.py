@@ -10,6 +10,7 @@ from symphys.export.folder import ExportError
 from symphys.export.mjcf_bodies import APART, StartState, loose_frames, nesting_joints
 from symphys.export.mjcf_equality import expressible_loop
 from symphys.export.mjcf_joints import joint_equalities
+from symphys.export.mjcf_surfaces import normal_of
 from symphys.export.mjcf_terrain import deviation, window
 from symphys.model.heightfield import Heightfield
 from symphys.model.joints import Servo, VelocityMotor
@@ -105,6 +106,12 @@ def contact_departures(start: StartState) -> Iterator[Departure]:
     bouncing = [name for name, law in contacts.items() if not law.soft and not is_zero(law.restitution)]
     text = "restitution, which MuJoCo does not have; give the surfaces restitution 0"
     yield Departure("left out", tuple(bouncing), text)
+    rubbing: dict[str, dict[str, None]] = {}
+    for pair in start.world.pairs:
+        friction = pair.law.mujoco_friction(normal_of(start.world, (pair.first, pair.second)))
+        rubbing.setdefault(friction.departure, {})[pair.name.partition(":")[0]] = None
+    for text, names in rubbing.items():
+        yield Departure("left out", tuple(names) if text else (), text)
     soft = [name for name, law in contacts.items() if law.soft]
     text = "a contact that gives way, with its frequency by MuJoCo's estimate of the mass behind it"
     yield Departure("approximated", tuple(soft), text)

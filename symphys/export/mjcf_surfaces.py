@@ -7,8 +7,7 @@ from math import pi
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from symphys.model.scalar import is_zero
-from symphys.model.shapes import Convex, Plane, Shape, Terrain, surface
+from symphys.model.shapes import Capsule, Convex, Plane, Shape, Terrain, surface
 from symphys.model.world import Law, Side, World, side_name
 
 MJCF_PLACEMENT = {"centre": "pos", "orientation": "quat"}
@@ -78,8 +77,9 @@ def pairs(world: World, step: float, stiffer: Mapping[tuple[str, str], float]) -
     laws = {(pair.first, pair.second): pair.law for pair in world.pairs}
     for sides, law in laws.items():
         first, second = (side_name(world.bodies, world.statics, side) for side in sides)
-        friction = (law.friction, law.friction, law.torsion, law.rolling, law.rolling)
-        given = {"geom1": first, "geom2": second, "condim": directions(law), "friction": text(friction)}
+        friction = law.mujoco_friction(normal_of(world, sides))
+        given = {"condim": str(friction.directions), "friction": text(friction.coefficients)}
+        given = {"geom1": first, "geom2": second, **given}
         contact.append(Element("pair", given | softness(law, step, stiffer.get((first, second), 1.0))))
     return contact
 
@@ -94,10 +94,7 @@ def softness(law: Law, step: float, factor: float) -> dict[str, str]:
     return {"solref": text(spring), **held}
 
 
-def directions(law: Law) -> str:
-    """In how many directions a contact acts: the normal, two across, about the normal, two rolling."""
-    if not is_zero(law.rolling):
-        return "6"
-    if not is_zero(law.torsion):
-        return "4"
-    return "1" if is_zero(law.friction) else "3"
+def normal_of(world: World, sides: tuple[Side, Side]) -> tuple[Any, ...] | None:
+    """(3,): the normal of a contact with a plane; None where the frame of MuJoCo's contact turns with a body."""
+    shape, other = world.surface(sides[1]), world.surface(sides[0])
+    return tuple(shape.normal) if isinstance(shape, Plane) and not isinstance(other, Capsule) else None

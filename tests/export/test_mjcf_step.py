@@ -109,6 +109,17 @@ def test_a_box_on_soft_ground_is_held_by_friction() -> None:
     assert abs(data.qpos[0]) < 1e-3 and 0.045 < data.qpos[2] < 0.05
 
 
+@pytest.mark.parametrize(("way", "mu"), [([1, 0, 0], 0.5), ([0, 1, 0], 0.2)])
+def test_friction_along_and_across_a_direction_brakes_there_as_here(way: list[int], mu: float) -> None:
+    """A box that slides along x, where mu is 0.5, or along y, where it is 0.2; MuJoCo's tangents are y and x."""
+    box = {"name": "b", "shape": {"box": {"size": [0.4, 0.4, 0.1]}}, "mass": 2.0, "position": [0, 0, 0.05]}
+    ground = {"friction": [0.5, 0.2], "friction_direction": [1, 0, 0]}
+    tables = {"simulation": SIMULATION, "ground": ground, "body": [{**box, "velocity": [2 * each for each in way]}]}
+    data, _ = run(problem_model(problem_of_tables(tables, "slide")).text, seconds=0.3)
+    pressed = 9.81 * data.time + data.qvel[2]  # what the ground has given, by mass: the box may hop
+    assert 2 - data.qvel[:3] @ way == pytest.approx(mu * pressed, rel=0.02)
+
+
 def test_a_soft_foot_has_its_own_mass_behind_it_whatever_hangs_on_it() -> None:
     """MuJoCo's estimate has the joints in it; a trial corrects it, and a robot sinks by F / (m omega^2) as here."""
     foot = {"name": "foot", "shape": {"sphere": {"radius": 0.1}}, "mass": 0.5, "position": [0, 0, 0.1]}

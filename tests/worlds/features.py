@@ -287,6 +287,12 @@ FEATURES: dict[str, Tables] = {
         ],
         constraint=[{"name": "cone", "at": "always", "value": "ground.friction * ball.position[2]", "upper": 0.03}],
     ),
+    "friction along and across a direction": thrown(
+        varied("ball.friction", [0.7, 0.2]),
+        body=[
+            {**BALL, "friction": [0.6, 0.3], "friction_direction": [1, 0.5, 0.2], "orientation": [0.9, 0.2, -0.3, 0.1]}
+        ],
+    ),
     "free duration": thrown({"name": "T", "sets": "simulation.duration", "guess": 0.15}),
     "force laws": thrown(
         varied("drag.c"),

@@ -12,6 +12,7 @@ from itertools import combinations, combinations_with_replacement, product
 from typing import Any
 
 from symphys.importing.tables.reading import ModelReading, numbers
+from symphys.model.world import COMBINE
 
 Law = tuple[float, float, float]
 """Friction, torsion [m], rolling [m]."""
@@ -70,11 +71,8 @@ def statement(names: tuple[str, str], own: Mapping[str, Law], meet: Meetings) ->
     law = meet.get(names)
     if law is None:
         return APART
-    stated = [own[name] for name in names if name in own]
-    follows = list(stated[0])
-    if len(stated) == 2:  # friction is multiplied, lengths are added
-        (a, *c), (b, *d) = stated
-        follows = [a * b, *(x + y for x, y in zip(c, d, strict=True))]
+    stated = list(zip(KEYS, zip(*(own[name] for name in names if name in own), strict=True), strict=True))
+    follows = [each[0] if len(each) == 1 else COMBINE[key](list(each)) for key, each in stated]
     off = [key for key, x, y in zip(KEYS, law, follows, strict=True) if abs(x - y) > 1e-12]
     return tuple((key, numbers(value)) for key, value in zip(KEYS, law, strict=True) if key in off)
 

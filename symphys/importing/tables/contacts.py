@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable
 from itertools import combinations
 from typing import Any
@@ -9,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from symphys.importing.tables.contact_limits import few_enough, without_overlap, without_rule
-from symphys.importing.tables.contact_tables import Law, Meetings, write_contacts
-from symphys.importing.tables.reading import ModelReading
+from symphys.importing.tables.contact_tables import KEYS, Law, Meetings, write_contacts
+from symphys.importing.tables.reading import ModelReading, numbers
 from symphys.importing.tables.shapes import Shapes
+from symphys.model.world import mujoco_tangent
+from symphys.types import Array
 
 
 def read_contacts(
@@ -38,6 +41,9 @@ def read_contacts(
     meet = without_overlap(reading, owners, without_rule(reading, surfaces, still, meet))
     meet = few_enough(reading, owners, surfaces, still, meet)
     pairs = write_contacts(reading, classes_of(reading, owners), surfaces, still, meet)
+    directed = directed_pairs(reading, owners, meet)
+    named = [set(table["between"]) for table in directed]
+    pairs = [table for table in pairs if set(table["between"]) not in named] + directed
     soft(reading, owners)
     return {"pair": pairs, "touching": set(meet)}
 
@@ -129,12 +135,39 @@ def geom_law(reading: ModelReading, one: int, other: int) -> Law:
 
 
 def pair_law(reading: ModelReading, pair: int) -> Law:
-    """Of an explicit pair; its two directions of friction are one here."""
+    """Of an explicit pair; of its coefficients along the two tangents of a contact the larger."""
     friction = reading.model.pair_friction[pair]
-    if friction[0] != friction[1]:
-        text = "friction is the same in all directions here; the larger one holds"
-        reading.note("approximated", f"contact pair {pair}", text, f"{abs(friction[0] - friction[1]):g}")
     return law_of(max(friction[:2]), friction[2], max(friction[3:5]), int(reading.model.pair_dim[pair]))
+
+
+def directed_pairs(reading: ModelReading, owners: dict[int, str], meet: Meetings) -> list[dict[str, Any]]:
+    """[[pair]] tables of what has two coefficients of friction; notes those whose directions turn with a body."""
+    model, tables = reading.model, []
+    geoms = Counter(owners.values())
+    for pair, friction in enumerate(model.pair_friction):
+        ends = int(model.pair_geom1[pair]), int(model.pair_geom2[pair])
+        names = tuple(sorted(owners.get(geom, "") for geom in ends))
+        if friction[0] == friction[1] or int(model.pair_dim[pair]) < 3 or names not in meet:
+            continue
+        direction = tangent_of(reading, *ends)
+        if direction is None or any(geoms[name] > 1 for name in names):
+            text = "friction along and across a direction that is not the same in all of their contacts; the larger "
+            text += "coefficient holds in all directions: a [[pair]] may state another, with a friction_direction"
+            reading.note("approximated", f"contact pair {pair}", text, f"{abs(friction[0] - friction[1]):g}")
+            continue
+        along_across = {"friction": numbers(friction[:2]), "friction_direction": numbers(direction)}
+        lengths = {key: numbers(value) for key, value in zip(KEYS[1:], meet[names][1:], strict=True)}
+        tables.append({"between": list(names), **along_across, **lengths})
+    return tables
+
+
+def tangent_of(reading: ModelReading, one: int, other: int) -> Array | None:
+    """(3,): the first tangent of the contacts of two geoms; None where it turns with one of them."""
+    kinds, types = reading.model.geom_type, reading.library.mjtGeom
+    plane, body = (one, other) if kinds[one] == types.mjGEOM_PLANE else (other, one)
+    if kinds[plane] != types.mjGEOM_PLANE or kinds[body] == types.mjGEOM_CAPSULE:
+        return None
+    return mujoco_tangent(np.array(reading.data.geom_xmat[plane]).reshape(3, 3)[:, 2])
 
 
 def law_of(friction: float, torsion: float, rolling: float, directions: int) -> Law:
