@@ -234,7 +234,7 @@ def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None) ->
     world = replace(problem.world(parameters.overrides()), scheduled=scheduled)
     z = ca.MX.sym("z", sum(v.guess.size for v in problem.variables))
     smoothing = ca.MX.sym("smoothing")
-    start, memory = start_of(problem, world, inputs, parameters, z), memory_of(problem, world)
+    start, memory = start_of(problem, world, inputs, parameters, z), memory_of(problem, world, inputs)
     return Rollout(problem, world, inputs, parameters, memory, z, smoothing, memory.start(start.x0), start.u, start.p)
 
 

@@ -53,8 +53,8 @@ def test_sensors_read_what_mujoco_senses() -> None:
     sensed = np.concatenate([np.array(parse(table["reads"]).evaluate(named)).ravel() for table in tables["sensor"]])
     assert sensed == pytest.approx(data.sensordata, abs=1e-12)
     for name in ("mark", "nose", "top"):
-        assert np.array(named[f"{name}.position"]).ravel() == pytest.approx(data.site(name).xpos, abs=1e-12)
-    assert np.array(named["mast.position"]).ravel() == pytest.approx(data.body("mast").xpos, abs=1e-12)
+        assert np.array(named[f"{name}.position"]()).ravel() == pytest.approx(data.site(name).xpos, abs=1e-12)
+    assert np.array(named["mast.position"]()).ravel() == pytest.approx(data.body("mast").xpos, abs=1e-12)
 
 
 def names_at_start(problem: Any) -> dict[str, Any]:

@@ -1,14 +1,15 @@
-"""What can be read off a joint in a state: its coordinates, their rates, what its motor gives, how far it is apart."""
+"""Sensors of joints: their coordinates and rates, and what their motors give; also how far joints are apart."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from symphys.dynamics.joints.joint_frames import JointFrames, errors, free, joint_frames_at
+from symphys.dynamics.observation.sensor_kind import MjcfSensor, SensedState, SensorKind
 from symphys.model.joints import Coordinate, Joint, PlacedFrames
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
@@ -51,33 +52,6 @@ def reading_function(world: World, parameters: Sequence[Any] = ()) -> ca.Functio
     return ca.Function("joints", [x, ca.vertcat(ca.SX(0, 1), *parameters)], results)
 
 
-def joint_quantities(world: World, x: Expr) -> dict[str, Expr]:
-    """What formulas call them: ``knee.angle`` or ``rail.position``, ``.rate``, and ``.torque`` if there is a motor."""
-    return named_readings(world, readings(world, x))
-
-
-def named_readings(world: World, found: Mapping[str, Reading]) -> dict[str, Expr]:
-    """See ``joint_quantities``, of joints that have been read; ``found``: all of them."""
-    named: dict[str, Expr] = {}
-    for joint, reading in zip(world.joints, found.values(), strict=True):
-        parts = (reading.value, reading.rate, reading.torque)
-        named.update(zip(_names(joint), parts, strict=False))
-    return named
-
-
-def joint_quantity_names(world: World) -> list[str]:
-    """The names of ``joint_quantities``."""
-    return [name for joint in world.joints for name in _names(joint)]
-
-
-def _names(joint: Joint) -> list[str]:
-    """In the order value, rate, torque; none without coordinates."""
-    if not joint.kind.coordinates:
-        return []
-    value = "angle" if joint.kind.coordinates[0].turns else "position"
-    return [f"{joint.name}.{field}" for field in (value, "rate", *(("torque",) if joint.motor is not None else ()))]
-
-
 def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
     names, coordinates = [world.bodies[i].name for i in joint.bodies], joint.kind.coordinates
     poses = tuple((x[layout[f"{name}.position"]], x[layout[f"{name}.orientation"]]) for name in names)
@@ -104,3 +78,71 @@ def _rate(frames: JointFrames, placed: PlacedFrames, coordinate: Coordinate, mot
         linear += sign * (velocity + ca.cross(spin, arm))
         angular += sign * spin
     return free(coordinate, placed).forwards(linear, angular)
+
+
+def _readings(at: SensedState) -> dict[str, Reading]:
+    return readings(at.world, at.x)
+
+
+def _reads(field: str) -> Callable[[SensedState, Joint], Expr]:
+    """Return a function that reads a field of a joint's ``Reading``."""
+
+    def read(at: SensedState, joint: Joint) -> Expr:
+        return getattr(at.shared(_readings)[joint.name], field)
+
+    return read
+
+
+def _turns(joint: Joint) -> bool:
+    return bool(joint.kind.coordinates) and joint.kind.coordinates[0].turns
+
+
+def _slides(joint: Joint) -> bool:
+    return bool(joint.kind.coordinates) and not joint.kind.coordinates[0].turns
+
+
+JOINT_SENSORS = (
+    SensorKind(
+        "angle",
+        "joint",
+        "the coordinate of a joint that turns, 0 as the bodies lie in the file",
+        _reads("value"),
+        unit="rad",
+        size=None,
+        has=_turns,
+        mjcf=MjcfSensor("jointpos", "joint"),
+    ),
+    SensorKind(
+        "position",
+        "joint",
+        "the coordinate of a slider, 0 as the bodies lie in the file",
+        _reads("value"),
+        unit="m",
+        size=None,
+        has=_slides,
+        mjcf=MjcfSensor("jointpos", "joint"),
+    ),
+    SensorKind(
+        "rate",
+        "joint",
+        "the derivative of the coordinate in time",
+        _reads("rate"),
+        unit="rad/s",
+        sliding_unit="m/s",
+        size=None,
+        has=lambda joint: bool(joint.kind.coordinates),
+        mjcf=MjcfSensor("jointvel", "joint"),
+    ),
+    SensorKind(
+        "torque",
+        "joint",
+        "what the motor gave in the last step; of a servo its mean over a step until half a step ago",
+        _reads("torque"),
+        unit="N m",
+        sliding_unit="N",
+        size=None,
+        has=lambda joint: joint.driven,
+        mjcf=MjcfSensor("jointactuatorfrc", "joint"),
+    ),
+)
+"""Every kind of sensor of a joint."""
