@@ -80,6 +80,7 @@ class SensorKind:
         before: returns the names of the parts of the state and of the inputs one step before that ``read`` needs.
         parameters: names of the world's numbers that it depends on beside the state.
         ahead: whether it is known half a step ahead, where force laws are evaluated.
+        kept: whether it reads forces of joints, which a state keeps only where steps have a warm start.
         mjcf: the sensor of MuJoCo with the same reading; None where there is none.
     """
 
@@ -95,6 +96,7 @@ class SensorKind:
     before: Callable[[World, Any], tuple[str, ...]] = lambda world, owner: ()
     parameters: frozenset[str] = frozenset()
     ahead: bool = True
+    kept: bool = False
     mjcf: MjcfSensor | None = None
 
     def unit_of(self, owner: Any) -> str:
