@@ -257,7 +257,8 @@ def namespace(
     names.update(parameters.overrides())
     followed = [each for each in problem.references if not wanted.isdisjoint(each.names)]
     names.update(reference_values(followed, at.time, names))
-    names.update(sensor_readings(SensedState(world, at.x, memory.before(at.x), dt), wanted))
+    never = {name: ca.SX.zeros(size) for name, size in input_sizes(world).items() if name not in inputs}
+    names.update(sensor_readings(SensedState(world, at.x, never | memory.before(at.x), dt), wanted))
     return names
 
 

@@ -22,7 +22,7 @@ class SensedState:
     Attributes:
         world: what is simulated.
         x: (nx,) the state; see ``Layout``.
-        before: by name, parts of the state and inputs one step before; an input that is not among them was 0.
+        before: by name, parts of the state and inputs one step before, as far as they are known.
         dt: the time step [s].
     """
 

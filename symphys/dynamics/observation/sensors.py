@@ -52,11 +52,10 @@ def named_sensors(world: World) -> dict[str, NamedSensor]:
 def sensor_readings(at: SensedState, wanted: Collection[str]) -> dict[str, Expr]:
     """Return what the wanted sensors read, by name.
 
-    A sensor is left out where ``at.before`` lacks a part of the state that it needs. Names that are none of a sensor
-    are ignored.
+    A sensor is left out where ``at.before`` lacks what it needs. Names that are none of a sensor are ignored.
     """
     found = dict[str, Expr]()
     for name, sensor in named_sensors(at.world).items():
-        if name in wanted and all(part in at.before for part in sensor.before(at.world) if part in at.layout):
+        if name in wanted and all(part in at.before for part in sensor.before(at.world)):
             found[name] = sensor.read(at)
     return found

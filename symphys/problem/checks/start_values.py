@@ -17,7 +17,7 @@ import numpy as np
 from symphys.dynamics.kept import structure
 from symphys.dynamics.observation import NamedSensor, SensedState, gap_function, named_sensors, readings
 from symphys.dynamics.observation.joint_coordinates import Reading
-from symphys.model.state_layout import GIVEN, Layout, initial_state
+from symphys.model.state_layout import GIVEN, Layout, initial_state, input_sizes
 from symphys.model.world import World
 from symphys.problem.parametric.parts import DISTRIBUTION
 from symphys.problem.parametric.world import ParametricWorld
@@ -56,7 +56,8 @@ class StartFunctions:
     @cached_property
     def _still(self) -> SensedState:
         layout = Layout(self.world)
-        return SensedState(self.world, self.x, {name: self.x[layout[name]] for name in layout.names()})
+        before: dict[str, Expr] = {name: ca.SX.zeros(size) for name, size in input_sizes(self.world).items()}
+        return SensedState(self.world, self.x, before | {name: self.x[layout[name]] for name in layout.names()})
 
     @cached_property
     def _readings(self) -> dict[str, Reading]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 
 from symphys.dynamics.observation import named_sensors
+from symphys.expression import Formula
 from symphys.model.state_layout import Layout, input_columns, input_sizes
 from symphys.model.world import World
 from symphys.problem import ALIVE, Constraint, Cost, Output, Problem, Target
@@ -72,8 +73,11 @@ class SensorMemory:
         return {name: x[self.columns[name]] for name in self.inputs}
 
 
-def memory_of(problem: Problem, world: World, inputs: Sequence[str]) -> SensorMemory:
-    """Collect the memory that the sensors of a problem need; ``inputs``: names of those that may act."""
+def memory_of(problem: Problem, world: World, inputs: Sequence[str], more: Iterable[Formula] = ()) -> SensorMemory:
+    """Collect the memory that the sensors of a problem need.
+
+    ``inputs``: names of those that may act. ``more``: formulas that are read beside those of the problem.
+    """
     sensed = frozenset[str]().union(*(formula.names for sensor in problem.sensors for formula in sensor.formulas))
     objectives: list[Cost | Target | Constraint | Output] = [
         *problem.costs,
@@ -81,7 +85,7 @@ def memory_of(problem: Problem, world: World, inputs: Sequence[str]) -> SensorMe
         *problem.constraints,
         *problem.outputs,
     ]
-    asked = frozenset[str]().union(*(each.formula.needed for each in objectives))
+    asked = frozenset[str]().union(*(each.formula.needed for each in objectives), *(each.needed for each in more))
     margin = problem.termination.margin.names if problem.termination else frozenset[str]()
     wanted = sensed | asked | margin
     needed = dict.fromkeys(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import symphys
 from symphys.dynamics.observation import SENSOR_KINDS, SensorKind
 from symphys.problem.recordings.conversion import TURNED
 
@@ -31,3 +33,22 @@ def test_names_are_unique_and_frames_turn_what_is_in_world_axes() -> None:
     own = {kind.key for kind in SENSOR_KINDS if kind.axes == "own"}
     assert "gyro" in own and not own & TURNED
     assert {"velocity", "angular_velocity", "contact_force", "force", "torque"} <= TURNED
+
+
+def test_quantities_over_time_may_remember_the_step_before() -> None:
+    """An accelerometer that nothing in the file asks for: the change of velocity over each step, less gravity."""
+    body = {"name": "ball", "shape": {"sphere": {"radius": 0.1}}, "mass": 0.5, "position": [0, 0, 5]}
+    drag = {"name": "drag", "on": "ball.force", "value": "-0.3 * ball.velocity"}
+    tables = {
+        "simulation": {"duration": 0.1, "dt": 0.01},
+        "body": [body],
+        "force": [drag],
+        "variable": [{"name": "throw", "sets": "ball.velocity", "guess": [3, 1, 2]}],
+        "cost": [{"name": "low", "value": "ball.position[2]"}],
+    }
+    start = np.array([3.0, 1.0, 2.0])
+    _, found = symphys.compile(tables).recording("ball.accelerometer", "ball.velocity").forward(start[None])
+    velocities = np.vstack([start, found["ball.velocity"][0]])
+    felt = np.diff(velocities, axis=0) / 0.01 + [0, 0, 9.81]
+    assert found["ball.accelerometer"][0] == pytest.approx(felt, abs=1e-9)
+    assert np.linalg.norm(felt[0]) > 1
