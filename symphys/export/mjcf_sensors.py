@@ -14,7 +14,7 @@ import numpy as np
 from symphys.dynamics.observation import named_sensors
 from symphys.export.mjcf_surfaces import text
 from symphys.model.body import Body
-from symphys.model.joints import AffineMotor
+from symphys.model.joints import AffineMotor, Joint, kinematic_trees
 from symphys.model.site import Site
 from symphys.model.world import World
 from symphys.problem.feedback import Sensor
@@ -103,9 +103,18 @@ def same_reading(world: World, name: str, sensed: str, turn: str | None, sites: 
 
 
 def mount_of(world: World, owner: Any) -> tuple[int, Sequence[float]] | None:
-    """The body whose axes are those of a sensor, and the sensor's point (3,) on it; None for a frame without mass."""
-    body = [each.name for each in world.bodies].index(owner.name)
-    return None if world.bodies[body].massless else (body, (0.0, 0.0, 0.0))
+    """The body whose axes are those of a sensor, and the sensor's point (3,) on it; None where MuJoCo has none.
+
+    A joint's is the body that hangs on it: MuJoCo reads what a body's parent exerts on it.
+    """
+    if isinstance(owner, Joint):
+        hanging = {link.joint for tree in kinematic_trees(world.joints) for link in tree.links if link.sign > 0}
+        if [joint.name for joint in world.joints].index(owner.name) not in hanging:
+            return None
+        body, point = owner.first, owner.frames[0].point
+    else:
+        body, point = [each.name for each in world.bodies].index(owner.name), (0.0, 0.0, 0.0)
+    return None if world.bodies[body].massless else (body, point)
 
 
 def site_at(
