@@ -2,7 +2,7 @@
 
 from symphys.dynamics.observation.ball_turns import joint_turn
 from symphys.dynamics.observation.half_step import half_step_function
-from symphys.dynamics.observation.joint_coordinates import reading_function, readings
+from symphys.dynamics.observation.joint_coordinates import joint_readings, reading_function, readings
 from symphys.dynamics.observation.queries import gap_function, slip_function
 from symphys.dynamics.observation.sensor_kind import MjcfSensor, SensedState, SensorKind
 from symphys.dynamics.observation.sensors import SENSOR_KINDS, NamedSensor, named_sensors, sensor_readings
@@ -15,6 +15,7 @@ __all__ = [
     "SensorKind",
     "gap_function",
     "half_step_function",
+    "joint_readings",
     "joint_turn",
     "named_sensors",
     "reading_function",

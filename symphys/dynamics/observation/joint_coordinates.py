@@ -89,7 +89,8 @@ def _rate(frames: JointFrames, placed: PlacedFrames, coordinate: Coordinate, mot
     return free(coordinate, placed).forwards(linear, angular)
 
 
-def _readings(at: SensedState) -> dict[str, Reading]:
+def joint_readings(at: SensedState) -> dict[str, Reading]:
+    """Return the readings of every joint, by name; see ``SensedState.shared``."""
     return readings(at.world, at.x)
 
 
@@ -97,7 +98,7 @@ def _reads(field: str) -> Callable[[SensedState, Joint], Expr]:
     """Return a function that reads a field of a joint's ``Reading``."""
 
     def read(at: SensedState, joint: Joint) -> Expr:
-        return getattr(at.shared(_readings)[joint.name], field)
+        return getattr(at.shared(joint_readings)[joint.name], field)
 
     return read
 

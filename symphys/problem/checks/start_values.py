@@ -15,8 +15,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.dynamics.kept import structure
-from symphys.dynamics.observation import NamedSensor, SensedState, gap_function, named_sensors, readings
-from symphys.dynamics.observation.joint_coordinates import Reading
+from symphys.dynamics.observation import NamedSensor, SensedState, gap_function, joint_readings, named_sensors
 from symphys.model.state_layout import GIVEN, Layout, initial_state, input_sizes
 from symphys.model.world import World
 from symphys.problem.parametric.parts import DISTRIBUTION
@@ -60,13 +59,9 @@ class StartFunctions:
         return SensedState(self.world, self.x, before | {name: self.x[layout[name]] for name in layout.names()})
 
     @cached_property
-    def _readings(self) -> dict[str, Reading]:
-        return readings(self.world, self.x)
-
-    @cached_property
     def joints(self) -> ca.Function:
         """Return a function for the separation, tilt and coordinates of each joint."""
-        found = self._readings.values()
+        found = self._still.shared(joint_readings).values()
         return self._function("joints", [part for each in found for part in (each.separation, each.tilt, each.value)])
 
     def _function(self, name: str, values: list[Any]) -> ca.Function:
