@@ -42,7 +42,8 @@ class Formula:
     def evaluate(self, namespace: Mapping[str, Any]) -> Expr:
         """The value as a dense casadi column (n,) of SX, MX or DM; (1,) for a number.
 
-        ``namespace`` maps every name to a number, a sequence of numbers or a casadi column; SX and MX do not mix.
+        ``namespace`` maps every name to a number, a sequence of numbers or a casadi column, or to a function that
+        returns one and is called where the formula uses the name; SX and MX do not mix.
         FormulaError for an unknown name or shapes that do not fit.
         """
         return ca.densify(evaluate(self.root, namespace))

@@ -60,7 +60,8 @@ def look_up(name: str, namespace: Mapping[str, Any]) -> Expr:
     """The value of a name; FormulaError that says which names come close."""
     if name not in namespace:
         raise FormulaError(f"unknown name {quote(name)}; {hint(name, namespace)}")
-    return call(column, [namespace[name]], name)
+    value = namespace[name]
+    return call(column, [value() if callable(value) else value], name)
 
 
 def call(function: Callable[..., Expr], values: list[Any], piece: str) -> Expr:

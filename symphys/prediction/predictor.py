@@ -74,9 +74,8 @@ class Predictor:
         self._variables = whole.variables
         watched = {text: formula for text, formula in velocities.items() if text not in formulas}
         driven = [variable.name for variable in self._given if variable.kind == "control"]
-        self._motion = QuantitySlopes(
-            symbolic_rollout(whole), formulas, threads=threads, by_step=driven, watched=watched
-        )
+        rollout = symbolic_rollout(whole, asked=formulas.values())
+        self._motion = QuantitySlopes(rollout, formulas, threads=threads, by_step=driven, watched=watched)
         self.sizes = {text: self._motion.sizes[text] for text in formulas}
         self._velocities, self._gravity = tuple(velocities), np.asarray(problem.world().gravity, float)
         guess = np.concatenate([variable.guess for variable in whole.variables])

@@ -315,6 +315,20 @@ FEATURES: dict[str, Tables] = {
         more=[{"name": "off", "at": "always", "squares": "ball.position[0] - path.x"}],
     ),
     "sensors and controllers": swung(*map(varied, ("hold.gains", "brain.weights", "shake.frequency")), **FEEDBACK),
+    "reactions of joints": {
+        **LEG,
+        "sensor": [{"name": "strain", "reads": ["knee.reaction_force", "hip.reaction_torque"]}],
+        "controller": [
+            {
+                "name": "comply",
+                "drives": "knee.command",
+                "senses": ["strain"],
+                "linear": {"gains": [[1e-3, 2e-3, -3e-3, 0.01, 0.02, -0.01]]},
+            }
+        ],
+        "variable": [*LEG["variable"], {"name": "shove", "sets": "thigh.force", "guess": [2, -1, 3]}],
+        "cost": [*LEG["cost"], {"name": "load", "at": "always", "squares": "0.01 * rail.reaction_force"}],
+    },
     "start, end and integrals": thrown(
         PUSH,
         cost=[

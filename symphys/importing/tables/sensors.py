@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from symphys.importing.tables.reading import HINGE, SLIDE, ModelReading, WeldedLink, is_upright, numbers
+from symphys.importing.tables.reading import FREE, HINGE, SLIDE, ModelReading, WeldedLink, is_upright, numbers
 from symphys.types import Array
 
 MEET = 1e-6
@@ -196,8 +196,34 @@ def velocimeter(reading: ModelReading, frame: SensorFrame | None, site: int) -> 
     return frame.own_axes(f"rotate([{q}[0], -{q}[1], -{q}[2], -{q}[3]], {world})")
 
 
+def force(reading: ModelReading, frame: SensorFrame | None, site: int) -> str | None:
+    """What the parent of a site's body exerts on it, in the axes of the site."""
+    joint = joint_before(reading, site)
+    return None if frame is None or joint is None else frame.own_axes(f"{reading.joint_names[joint]}.reaction_force")
+
+
+def torque(reading: ModelReading, frame: SensorFrame | None, site: int) -> str | None:
+    """The torque about a site that goes with that force, in the axes of the site."""
+    joint = joint_before(reading, site)
+    if frame is None or joint is None:
+        return None
+    name, arm = reading.joint_names[joint], frame.offset - frame.link.to_body(np.array(reading.data.xanchor[joint]))
+    moment = f" - cross({numbers(arm)}, {name}.reaction_force)" if any(numbers(arm)) else ""
+    return frame.own_axes(f"{name}.reaction_torque{moment}")
+
+
+def joint_before(reading: ModelReading, site: int) -> int | None:
+    """The joint that carries the body of a site; None where it is welded to its parent, or floats."""
+    body = int(reading.model.site_bodyid[site])
+    joints = reading.joints_of(body)
+    held = body in reading.links and reading.links[body].top == body and len(joints)
+    return joints[-1] if held and reading.model.jnt_type[joints[-1]] != FREE else None
+
+
 INERTIAL: dict[str, Callable[[ModelReading, SensorFrame | None, int], str | None]] = {
     "GYRO": gyro,
     "ACCELEROMETER": accelerometer,
     "VELOCIMETER": velocimeter,
+    "FORCE": force,
+    "TORQUE": torque,
 }
