@@ -18,7 +18,7 @@ from symphys.transcription.network_rollout import require_small_nets
 from symphys.version import __version__
 
 
-def export(
+def export_problem(
     problem: Source,
     *,
     c: str | Path | None = None,
@@ -26,7 +26,7 @@ def export(
     mjcf: str | Path | None = None,
     approximate: bool = False,
 ) -> list[Path]:
-    """Write a problem as files that need no symphys. Also called as ``symphys.export``.
+    """Write a problem as files that need no symphys.
 
     Args:
         problem: what ``symphys.load`` takes.
@@ -45,14 +45,14 @@ def export(
 
     Example:
         >>> import symphys
-        >>> [path.name for path in symphys.export("arm_reach", mjcf="model")]
+        >>> [path.name for path in symphys.export_problem("arm_reach", mjcf="model")]
         ['arm_reach.xml']
     """
     asked = {
         kind: Path(folder) for kind, folder in (("c", c), ("casadi", casadi), ("mjcf", mjcf)) if folder is not None
     }
     if not asked:
-        raise ExportError("export: say what to write and where, as c='folder', casadi='folder' or mjcf='folder'")
+        raise ExportError("say what to write and where, as c='folder', casadi='folder' or mjcf='folder'")
     return list(write(load(problem), asked, approximate).paths)
 
 

@@ -149,7 +149,8 @@ class Hinge(MovingJoint):
         axis: (3,) of any length but 0, as the bodies lie, world coordinates.
 
     Example:
-        >>> from symphys import Body, Hinge, Problem, Servo, Spring, make_world, simulate
+        >>> from symphys import Problem, simulate
+        >>> from symphys.model import Body, Hinge, Servo, Spring, make_world
         >>> rod = {"radius": 0.02, "length": 0.4, "mass": 0.5}
         >>> bodies = [Body.capsule(name, **rod, position=(0, 0, z)) for name, z in (("upper", 0.8), ("lower", 0.4))]
         >>> joints = [
@@ -180,7 +181,8 @@ class Slider(MovingJoint):
         axis: (3,) of any length but 0, as the bodies lie, world coordinates.
 
     Example:
-        >>> from symphys import Body, Problem, Slider, TorqueMotor, make_world, simulate
+        >>> from symphys import Problem, simulate
+        >>> from symphys.model import Body, Slider, TorqueMotor, make_world
         >>> cart = Body.box("cart", size=(0.2, 0.2, 0.1), mass=1)
         >>> rail = Slider("rail", ("world", "cart"), axis=(1, 0, 0), motor=TorqueMotor(torque=10))
         >>> push = {"sets": "rail.command", "guess": [2.0]}

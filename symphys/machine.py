@@ -28,7 +28,6 @@ from symphys.codegen import (
 from symphys.codegen.cuda import compile_on, find_gpu
 from symphys.codegen.toolchain.compiler import find_compiler, processors
 from symphys.codegen.toolchain.processor import processor
-from symphys.verbs import make_callable
 
 PACKAGES = ("casadi", "click", "cma", "matplotlib", "numpy", "pydantic", "rich", "scipy")
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "spral")
@@ -84,9 +83,6 @@ def doctor() -> list[Capability]:
         'ok'
     """
     return list(examine())
-
-
-make_callable(__name__, doctor)
 
 
 def healthy(findings: list[Capability]) -> bool:
