@@ -21,13 +21,12 @@ from symphys.version import __version__
 if TYPE_CHECKING:
     from symphys import model, problems, results, solvers
     from symphys.api.checking import Checked, check
-    from symphys.api.compiled import CompiledRollout, compile
-    from symphys.api.robots.robot import Robot, load_robot
+    from symphys.api.compiled import CompiledRollout, CompiledStep, compile, compile_step
+    from symphys.api.robot import Robot, load_robot
     from symphys.api.showing import show
     from symphys.api.simulation import simulate
     from symphys.api.solution import Solution, read
     from symphys.api.solving import solve
-    from symphys.api.stepping import CompiledStep, compile_step
     from symphys.api.sweeping import solve_all
     from symphys.api.tools import cache, new, schema
     from symphys.dynamics.functions import step_function
@@ -79,13 +78,12 @@ __all__ = [
 
 _HOMES = {
     "api.checking": ("Checked", "check"),
-    "api.compiled": ("CompiledRollout", "compile"),
-    "api.robots.robot": ("Robot", "load_robot"),
+    "api.compiled": ("CompiledRollout", "CompiledStep", "compile", "compile_step"),
+    "api.robot": ("Robot", "load_robot"),
     "api.showing": ("show",),
     "api.simulation": ("simulate",),
     "api.solution": ("Solution", "read"),
     "api.solving": ("solve",),
-    "api.stepping": ("CompiledStep", "compile_step"),
     "api.sweeping": ("solve_all",),
     "api.tools": ("cache", "new", "schema"),
     "dynamics.functions": ("step_function",),

@@ -99,9 +99,9 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "matplotlib numpy",
         "what Python calls",
     ),
-    "torch": ("api transcription", "numpy torch", "rollouts and steps for PyTorch"),
-    "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
-    "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
+    "torch": ("api problem transcription", "numpy torch", "rollouts and steps for PyTorch"),
+    "jax": ("api errors problem transcription", "jax numpy", "rollouts and steps for JAX"),
+    "env": ("api errors problem", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
         "api batches codegen errors export files findings identification importing interrupts machine mpc "
         "prediction problem problems report results runs solvers suggest threads trajectory transcription "
