@@ -51,7 +51,7 @@ class Robot:
         """Write a file for ``[[include]]`` and return its path.
 
         Raises:
-            FileError: the file cannot be written.
+            SymphysError: the file cannot be written.
         """
         write_text(Path(path), self.text())
         return Path(path)

@@ -40,7 +40,7 @@ def export_problem(
         The paths of the files.
 
     Raises:
-        ExportError: there is nothing to write, a file that symphys did not write is in the way, or MJCF cannot express
+        SymphysError: there is nothing to write, a file that symphys did not write is in the way, or MJCF cannot express
             the world.
         ProblemError: the problem cannot be exported to this format; says why.
 

@@ -114,7 +114,9 @@ def test_the_notebook_runs(tmp_path: Path) -> None:
         text=True,
         check=False,
         cwd=tmp_path,
-        env=os.environ | {"IPYTHONDIR": str(tmp_path / "ipython"), "CUDA_VISIBLE_DEVICES": ""},
+        env=os.environ
+        | {"IPYTHONDIR": str(tmp_path / "ipython"), "CUDA_VISIBLE_DEVICES": ""}
+        | {"PYTHONWARNINGS": "error:symphys:DeprecationWarning"},
     )
     assert done.returncode == 0, done.stderr
     outputs = [output for cell in json.loads(done.stdout.splitlines()[-1]) for output in cell]

@@ -148,7 +148,7 @@ def write_report(folder: str | Path, pages: str = AUTO, jobs: int = 1, remake: b
         its own, report.html.
 
     Raises:
-        ReportError: there is no such folder, it holds no run folder, or a page cannot be made; all others are then.
+        SymphysError: there is no such folder, it holds no run folder, or a page cannot be made; all others are then.
 
     Example:
         >>> import symphys
