@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from symphys.deprecated import NAMES, Facade, deprecated
 from symphys.version import __version__
@@ -103,7 +103,7 @@ _PACKAGES = ("env", "export", "jax", "model", "problems", "report", "results", "
 sys.modules[__name__].__class__ = Facade
 
 
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:
     """Return a public name from the module where it lives, or a deprecated one."""
     if name in _PACKAGES:
         return import_module(f"symphys.{name}")
