@@ -1,4 +1,4 @@
-"""How far a problem's gradient and motion can be trusted, before anything is solved."""
+"""Measure how far a problem's gradient and motion can be trusted, before anything is solved."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,11 +34,43 @@ IN_TABLES = (GRADIENT, GRID)
 WIDTH = 110
 """Largest number of characters in a line."""
 At = None | str | Path | Solution | Mapping[str, ArrayLike]
-"""Where a problem is examined: None: at the guess; else at a solution, a run folder, or values of variables."""
+"""The point that is examined. None: the guess; else a solution, a run folder, or values of variables by name."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Checked:
+class Examined:
+    """The examination of a point, and the judgement that it belongs to.
+
+    Attributes:
+        judged: the objective and the largest error / tolerance at the point that was examined.
+        trust: all that was measured, such as ``trust.gradient[0].error``; see ``symphys.findings.examination``.
+    """
+
+    judged: Judged
+    trust: Examination
+
+    @classmethod
+    def of(cls, verdict: Assessment, trust: Mapping[str, Any], **others: Any) -> Self:
+        """Combine a judgement with the numbers of ``symphys.verification.examine``."""
+        goal = any(check.kind == "goal" for check in verdict.checks)
+        costs = np.nan if goal else sum(verdict.costs.values())
+        judged = Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks), costs)
+        return cls(judged, Examination.from_json(files.strict(trust)), **others)
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings, each with ``level`` ("good", "fair", "bad" or "unknown"), ``what``, ``number``, ``meaning``."""
+        return tuple(advice.findings(self.trust, self.judged))
+
+    @property
+    def wrong(self) -> bool:
+        """Whether a gradient differs from finite differences, or anything is not finite."""
+        levels = [line.level for line in self.findings if line.about in (GRADIENT, advice.FAULT)]
+        return FAIR in levels or BAD in levels or not np.isnan(reach(self.trust.growth).lost)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Checked(Examined):
     """The findings of ``check``; prints as a report in text, and shows itself in a notebook.
 
     Attributes:
@@ -47,24 +80,11 @@ class Checked:
     """
 
     problem: Problem
-    judged: Judged
-    trust: Examination
-
-    @cached_property
-    def findings(self) -> tuple[Finding, ...]:
-        """The findings, each with ``level`` ("good", "fair", "bad" or "unknown"), ``what``, ``number``, ``meaning``."""
-        return tuple(advice.findings(self.trust, self.judged))
 
     @property
     def advice(self) -> str:
         """Advice that follows from the findings, in a paragraph."""
         return advice.advice(self.trust, self.judged)
-
-    @property
-    def wrong(self) -> bool:
-        """Whether a gradient differs from differences, or anything is not finite."""
-        levels = [line.level for line in self.findings if line.about in (GRADIENT, advice.FAULT)]
-        return FAIR in levels or BAD in levels or not np.isnan(reach(self.trust.growth).lost)
 
     def __str__(self) -> str:
         """Return the report that ``symphys check`` prints: gradients, finer simulations, other findings, advice."""
@@ -123,7 +143,7 @@ def check(problem: Source, at: At = None) -> Checked:
     require_solvable(read_in)
     made = transcribed(read_in, True, "casadi")
     z = vector(made.shooting, values_of(at))
-    return Checked(read_in, judged(made.judge(z)), Examination.from_json(files.strict(examine(made, z))))
+    return Checked.of(made.judge(z), examine(made, z), problem=read_in)
 
 
 def values_of(at: At) -> Mapping[str, ArrayLike]:
@@ -131,13 +151,6 @@ def values_of(at: At) -> Mapping[str, ArrayLike]:
     if at is None or isinstance(at, Mapping):
         return at or {}
     return (at if isinstance(at, Solution) else read(at)).value
-
-
-def judged(verdict: Assessment) -> Judged:
-    """Return the part of an assessment that findings are derived from."""
-    goal = any(check.kind == "goal" for check in verdict.checks)
-    costs = np.nan if goal else sum(verdict.costs.values())
-    return Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks), costs)
 
 
 def text_line(finding: Finding) -> str:
