@@ -20,7 +20,7 @@ NAMES = {name: ("symphys.model", f"symphys.model.{name}") for name in WORLDS} | 
     "roll_out": ("symphys.dynamics.horizon", "symphys.step_function and its mapaccum"),
     "transcribe": ("symphys.transcription", "symphys.compile"),
 }
-"""For each name the module that has it, and what to use."""
+"""The module that has each name, and its replacement."""
 CALLS = {"export": "symphys.export_problem", "report": "symphys.write_report", "results": "symphys.results.runs"}
 """Packages that were called as functions, ``symphys.report(folder)``, and the function of each."""
 

@@ -1,4 +1,4 @@
-"""What a solve found, by the names of the problem."""
+"""Solutions: the results of solves, by the names that the problem uses."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Solution:
 
     @property
     def advice(self) -> str:
-        """How the solver ended, and what to try if it did not reach a solution."""
+        """The reason why the solver ended, and what to try if it did not reach a solution."""
         return self.run.advice
 
     @property
