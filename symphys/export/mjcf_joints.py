@@ -17,12 +17,17 @@ from symphys.model.scalar import is_zero
 from symphys.types import Array
 
 UNBOUNDED = 1e10
-"""[rad], [m] where one of two limits is missing."""
+"""Limit of a coordinate where one of two is missing [rad], [m]."""
 
 
 @dataclass(frozen=True)
 class Freedom:
-    """A joint of MJCF: its element, and what a keyframe says of it."""
+    """A joint of MJCF.
+
+    Attributes:
+        element: the joint.
+        qpos, qvel: its coordinates and velocities in the keyframe.
+    """
 
     element: Element
     qpos: Array
@@ -30,18 +35,18 @@ class Freedom:
 
 
 def freedoms(start: StartState, reference: StartState, nested: NestedBody) -> list[Freedom]:
-    """What a body may do against its parent, in MuJoCo's order: what is next to the parent comes first.
+    """Write the joints between a body and its parent, in MuJoCo's order, from the parent on.
 
     Args:
-        start: what the keyframe says.
-        reference: where the model's bodies lie in its file.
-        nested: of the body.
+        start: the state of the keyframe.
+        reference: the poses that the file has.
+        nested: the body.
     """
     return [freedom for link in nested.links for freedom in link_freedoms(start, reference, link, nested.body)]
 
 
 def link_freedoms(start: StartState, reference: StartState, link: Link, body: int) -> list[Freedom]:
-    """What one joint on the way to a body leaves free, in the frame of that body as the file has it."""
+    """Write the free directions of one joint on the chain to a body, in that body's frame as the file has it."""
     if link.joint is None:
         pose = np.concatenate([start.of(body, "position"), start.of(body, "orientation")])
         spin = start.axes(body).T @ start.of(body, "angular_velocity")
@@ -78,7 +83,7 @@ def slide_of(joint: Joint, k: int) -> str:
 
 
 def anchor(reference: StartState, link: Link, body: int) -> Array:
-    """(3,) [m]: the point of a link's joint on its child, in the frame of a body."""
+    """Return the point (3,) [m] of a link's joint on its child, in the frame of a body."""
     joint = reference.world.joints[link.joint or 0]
     point = np.array(joint.frames[0 if link.sign > 0 else 1].point, float)
     if link.body == body:
@@ -88,7 +93,7 @@ def anchor(reference: StartState, link: Link, body: int) -> Array:
 
 
 def acting(joint: Joint) -> dict[str, str]:
-    """Limits, spring, armature and dry friction along each coordinate, or each rotation of a ball joint."""
+    """Return limits, spring, armature and dry friction of each coordinate, or of the rotations of a ball joint."""
     found, limits, spring = {}, joint.limits, joint.spring
     if limits.lower is not None or limits.upper is not None:
         ends = (limits.lower, -UNBOUNDED), (limits.upper, UNBOUNDED)
@@ -103,7 +108,7 @@ def acting(joint: Joint) -> dict[str, str]:
 
 
 def names(joint: Joint) -> list[str]:
-    """Of the coordinates."""
+    """Return the names of the coordinates, which MuJoCo's joints have."""
     coordinates = joint.kind.coordinates
     return [joint.name] if len(coordinates) == 1 else [f"{joint.name}.{c.name}" for c in coordinates]
 

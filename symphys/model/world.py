@@ -361,7 +361,8 @@ def make_world(
         SymphysError: names the body, joint or pair, and what would be valid.
 
     Example:
-        >>> from symphys import Body, Law, Plane, Problem, make_world, simulate
+        >>> from symphys import Problem, simulate
+        >>> from symphys.model import Body, Law, Plane, make_world
         >>> ball = Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1), velocity=(3, 0, 2))
         >>> crate = Body.box("crate", size=(0.4, 0.4, 0.4), density=100, position=(2, 0, 0.2))
         >>> laws = {("ball", "ground"): Law(friction=0.3, restitution=0.8)}

@@ -37,7 +37,8 @@ def transcribe(
 
     Example:
         >>> import symphys
-        >>> made = symphys.transcribe(symphys.load("ball_throw"), backend="casadi")
+        >>> from symphys.transcription import transcribe
+        >>> made = transcribe(symphys.load("ball_throw"), backend="casadi")
         >>> made.judge(made.shooting.start(0)).solved, made.shooting.n
         (False, 6)
     """

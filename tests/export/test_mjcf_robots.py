@@ -323,9 +323,9 @@ def test_plain_motors_stay_readable() -> None:
 
 
 def test_shipped_problems_are_written_with_what_they_lose(tmp_path: Path) -> None:
-    from symphys.export import export
+    from symphys.export import export_problem
 
-    (path,) = export("ball_throw", mjcf=tmp_path, approximate=True)
+    (path,) = export_problem("ball_throw", mjcf=tmp_path, approximate=True)
     assert path.read_text(encoding="utf-8").count("<!-- ") >= 1
 
 

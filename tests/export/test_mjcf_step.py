@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from symphys.export import problem_model
+from symphys.export.mjcf_actuation import inertias
 from symphys.export.mjcf_bodies import StartState
-from symphys.export.moving.step import inertias
-from symphys.export.moving.trial import stiffer, tried_model
+from symphys.export.mjcf_trial import stiffer, tried_model
 from symphys.problem import Problem, problem_of_tables
 
 mujoco = pytest.importorskip("mujoco")

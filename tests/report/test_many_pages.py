@@ -63,7 +63,7 @@ def test_a_page_that_cannot_be_made_is_named_and_the_others_are_made(runs: list[
     said = made.page.read_text(encoding="utf-8").partition("Pages that could not be made")[2]
     assert "throw/gradient-seed2" in said and "directory" in said
     with pytest.raises(ReportError, match="gradient-seed2"):
-        symphys.report(runs[0].parents[1], pages="light")
+        symphys.write_report(runs[0].parents[1], pages="light")
     (blocked / "inside").rmdir()
     blocked.rmdir()
     mended = make_pages(wanted_below(runs[0].parents[1], "light"), "light")

@@ -52,7 +52,8 @@ class HelicalJoint(MovingJoint):
         pitch: displacement along the axis in a turn [m]; negative for a left-hand thread, not 0.
 
     Example:
-        >>> from symphys import Body, HelicalJoint, Problem, TorqueMotor, make_world, simulate
+        >>> from symphys import Problem, simulate
+        >>> from symphys.model import Body, HelicalJoint, TorqueMotor, make_world
         >>> nut = Body.cylinder("nut", radius=0.02, length=0.02, mass=0.2)
         >>> screw = HelicalJoint("screw", ("world", "nut"), axis=(0, 0, 1), pitch=0.005, point=(0, 0, 0), start=6.0)
         >>> motion = simulate(Problem.from_world(make_world([nut], joints=[screw]), duration=0.1))

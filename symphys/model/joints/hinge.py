@@ -33,7 +33,8 @@ class Hinge(MovingJoint):
         axis: (3,) of any length but 0, as the bodies lie, world coordinates.
 
     Example:
-        >>> from symphys import Body, Hinge, Problem, Servo, Spring, make_world, simulate
+        >>> from symphys import Problem, simulate
+        >>> from symphys.model import Body, Hinge, Servo, Spring, make_world
         >>> rod = {"radius": 0.02, "length": 0.4, "mass": 0.5}
         >>> bodies = [Body.capsule(name, **rod, position=(0, 0, z)) for name, z in (("upper", 0.8), ("lower", 0.4))]
         >>> joints = [

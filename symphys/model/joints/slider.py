@@ -30,7 +30,8 @@ class Slider(MovingJoint):
         axis: (3,) of any length but 0, as the bodies lie, world coordinates.
 
     Example:
-        >>> from symphys import Body, Problem, Slider, TorqueMotor, make_world, simulate
+        >>> from symphys import Problem, simulate
+        >>> from symphys.model import Body, Slider, TorqueMotor, make_world
         >>> cart = Body.box("cart", size=(0.2, 0.2, 0.1), mass=1)
         >>> rail = Slider("rail", ("world", "cart"), axis=(1, 0, 0), motor=TorqueMotor(torque=10))
         >>> push = {"sets": "rail.command", "guess": [2.0]}

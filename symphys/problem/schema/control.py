@@ -67,7 +67,7 @@ class NetTable(SchemaTable):
 
 
 class FunctionTable(SchemaTable):
-    """A casadi function that Python gives: load_problem(..., functions={name: function})."""
+    """A casadi function that Python gives: symphys.load(..., functions={name: function})."""
 
     weights: Numbers | None = Field(default=None, description="its numbers at the start; default 0")
 

@@ -130,8 +130,8 @@ def make_pages(
     return MadePages(index, made, light, tuple(found), wanted.kept)
 
 
-def report(folder: str | Path, pages: str = AUTO, jobs: int = 1, remake: bool = False) -> Path:
-    """Make the report of a run folder, or of all runs below a folder. Also called as ``symphys.report``.
+def write_report(folder: str | Path, pages: str = AUTO, jobs: int = 1, remake: bool = False) -> Path:
+    """Make the report of a run folder, or of all runs below a folder.
 
     Pages are made that are missing, or made from other files or by other code than there are now.
 
@@ -148,12 +148,12 @@ def report(folder: str | Path, pages: str = AUTO, jobs: int = 1, remake: bool = 
         its own, report.html.
 
     Raises:
-        ReportError: there is no such folder, it holds no run folder, or a page cannot be made; all others are then.
+        SymphysError: there is no such folder, it holds no run folder, or a page cannot be made; all others are then.
 
     Example:
         >>> import symphys
         >>> solution = symphys.solve("ball_throw", "least_squares", backend="casadi", folder="reports")
-        >>> symphys.report("reports").name
+        >>> symphys.write_report("reports").name
         'index.html'
     """
     identified = identification_folders(Path(folder))

@@ -104,26 +104,7 @@ def parquet_bytes(rows: Sequence[Row], names: Sequence[str]) -> bytes:
 
 
 def frame(folder: str | Path, where: str | Sequence[str] = (), sort: str = "") -> Any:
-    """All runs below a folder as a pandas.DataFrame, a row each. Also called as ``symphys.results``.
-
-    Args:
-        folder: what `symphys solve --out` has written, or any folder above or below.
-        where: conditions that a run must meet, such as ``"objective<0.5"`` or ``["solver=cma", "seed>3"]``.
-        sort: the column to sort by, ``-`` before it for the largest first; by problem, case, solver and seed if empty.
-
-    Returns:
-        The columns are those of `symphys ls`; ``attrs["faults"]`` lists the folders that could not be read.
-
-    Raises:
-        SymphysError: no such folder, a condition that cannot be read, an unknown column, or no pandas.
-
-    Example:
-        >>> import symphys
-        >>> solution = symphys.solve("ball_throw", "least_squares", backend="casadi", folder="reports")
-        >>> table = symphys.results("reports", where="problem=ball_throw")
-        >>> list(table["verdict"]), int(table["seed"].max())
-        (['solved'], 0)
-    """
+    """Read all runs below a folder into a pandas.DataFrame, as ``symphys.results.runs`` does."""
     found = read_rows(Path(folder))
     rows = chosen(found.rows, [where] if isinstance(where, str) else where)
     return framed(ordered(rows, sort) if sort else rows, found)

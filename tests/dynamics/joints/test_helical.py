@@ -11,7 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tools.laboratory import Lab
 
-from symphys import Body, HelicalJoint, Problem, SymphysError, make_world, simulate
+from symphys import Problem, SymphysError, simulate
+from symphys.model import Body, HelicalJoint, make_world
 from symphys.model.joints import (
     FIXED,
     HINGE,

@@ -10,7 +10,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys import (
+from symphys import Problem, SymphysError
+from symphys.dynamics.observation import readings
+from symphys.model import (
     BallJoint,
     Body,
     FixedJoint,
@@ -18,15 +20,12 @@ from symphys import (
     Hinge,
     Law,
     Plane,
-    Problem,
     Slider,
-    SymphysError,
     UniversalJoint,
     World,
     initial_state,
     make_world,
 )
-from symphys.dynamics.observation import readings
 
 HINGE: dict[str, Any] = {"axis": (0, 1, 0), "point": (0, 0, 1)}
 

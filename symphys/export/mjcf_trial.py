@@ -1,4 +1,4 @@
-"""Trial of a model: the first second of the problem's motion in MuJoCo, if it is installed, against the motion here."""
+"""Compare the first second of a problem's motion with that of its model in MuJoCo, if that is installed."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription import transcribe
 
 SECONDS = 1.0
-"""[s] that are compared at most."""
+"""Largest duration of the comparison [s]."""
 MOST_WORK = 20_000
-"""Bodies times steps; larger models take minutes without a kernel, so that only MuJoCo's motion is checked."""
+"""Largest product of bodies and steps. Of larger models, which take minutes here, only MuJoCo's motion is checked."""
 
 
 def tried_model(problem: Problem, approximate: bool) -> MjcfModel:
-    """The model with the result of a trial in its first lines; without a trial where MuJoCo is not installed."""
+    """Write a problem's model with the result of the trial in its first lines; no trial without MuJoCo."""
     model = problem_model(problem, approximate)
     if importlib.util.find_spec("mujoco") is None:
         return model
@@ -41,10 +41,10 @@ def tried_model(problem: Problem, approximate: bool) -> MjcfModel:
 
 
 def stiffer(world: World, text: str) -> dict[tuple[str, str], float]:
-    """Factors for contacts that give way, by the names of their surfaces.
+    """Compute the factors on stiffness and damping of compliant contacts, by the names of their surfaces.
 
-    Here the mass behind such a contact is that of the bodies themselves. MuJoCo takes the mass that its compiler
-    computes where all coordinates are 0, joints included.
+    The mass behind such a contact is that of its two bodies here. MuJoCo's compiler computes it from the whole tree at
+    coordinates 0.
     """
     soft = {(pair.first, pair.second) for pair in world.pairs if pair.law.soft}
     if not soft:
@@ -65,7 +65,7 @@ def stiffer(world: World, text: str) -> dict[tuple[str, str], float]:
 
 
 def trial(problem: Problem, text: str) -> Departure:
-    """The distance of MuJoCo's motion from the problem's own, under the same commands and forces."""
+    """Measure how far MuJoCo's motion is from the problem's, under the same commands and forces."""
     import mujoco
 
     work = len(problem.world().bodies) * problem.simulation.steps
@@ -88,7 +88,7 @@ def trial(problem: Problem, text: str) -> Departure:
 
 
 def own_motion(problem: Problem) -> Trajectory | None:
-    """The problem's motion from its start, as the model has it, with the guess of its controls; None: not finite."""
+    """Simulate the problem from the start of the model with the guess of its controls; None if not finite."""
     made = transcribe(problem, backend="casadi")
     known = {**problem.initial, **problem.parametric.starts(), **problem.parameters, **problem.weights}
     z = made.shooting.start(0)
@@ -103,10 +103,10 @@ def own_motion(problem: Problem) -> Trajectory | None:
 
 
 class MujocoReplay:
-    """A model of MuJoCo that is driven as a motion was; without one, by commands of 0."""
+    """A simulation in MuJoCo under the forces and commands of a motion, or without any."""
 
     def __init__(self, mujoco: Any, world: World, text: str, motion: Trajectory | None) -> None:
-        """Begin at the start of the motion."""
+        """Reset MuJoCo to the keyframe of the start."""
         self._step, self._motion = mujoco.mj_step, motion
         self._model = mujoco.MjModel.from_xml_string(text)
         self._data = mujoco.MjData(self._model)
@@ -120,7 +120,7 @@ class MujocoReplay:
         ]
 
     def advance(self, k: int, dt: float) -> None:
-        """Advance by step ``k`` of the motion, which takes ``dt`` [s]."""
+        """Simulate step ``k`` of the motion, of length ``dt`` [s]."""
         if self._motion is not None:
             for body, name in self._bodies:
                 self._data.body(name).xfrc_applied[:3] = self._motion.force[k, body]
@@ -132,12 +132,12 @@ class MujocoReplay:
 
     @property
     def sound(self) -> bool:
-        """Whether all numbers are finite, and MuJoCo did not begin anew because they were not."""
+        """Whether all numbers are finite, and MuJoCo has not reset itself because they were not."""
         restarts = sum(each.number for each in self._data.warning)
         return not restarts and bool(np.isfinite(self._data.qpos).all())
 
     def gaps(self, k: int) -> Iterator[tuple[str, float, float]]:
-        """Each body's name, distance [m] and angle [rad] from instant ``k`` of the motion."""
+        """Yield the name of each body, and its distance [m] and angle [rad] from the motion at instant ``k``."""
         for body, name in self._bodies if self._motion is not None else ():
             here = self._data.body(name)
             far = float(np.linalg.norm(here.xipos - self._motion.position[k, body]))  # type: ignore[union-attr]

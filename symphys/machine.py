@@ -1,4 +1,4 @@
-"""What symphys finds on this machine, and whether it works: each thing is tried, on something tiny."""
+"""Examine this machine: each capability that symphys uses is tried on a tiny problem."""
 
 from __future__ import annotations
 
@@ -28,7 +28,6 @@ from symphys.codegen import (
 from symphys.codegen.cuda import compile_on, find_gpu
 from symphys.codegen.toolchain.compiler import find_compiler, processors
 from symphys.codegen.toolchain.processor import processor
-from symphys.verbs import make_callable
 
 PACKAGES = ("casadi", "click", "cma", "matplotlib", "numpy", "pydantic", "rich", "scipy")
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "spral")
@@ -36,20 +35,22 @@ WITHOUT = "symphys works all the same, by casadi's evaluation, but for samples o
 CLOSE = 1e-12
 """Largest relative difference of a kernel's values from casadi's."""
 STEPS, DT, ROWS = 20, 0.05, 37
+"""Steps of the pendulum, their length [s], and rows of a batch."""
 Z = (0.5, -0.3)
+"""The pendulum's first angle [rad] and rate [rad/s]."""
 
 State = Literal["ok", "missing", "failed"]
 
 
 @dataclass(frozen=True)
 class Capability:
-    """One thing that was tried.
+    """A capability of this machine.
 
     Attributes:
-        name: of the thing.
+        name: such as "compiler", "gpu" or "kernel, values".
         state: "ok", "missing" or "failed".
         text: what was found, or what is wrong and what to do.
-        required: whether symphys needs it.
+        required: whether symphys does not work without it.
     """
 
     name: str
@@ -59,7 +60,7 @@ class Capability:
 
 
 def examine() -> Iterator[Capability]:
-    """Everything, one after the other."""
+    """Yield all capabilities, each as soon as it was tried."""
     yield Capability("python", "ok", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
     yield _tried("packages", _packages, required=True)
     yield _tried("ipopt", _ipopt, required=True)
@@ -76,7 +77,10 @@ def examine() -> Iterator[Capability]:
 
 
 def doctor() -> list[Capability]:
-    """What symphys finds on this machine, each thing tried. Also called as ``symphys.doctor``.
+    """Try what symphys uses on this machine: packages, IPOPT, compiler, GPU, kernels.
+
+    Returns:
+        The capabilities, each with ``name``, ``state`` ("ok", "missing" or "failed") and ``text``.
 
     Example:
         >>> import symphys
@@ -86,20 +90,17 @@ def doctor() -> list[Capability]:
     return list(examine())
 
 
-make_callable(__name__, doctor)
-
-
 def healthy(findings: list[Capability]) -> bool:
-    """Whether all that symphys needs works."""
+    """Whether all capabilities that symphys needs work."""
     return all(finding.state == "ok" for finding in findings if finding.required)
 
 
 class _Missing(Exception):
-    """Something that is not there, with what to do."""
+    """A capability that is not installed; the text says what to install."""
 
 
 def _tried(name: str, work: Callable[[], str], required: bool = False) -> Capability:
-    """What came of it, whatever it was."""
+    """Try a capability; whatever it raises becomes part of the report."""
     try:
         return Capability(name, "ok", work(), required)
     except _Missing as error:
@@ -169,7 +170,7 @@ def _compiler() -> str:
 
 
 def _kernels() -> Iterator[Capability]:
-    """A tiny kernel, cold into an empty cache, then right, on two threads, and warm."""
+    """Try a tiny kernel: compiled into an empty cache, its values, its gradient, two threads, loaded from the cache."""
     with tempfile.TemporaryDirectory(prefix="symphys-doctor-", ignore_cleanup_errors=True) as folder:
         cache, program, built = Cache(Path(folder)), pendulum(), list[ProcessorKernel]()
         yield _tried("kernel, compiled", lambda: _cold(program, cache, built))
@@ -182,7 +183,7 @@ def _kernels() -> Iterator[Capability]:
 
 
 def pendulum() -> Program:
-    """A driven pendulum: z is the angle [rad] and its rate at the start, the output a cost over time."""
+    """Return the program of a damped pendulum: z is its first angle [rad] and rate [rad/s], the output a cost."""
     x = ca.SX.sym("x", 2)
     move = ca.Function("move", [x], [ca.vertcat(x[0] + DT * x[1], x[1] - DT * (9.81 * ca.sin(x[0]) + 0.1 * x[1]))])
     cost = ca.Function("cost", [x], [ca.sumsqr(x) + ca.fmax(x[1], 0)])
@@ -239,6 +240,6 @@ def _warm(program: Program, cache: Cache) -> str:
 
 
 def _require(found: Any, wanted: Any, tolerance: float) -> None:
-    """Numbers that differ are the compiler's fault."""
+    """Raise ValueError for numbers that differ, which is the compiler's fault."""
     if not np.allclose(found, wanted, rtol=tolerance, atol=0):
         raise ValueError(f"{found} for {wanted}: this compiler cannot be trusted; set CC to another")

@@ -1,4 +1,4 @@
-"""A robot that was read from another program's model: its tables, what became of its parts, a problem about it."""
+"""Robots read from MJCF and URDF files: their tables, what became of their parts, problems about them."""
 
 from __future__ import annotations
 
@@ -20,47 +20,50 @@ from symphys.problem.robot_alone import lowest, stands
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot.
+    """A robot that was read from another program's model.
 
     Attributes:
-        imported: what was read.
+        imported: the tables of the robot and the findings of the import.
     """
 
     imported: Imported
 
     @property
     def title(self) -> str:
-        """What the model calls itself."""
+        """The title of the model."""
         return self.imported.title
 
     @property
     def tables(self) -> dict[str, Any]:
-        """Of a problem file, as ``[[include]]`` takes them: ``body``, ``joint``, ... Lengths in m, angles in rad."""
+        """The tables of a problem file, as ``[[include]]`` takes them: ``body``, ``joint``, ... in m and rad."""
         return self.imported.tables
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What became of the parts of the model: taken, approximated, left out, or recovered from its file."""
+        """The fate of each part of the model: taken, approximated, left out, or recovered from its file."""
         return self.imported.findings
 
     def text(self) -> str:
-        """The robot as the text of a file for ``[[include]]``."""
+        """Return the robot as the text of a file for ``[[include]]``."""
         return robot_text(self.imported)
 
     def save(self, path: str | Path) -> Path:
-        """Write that file; FileError if that cannot be."""
+        """Write a file for ``[[include]]`` and return its path.
+
+        Raises:
+            SymphysError: the file cannot be written.
+        """
         write_text(Path(path), self.text())
         return Path(path)
 
     def problem(self, duration: float = 1.0, dt: float = 0.01, ground: bool = True, **tables: Any) -> Problem:
-        """A problem about the robot.
+        """Make a problem about the robot.
 
         Args:
-            duration: [s], a whole number of steps.
+            duration: duration [s], a whole number of steps.
             dt: time step [s].
-            ground: whether a robot that floats, in a model without anything to stand on, gets a ground below its lowest
-                point.
-            tables: further tables of a problem file: ``variable=[{...}]``, ``solver={...}``. Lists come after the
+            ground: whether a floating robot whose model has no static surface gets a ground at its lowest point.
+            tables: further tables of a problem file: ``variable=[{...}]``, ``solver={...}``. Lists are appended to the
                 robot's.
 
         Raises:
@@ -76,14 +79,14 @@ class Robot:
         return problem_of_tables(whole, name)
 
     def __str__(self) -> str:
-        """What it is, and what became of its parts, line by line."""
+        """Return the title and the findings, line by line."""
         lines = [f"{self.title}, {self.imported.file}: {described(self.imported)}"]
         for heading, found in grouped(self.findings):
             lines += [f"{heading}:", *(f"  {sentence(finding)}" for finding in found)]
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        """The same as a table, for notebooks."""
+        """Return the findings as a table, for notebooks."""
         rows = "".join(
             f"<tr><td>{escape(heading)}</td><td>{escape(each.what)}</td><td>{escape(each.how)}</td>"
             f"<td>{escape(each.amount)}</td></tr>"
@@ -102,16 +105,17 @@ def load_robot(
     assets: Iterable[str | Path] = (),
     meshes: Literal["hull", "fit"] = "hull",
 ) -> Robot:
-    """Read a robot from an MJCF or URDF file; it takes the extra ``symphys[robots]``.
+    """Read a robot from an MJCF or URDF file; needs the extra ``symphys[robots]``.
 
     Args:
-        path: of the file, or ``package://gymnasium/envs/mujoco/assets/ant.xml`` in an installed package.
-        keyframe: the model's keyframe at which it begins; None: its reference pose.
+        path: the file, or ``package://gymnasium/envs/mujoco/assets/ant.xml`` for one in an installed package.
+        keyframe: the keyframe of the model at which the robot starts; None: its reference pose.
         self_collision: whether bodies of the robot may touch each other.
-        base: of a URDF, whether its root link floats; "auto": it does unless a link "world" holds it, or it is an arm.
-        assets: folders besides the model's own from which its meshes and included files may be read.
-        meshes: "hull": a mesh is its convex hull, exact on planes and terrain; "fit": spheres, boxes or capsules near
-            it, which touch other bodies too. That takes some ten seconds a mesh.
+        base: whether the root link of a URDF floats: "free", "fixed", or "auto": it floats unless a link "world" holds
+            it or the robot is an arm.
+        assets: folders besides the model's own from which meshes and included files may be read.
+        meshes: "hull": the convex hull of each mesh, which touches planes and terrain; "fit": spheres, boxes or
+            capsules fitted to it, which touch other bodies too and take some ten seconds a mesh.
 
     Raises:
         SymphysError: names the file, and where known the line, the element and the attribute; or says that MuJoCo,
@@ -122,14 +126,14 @@ def load_robot(
 
 
 def grouped(findings: Iterable[Finding]) -> list[tuple[str, list[Finding]]]:
-    """Findings below a heading for each kind."""
+    """Group findings by kind, each with its heading."""
     found = list(findings)
     groups = [(heading, [each for each in found if each.kind == kind]) for kind, heading in HEADINGS.items()]
     return [(heading, members) for heading, members in groups if members]
 
 
 def joined(first: Any, second: Any) -> Any:
-    """Two lists one after the other, two tables as one; else the second."""
+    """Concatenate two lists, merge two tables; otherwise return the second value."""
     if isinstance(first, list) and isinstance(second, list):
         return [*first, *second]
     if isinstance(first, Mapping) and isinstance(second, Mapping):

@@ -1,4 +1,4 @@
-"""The time step of a model for MuJoCo, and how stiff its motors may be at that step.
+"""Motors as MJCF actuators, and the time step at which MuJoCo holds them; their commands are MuJoCo's ctrl.
 
 MuJoCo takes the forces of springs, of soft contacts and of motors at their bounds as they are at the beginning of a
 step. All of a motor's torque T over a step h changes the rate of a coordinate of inertia I by T h / I. Where that is
@@ -13,38 +13,45 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from math import inf
+from xml.etree.ElementTree import Element
 
 import casadi as ca
 import numpy as np
 
 from symphys.dynamics.motion import inertia_matrix
 from symphys.export.mjcf_bodies import StartState, links_of
-from symphys.model.joints import AffineMotor, Joint, Servo, VelocityMotor
+from symphys.export.mjcf_joints import names
+from symphys.export.mjcf_surfaces import text
+from symphys.model.joints import AffineMotor, Joint, Motor, Servo, TorqueMotor, VelocityMotor
+from symphys.model.scalar import is_zero
 from symphys.types import Array
 
 Inertias = Mapping[tuple[str, int], float]
-"""[kg m^2] or [kg] of each coordinate, by its joint and number there; of joints in trees only."""
+"""The inertia of each coordinate of the trees [kg m^2] or [kg], by the joint's name and the number there."""
 STIFFEST, SOFTEST = 0.01, 0.1
-"""Velocity error at which a motor gives all of its torque, as a share of its largest velocity: wanted, and allowed."""
+"""Velocity error at which a motor gives its full torque, as a share of its largest velocity: desired, and allowed."""
 WITHIN, WITHIN_CONTACT = 1.0, 0.125
-"""Largest h omega of a spring, and of a contact that gives way: a body may have several, whose damping adds up."""
+"""Largest h omega of a spring, and of a compliant contact: a body may have several, whose damping adds up."""
 MOST_PARTS = 50
 """Largest number of parts of a time step."""
+UNBOUNDED = 1e10
+"""Bound of a force or a command where one of two is missing, in the unit of either."""
 
 
 def parts(start: StartState, found: Inertias, dt: float) -> int:
-    """The number of parts into which a step of ``dt`` [s] is cut."""
-    longest = min(_longest(start, found), default=math.inf)
+    """Return the number of parts into which a step of ``dt`` [s] is cut."""
+    longest = min(_longest(start, found), default=inf)
     return max(1, min(MOST_PARTS, math.ceil(dt / longest - 1e-9))) if longest > 0 else MOST_PARTS
 
 
 def steepness(motor: Servo | VelocityMotor, inertia: float, step: float) -> float:
-    """kv on a coordinate of this inertia [N m s/rad] or [N s/m], at a time step [s]."""
+    """Return kv on a coordinate of this inertia [N m s/rad] or [N s/m], at a time step [s]."""
     return float(min(motor.torque / (STIFFEST * motor.velocity), 2 * inertia / step))
 
 
 def inertias(start: StartState) -> Inertias:
-    """The inertia of each coordinate at the start while all others are free."""
+    """Compute the inertia of each coordinate at the start while all others are free."""
     world, links = start.world, links_of(start.world)
     columns: list[Array] = []
     """Twists (6,) of the coordinates at the world's origin: velocity and angular velocity at a rate of 1."""
@@ -73,7 +80,7 @@ def inertias(start: StartState) -> Inertias:
 
 
 def _freedoms(start: StartState, joint: int | None, body: int) -> Iterator[tuple[str, int, Array]]:
-    """Name and number of a coordinate, no name for those of none, and its twist (6,) at the world's origin."""
+    """Yield name, number and twist (6,) at the world's origin of each coordinate; free motions have no name."""
     if joint is None:
         yield from (("", k, row) for k, row in enumerate(np.eye(6)))
         return
@@ -88,12 +95,12 @@ def _freedoms(start: StartState, joint: int | None, body: int) -> Iterator[tuple
 
 
 def _armature(joints: tuple[Joint, ...], owner: tuple[str, int] | None) -> float:
-    """The armature of a coordinate's joint [kg m^2] or [kg]."""
+    """Return the armature of a coordinate's joint [kg m^2] or [kg]."""
     return next((float(joint.armature) for joint in joints if owner and joint.name == owner[0]), 0.0)
 
 
 def _longest(start: StartState, found: Inertias) -> Iterator[float]:
-    """The longest step that each motor, spring and soft contact takes [s]."""
+    """Yield the longest stable step of each motor, spring and compliant contact [s]."""
     joints = {joint.name: joint for joint in start.world.joints}
     for (name, _), inertia in found.items():
         motor, stiffness = joints[name].motor, _stiffness(joints[name])
@@ -107,7 +114,49 @@ def _longest(start: StartState, found: Inertias) -> Iterator[float]:
 
 
 def _stiffness(joint: Joint) -> float:
-    """Of a joint's spring and affine motor along each coordinate."""
+    """Return the stiffness of a joint's spring and affine motor along each coordinate [N m/rad] or [N/m]."""
     spring = 0.0 if joint.spring is None else float(joint.spring.stiffness)
     motor = joint.motor
     return spring + (float(motor.kp) * float(motor.gear) ** 2 if isinstance(motor, AffineMotor) else 0.0)
+
+
+def actuators(joint: Joint, inertias: Inertias, step: float) -> list[Element]:
+    """Write an actuator for each coordinate of a joint with a motor, for a time step [s]."""
+    if joint.motor is None:
+        return []
+    found = []
+    for number, name in enumerate(names(joint)):
+        kind, attributes = actuator(joint.motor, inertias.get((joint.name, number), inf), step)
+        found.append(Element(kind, {"name": name, "joint": name, **attributes}))
+    return found
+
+
+def actuator(motor: Motor, inertia: float, step: float) -> tuple[str, dict[str, str]]:
+    """Return the kind and the attributes of the nearest actuator for a motor on a coordinate of this inertia."""
+    if isinstance(motor, AffineMotor):
+        return affine(motor)
+    bound = text((-motor.torque, motor.torque))
+    if isinstance(motor, TorqueMotor):
+        return "motor", {"ctrlrange": bound}
+    kv = steepness(motor, inertia, step)
+    attributes = {"kv": text([kv]), "forcerange": bound}
+    if isinstance(motor, Servo):
+        held = {} if motor.range is None else {"ctrlrange": text((-motor.range, motor.range))}
+        return "position", {"kp": text([kv * motor.gain]), **attributes, **held}
+    return "velocity", {**attributes, "ctrlrange": text((-motor.velocity, motor.velocity))}
+
+
+def affine(motor: AffineMotor) -> tuple[str, dict[str, str]]:
+    """Return the exact actuator: "motor" if the force is the command, "general" otherwise."""
+    ranges = {"ctrlrange": motor.command_range, "forcerange": motor.force_range}
+    found = {"gear": text([motor.gear])}
+    found |= {key: text(bounded(ends)) for key, ends in ranges.items() if ends is not None and ends != (-inf, inf)}
+    if motor.passive and is_zero(motor.offset) and is_zero(motor.gain - 1):
+        return "motor", found
+    bias = text([motor.offset, -motor.kp, -motor.kv])
+    return "general", {**found, "gainprm": text([motor.gain]), "biastype": "affine", "biasprm": bias}
+
+
+def bounded(ends: tuple[float, float]) -> tuple[float, float]:
+    """Replace infinite bounds by numbers that MuJoCo takes."""
+    return max(ends[0], -UNBOUNDED), min(ends[1], UNBOUNDED)
