@@ -26,8 +26,8 @@ from symphys.findings.numerics import (
     smoothed_findings,
     unfelt,
 )
-from symphys.findings.obstacles import capital, obstacle_findings, obstacles
-from symphys.findings.writing import listed, percent, show
+from symphys.findings.obstacles import obstacle_findings, obstacles
+from symphys.findings.writing import capital, listed, percent, show
 
 FAULT, NO_SLOPE = "fault", "zero"
 SUBJECTS = (GRADIENT, GROWTH, GRID, SMOOTHING, ENERGY, CONTACTS)

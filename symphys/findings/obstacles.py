@@ -6,7 +6,7 @@ import math
 
 from symphys.findings.examination import Examination, HeldBound
 from symphys.findings.levels import FAIR, UNKNOWN, Finding, Judged
-from symphys.findings.writing import listed, several, show
+from symphys.findings.writing import capital, listed, several, show
 
 TARGETS, BOUNDS = "targets", "bounds"
 TINY = 1e-12
@@ -101,8 +101,3 @@ def extent(bound: HeldBound) -> str:
     """The bound, and how many knots lie there."""
     knots = f"{bound.knots} of {bound.of} knots" if bound.of > 1 else ""
     return ", ".join(filter(None, ("" if math.isnan(bound.bound) else show(bound.bound), knots)))
-
-
-def capital(clause: str) -> str:
-    """With a capital letter."""
-    return clause[:1].upper() + clause[1:]

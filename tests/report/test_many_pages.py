@@ -81,7 +81,7 @@ def test_a_motion_that_cannot_be_drawn_ends_no_page_of_others(
         raise ValueError("cannot convert float NaN to integer")
 
     monkeypatch.setattr("symphys.report.pages.batch.draw_motion", fails)
-    monkeypatch.setattr("symphys.report.pages.run.draw_motion", fails)
+    monkeypatch.setattr("symphys.report.pages.motion.draw_motion", fails)
     found = make_pages(wanted_below(tmp_path / "all", remake=True))
     assert [fault.page.name for fault in found.faults] == [PAGE]
     text = found.page.read_text(encoding="utf-8")

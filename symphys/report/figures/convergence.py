@@ -10,8 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from symphys.findings.writing import capital
 from symphys.report.figures import style
-from symphys.report.figures.data import DataFigure, keep
+from symphys.report.figures.data import DataFigure, keep, thin
 from symphys.results.discovery import Study
 from symphys.results.result import StageRecord, smoothed
 from symphys.results.run import Run
@@ -102,7 +103,7 @@ def draw_convergence(study: Study) -> DataFigure | None:
     outputs = dict.fromkeys(name for run in study.runs for name in run.outputs)
     asked = [
         *QUANTITIES,
-        *((f"{name[:1].upper()}{name[1:]}, of the best so far", best_output(name)) for name in outputs),
+        *((f"{capital(name)}, of the best so far", best_output(name)) for name in outputs),
     ]
     rows = [quantity for quantity in asked if any(curve(run, WORK, quantity[1]) for run in study.runs)]
     columns = [x for x in (WORK, SECONDS) if any(np.isfinite(run.trace[x]).any() for run in study.runs)]
@@ -130,7 +131,7 @@ def keep_runs(axes: Axes, study: Study, columns: Sequence[str], rows: Sequence[t
     found: list[tuple[list[str], list[int], Array]] = []
     for run in study.runs:
         numbers = [*(run.trace[along] for along in columns), *(quantity(run) for _, quantity in rows)]
-        _, thinned = style.thin(np.arange(float(run.trace.rows)), np.stack(numbers, axis=1), MOST_POINTS)
+        _, thinned = thin(np.arange(float(run.trace.rows)), np.stack(numbers, axis=1), MOST_POINTS)
         found.append(([run.solver] * len(thinned), [run.seed] * len(thinned), thinned))
     numbers_of_all = np.concatenate([numbers for _, _, numbers in found])
     words = {"solver": [name for names, _, _ in found for name in names]}
@@ -199,7 +200,7 @@ def fit_values(axes: Axes, values: Array, relative: bool) -> None:
 
 def draw_steps(axes: Axes, source: Curve, **look: object) -> None:
     """A step function, thinned; x = 0 is drawn just left of the first positive x."""
-    x, y = style.thin(source.x, source.y[:, None], MOST_POINTS)
+    x, y = thin(source.x, source.y[:, None], MOST_POINTS)
     positive = x[x > 0]
     first = float(positive.min()) * 0.8 if positive.size else 1.0
     axes.plot(np.where(x > 0, x, first), y[:, 0], drawstyle="steps-post", **look)  # type: ignore[arg-type]

@@ -231,21 +231,6 @@ def apart(low: Array, high: Array) -> tuple[Array, Array]:
     return middle - half, middle + half
 
 
-def thin(time: Array, columns: Array, points: int = 700) -> tuple[Array, Array]:
-    """At most about ``points`` samples of (rows, k) that keep the lowest and highest value of every stretch."""
-    rows = len(time)
-    if rows <= points:
-        return time, columns
-    stretches = np.array_split(np.arange(rows), max(points // (2 * columns.shape[1]), 30))
-    filled = np.nan_to_num(columns, nan=0.0, posinf=0.0, neginf=0.0)
-    keep = {0, rows - 1}
-    for stretch in stretches:
-        part = filled[stretch]
-        keep.update(int(i) for i in stretch[np.concatenate([part.argmin(axis=0), part.argmax(axis=0)])])
-    chosen = np.array(sorted(keep))
-    return time[chosen], columns[chosen]
-
-
 def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
     """One legend for all panels, in a row above them."""
     figure.legend(handles, labels, loc="outside upper left", ncols=min(len(labels), 8), borderaxespad=0.2)

@@ -5,14 +5,15 @@ from __future__ import annotations
 import base64
 import hashlib
 import html
+import json
 import re
-from collections.abc import Iterable, Sequence
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from urllib.parse import quote
 
 from symphys.report.charts.chart import Chart
-from symphys.report.charts.packed import pack, pack_json
 from symphys.report.figures.style import Picture
 from symphys.report.making.stamps import Stamp
 from symphys.results.file_names import FIGURES
@@ -102,6 +103,11 @@ def figures(pictures: Iterable[Drawn], caption: Part = "") -> Html:
     return join(parts)
 
 
+def named_figure(pictures: Mapping[str, Drawn], name: str, caption: Part = "") -> Html:
+    """Embed the picture of that name, if it was made."""
+    return figures([pictures[name]] if name in pictures else [], caption)
+
+
 def figure(picture: Picture) -> Html:
     """A picture embedded in the page, with links to its files, which lie in a folder beside the page."""
     code = base64.b64encode(picture.svg.encode()).decode("ascii")
@@ -112,8 +118,19 @@ def figure(picture: Picture) -> Html:
 
 def chart(found: Chart) -> Html:
     """The place of a chart, and its numbers, compressed."""
-    data = tag("script", Html(pack_json(found.to_json())), type="application/json", class_=PACKED)
-    return tag("figure", tag("div", role="img", aria_label=found.alt), data, class_="chart", data_name=found.name)
+    place = tag("div", role="img", aria_label=found.alt)
+    return tag("figure", place, packed_json(found.to_json()), class_="chart", data_name=found.name)
+
+
+def pack(text: str) -> str:
+    """Compress a text: base64 of a zlib stream, which ``unpack.js`` unpacks in the browser."""
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
+
+
+def packed_json(value: object) -> Html:
+    """Embed a value of strict JSON for scripts of a light page, compressed."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    return tag("script", Html(pack(text)), type="application/json", class_=PACKED)
 
 
 def embedded(data: str) -> Html:

@@ -11,19 +11,32 @@ import numpy as np
 
 from symphys import json_values as values
 from symphys.findings import writing
-from symphys.findings.writing import show
+from symphys.findings.advice import advice, answers, findings, slopes
+from symphys.findings.contacts import sliding
+from symphys.findings.examination import Examination
+from symphys.findings.levels import MARKS, Judged
+from symphys.findings.writing import capital, show
+from symphys.report.charts.run import component_names, knotted
 from symphys.report.figures import style
-from symphys.report.figures.variables import component_names, knotted
 from symphys.report.pages import words
-from symphys.report.pages.markup import Drawn, Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
-from symphys.report.robots.branches import is_large
-from symphys.report.scene.animation import animation, light_animation
+from symphys.report.pages.markup import (
+    Drawn,
+    Html,
+    banner,
+    card,
+    facts,
+    fold,
+    join,
+    named_figure,
+    pill,
+    stats,
+    table,
+    tag,
+)
 from symphys.results.case_name import settings_words
-from symphys.results.result import CheckRecord, Result, VariableRecord
+from symphys.results.result import CheckRecord, Result, StageRecord, VariableRecord, smoothed
 from symphys.results.run import Run
-from symphys.results.scene import Scene
 from symphys.results.trace import OUTPUT
-from symphys.trajectory import Trajectory
 from symphys.types import Array
 
 FOOTER = tag("footer", "Made by symphys from the files of the run folder; make it again with “symphys report”.")
@@ -40,12 +53,25 @@ LOG_TAIL = 20_000
 HOW_JUDGED = (
     "Judged by an exact rollout of the result, without smoothing. The bar ends at the error, the line is the tolerance."
 )
-HOW_DRAWN = "Poses at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
-HOW_ROBOTS_DRAWN = (
-    "Whole poses, each most of a length further on, the later the stronger; lines are paths of base bodies and feet."
+HOW_READ = (
+    "Each stage starts from the best point of the one before. “There” is at the stage's own smoothing, as the solver "
+    "saw it; “exact” is the same point in the exact rollout, which alone counts. The last point is the result, unless "
+    "an earlier one or the guess is worth more exactly."
 )
-HOW_JOINTS_DRAWN = "Dots are joints, squares those that slide or hold fast; bars are the axes."
-HOW_STRIP_DRAWN = "At even times; the section shown follows what travels far."
+NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder examines how far to trust it."
+ONLY_MOTION = (
+    "Only the motion was examined. “symphys check --at” this folder also examines its gradient, finer time steps and "
+    "the growth of changes."
+)
+HOW_FAR = "How far to trust this"
+HOW_GROWN = (
+    "By how much a small change of the state at time t is magnified until the end: distances in m, velocities in m/s, "
+    "turning at the bodies' radius of gyration; estimated from a few directions. Ticks: a contact begins."
+)
+HOW_BALANCED = (
+    "Potential energy is 0 at the origin. Angular momentum is not checked: where surfaces touched is not recorded."
+)
+HOW_REFINED = "The same variables, simulated otherwise: the answers, and in percent how much the gradients change."
 CHAPTERS = (
     ("checks", "Checks"),
     ("motion", "Motion"),
@@ -91,7 +117,7 @@ def key_numbers(run: Run) -> Html:
         [
             ("Objective", show(run.objective)),
             ("Error / tolerance", show(run.worst_ratio)),
-            *((name[:1].upper() + name[1:], show(value)) for name, value in run.outputs.items()),
+            *((capital(name), show(value)) for name, value in run.outputs.items()),
             ("Rollouts", words.count(run.counts.get("rollouts", math.nan))),
             *used,
             *labelled(run),
@@ -155,25 +181,6 @@ def gauge(check: CheckRecord) -> Html:
     return tag("span", bar, class_=f"gauge {'good' if check.met else 'bad'}", aria_hidden="true")
 
 
-def motion(
-    trajectory: Trajectory | None,
-    scene: Scene,
-    guess: Trajectory | None,
-    pictures: Mapping[str, Drawn],
-    faults: Sequence[str],
-) -> Html:
-    """The motion played and drawn, or why there is none; on a light page it is played only."""
-    notes = tag("p", "Not read: " + "; ".join(faults) + ".", class_="note") if faults else Html("")
-    if trajectory is None:
-        return card("The motion", tag("p", "This run recorded no motion."), notes, anchor="motion")
-    if "motion" not in pictures:
-        return card("The motion", light_animation(trajectory, scene, guess), notes, anchor="motion")
-    how = HOW_ROBOTS_DRAWN if is_large(trajectory, scene) else HOW_DRAWN
-    drawn = figures([pictures["motion"]], f"{how} {HOW_JOINTS_DRAWN}" if scene.joints else how)
-    strip = figures([pictures["strip"]], HOW_STRIP_DRAWN) if "strip" in pictures else Html("")
-    return card("The motion", animation(trajectory, scene, guess), strip, drawn, notes, anchor="motion")
-
-
 def found(run: Run, pictures: Mapping[str, Drawn]) -> Html:
     """Variables with one knot as a table, those with many as curves."""
     rows = [row for variable in run.variables if variable.value.shape[1] == 1 for row in variable_rows(variable)]
@@ -188,7 +195,7 @@ def found(run: Run, pictures: Mapping[str, Drawn]) -> Html:
         "What was found",
         table(header, rows[:MOST_ROWS], "tnnnnt", "Variables") if rows else "",
         more,
-        figures([pictures["variables"]] if "variables" in pictures else [], "; ".join(curves)),
+        named_figure(pictures, "variables", "; ".join(curves)),
         anchor="found",
     )
 
@@ -243,6 +250,101 @@ def between(value: float, guess: float, low: float, high: float) -> Html:
     bar = tag("span", *spots, class_="range", aria_hidden="true")
     edge = min(value - low, high - value) <= 1e-6 * (high - low)
     return join([bar, tag("small", "at a bound")]) if edge else bar
+
+
+def trusted(run: Run, pictures: Mapping[str, Drawn]) -> Html:
+    """Advice, findings, figures, and the refinements as numbers."""
+    judged = run.judged
+    lines = findings(run.examination, judged)
+    if not lines:
+        unknown = tag("p", NOT_EXAMINED) if run.readable else ""
+        return card(HOW_FAR, unknown, anchor="trust")
+    rows = [[pill(line.level, MARKS[line.level]), line.what, line.number, line.meaning] for line in lines]
+    return card(
+        HOW_FAR,
+        tag("p", advice(run.examination, judged)),
+        tag("p", ONLY_MOTION) if not run.examination.gradient else "",
+        table(["", "check", "value", "interpretation"], rows, "tttt", "Verification"),
+        step_note(run.examination),
+        named_figure(pictures, "growth", HOW_GROWN),
+        named_figure(pictures, "energy", " ".join(filter(None, [HOW_BALANCED, sliding(run.examination)]))),
+        refined(run.examination, judged),
+        anchor="trust",
+    )
+
+
+def step_note(trust: Examination) -> Html:
+    """What the numbers are, where that is not in the lines."""
+    if not math.isfinite(trust.step):
+        return Html("")
+    return tag(
+        "p", f"Central differences with a step of {show(trust.step, 2)} of a variable's scale.", class_="caption"
+    )
+
+
+def refined(trust: Examination, judged: Judged) -> Html:
+    """The refinements as tables; nothing without any."""
+    if not trust.refined:
+        return Html("")
+    header, rows = answers(trust, judged)
+    gradients, changes = slopes(trust)
+    return tag(
+        "details",
+        tag("summary", "Refined and smoothed, as numbers"),
+        table(header, rows, "tnnt", "Answers"),
+        table(gradients, changes, "tnnt" + "n" * len(trust.refined), "Gradients"),
+        tag("p", HOW_REFINED, class_="caption"),
+    )
+
+
+def stage_card(run: Run) -> Html:
+    """The stages in a table; nothing for a run without smoothing."""
+    if not smoothed(run.stages):
+        return Html("")
+    every = ("rollouts", "gradients", "jacobians", "hessians")
+    kinds = [kind for kind in every if any(stage.counts.get(kind, 0) > 0 for stage in run.stages)]
+    checked = bool(run.checks)
+    header = ["smoothing", "ended as", "objective there", "exact objective"]
+    header += ["error / tolerance there", "exact error / tolerance", ""] if checked else []
+    rows = [stage_row(stage, kinds, checked) for stage in run.stages]
+    layout = "ttnn" + "nnt" * checked + "n" * (len(kinds) + 1)
+    content = table([*header, *kinds, "time"], rows, layout, "Stages of smoothing")
+    return card("Stages of smoothing", content, remark(run), anchor="stages", note=HOW_READ)
+
+
+def stage_row(stage: StageRecord, kinds: Sequence[str], checked: bool) -> list[Html | str]:
+    """The cells of one stage."""
+    cells: list[Html | str] = [f"{show(stage.smoothing)} m/s" if stage.smoothing else "0, exact"]
+    cells += [words.ended(stage.status), show(stage.objective), tag("b", show(stage.exact_objective))]
+    if checked:
+        cells += [show(stage.worst), tag("b", show(stage.exact_worst))]
+        cells.append(pill("good", "met") if stage.solved else pill("bad", "missed"))
+    cells += [words.count(stage.counts.get(kind, math.nan)) for kind in kinds]
+    return [*cells, words.seconds(stage.seconds)]
+
+
+def remark(run: Run) -> Html:
+    """Says so where an earlier stage came closer than the last; its point is the result then, unless means decided."""
+    last, best = run.stages[-1], min(run.stages, key=rank)
+    if run.status == "interrupted" or rank(best) >= rank(last):
+        return Html("")
+    text = f"The point of the stage at {show(best.smoothing)} m/s "
+    if run.objective == best.exact_objective:
+        text += "is the result: it does better in the exact rollout than that of the last stage"
+    else:
+        text += "does better in the exact rollout than the result"
+    return tag("p", f"{text}: what the last stages gained, they gained for another problem.", class_="caption")
+
+
+def rank(stage: StageRecord) -> tuple[bool, float]:
+    """What comes closest in the exact rollout is lowest."""
+    return not stage.solved, stage.exact_objective if math.isfinite(stage.exact_objective) else math.inf
+
+
+def convergence(run: Run, pictures: Mapping[str, Drawn]) -> Html:
+    """Show the convergence, and say what the figure leaves out."""
+    caption = f"Pale: the lowest so far{' in its stage' * smoothed(run.stages)}. Work counts one rollout as 1."
+    return card("Convergence", named_figure(pictures, "convergence", caption), anchor="convergence")
 
 
 def time_split(run: Run) -> Html:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from symphys.findings.endings import ending
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, verdict_words
-from symphys.findings.writing import listed, plain, show
+from symphys.findings.writing import capital, listed, plain, show
 from symphys.results.result import CheckRecord
 from symphys.results.run import Run
 
@@ -55,8 +55,7 @@ def level(run: Run) -> str:
 def headline(run: Run) -> str:
     """A few words for a run."""
     if run.verdict in (SOLVED, DOUBTED, BEST_FOUND):
-        words = verdict_words(run.verdict, run.status, bool(run.checks))
-        return words[:1].upper() + words[1:]
+        return capital(verdict_words(run.verdict, run.status, bool(run.checks)))
     return ending(run.status).headline
 
 

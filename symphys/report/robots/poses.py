@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Polygon
 
-from symphys.report.figures import style
+from symphys.report.figures.data import thin
 from symphys.report.robots.branches import colours, linked, traced
 from symphys.report.robots.joint_positions import bones, draw_joint_positions, draw_lines
 from symphys.report.scene.outlines import inner_edges, outline
@@ -67,7 +67,7 @@ def draw_paths(axes: Axes, view: View, trajectory: Trajectory, scene: Scene) -> 
     kept = traced(trajectory, scene)
     for body, colour in enumerate(colours(trajectory, scene)):
         if trajectory.body_names[body] in kept:
-            _, path = style.thin(trajectory.time, view.flat(trajectory.position[:, body]), 500)
+            _, path = thin(trajectory.time, view.flat(trajectory.position[:, body]), 500)
             axes.plot(*path.T, color=colour, linewidth=0.8, alpha=0.6, zorder=2.2)
 
 

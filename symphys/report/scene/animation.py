@@ -6,9 +6,8 @@ import json
 
 import numpy as np
 
-from symphys.report.charts.packed import pack_json
 from symphys.report.figures import style
-from symphys.report.pages.markup import PACKED, Html, dot, embedded, join, tag
+from symphys.report.pages.markup import Html, dot, embedded, join, packed_json, tag
 from symphys.report.robots.branches import colours, keys, linked, traced
 from symphys.report.robots.joint_positions import SQUARE, axes_of, drawable
 from symphys.report.scene.ghosts import MEASURED
@@ -38,9 +37,8 @@ def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = N
 
 def light_animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> Html:
     """The same for a light page: fewer numbers, compressed."""
-    data = pack_json(motion_data(trajectory, scene, guess, LIGHT_NUMBERS))
-    held = tag("script", Html(data), type="application/json", class_=PACKED)
-    return player(trajectory, scene, "The motion plays only with JavaScript.", held)
+    data = packed_json(motion_data(trajectory, scene, guess, LIGHT_NUMBERS))
+    return player(trajectory, scene, "The motion plays only with JavaScript.", data)
 
 
 def player(trajectory: Trajectory, scene: Scene, without: str, data: Html) -> Html:

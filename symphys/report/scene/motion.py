@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from symphys.report.figures import style
-from symphys.report.figures.data import TIME, DataFigure, keep, vector
+from symphys.report.figures.data import TIME, DataFigure, keep, thin, vector
 from symphys.report.robots.branches import is_large, keys, traced
 from symphys.report.robots.joint_positions import draw_joint_positions
 from symphys.report.robots.poses import draw_robots
@@ -53,7 +53,7 @@ def keep_paths(axes: Axes, trajectory: Trajectory, names: Sequence[str], whose: 
     for body, name in enumerate(trajectory.body_names):
         if name in names:
             place, turned = trajectory.position[:, body], trajectory.orientation[:, body]
-            times, poses = style.thin(trajectory.time, np.concatenate([place, turned], axis=1), MOST_POSES)
+            times, poses = thin(trajectory.time, np.concatenate([place, turned], axis=1), MOST_POSES)
             columns = vector(f"{name}.position", "m", poses[:, :3]) | vector(
                 f"{name}.orientation", "", poses[:, 3:], "wxyz"
             )
@@ -64,7 +64,7 @@ def draw_guess(axes: Axes, panel: ViewPanel, guess: Trajectory, names: Sequence[
     """The guess's paths of these bodies, thin and grey."""
     for body in (index for index, name in enumerate(guess.body_names) if name in names):
         path = panel.view.flat(guess.position[:, body])
-        _, path = style.thin(guess.time, path, 300)
+        _, path = thin(guess.time, path, 300)
         axes.plot(*path.T, color="#98a4af", linewidth=0.9, linestyle=(0, (4, 2.5)), zorder=2)
 
 

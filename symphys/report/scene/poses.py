@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, Polygon
 
 from symphys.report.figures import style
+from symphys.report.figures.data import thin
 from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
 from symphys.report.scene.views import View, centres, corners, half_axes, reach, solids_of, turn
@@ -30,7 +31,7 @@ def draw_bodies(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
     shots = np.linspace(0, len(trajectory.time) - 1, int(np.clip(SHAPES // total, 3, 10))).round().astype(int)
     for body in bodies:
         colour = style.BODIES[body % len(style.BODIES)]
-        _, path = style.thin(trajectory.time, panel.view.flat(trajectory.position[:, body]), 500)
+        _, path = thin(trajectory.time, panel.view.flat(trajectory.position[:, body]), 500)
         axes.plot(*path.T, color=colour, linewidth=1.3 if total < 10 else 0.7, zorder=3)
         solids = solids_of(trajectory, scene, body)
         for shot in apart(trajectory, panel.view, body, solids, shots):
