@@ -15,10 +15,10 @@ from rich.text import Text
 
 from symphys import files
 from symphys.findings.advice import FAULT, NO_SLOPE, VERDICTS, advice, answers, findings, of_influence, slopes
-from symphys.findings.contacts import sliding
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Judged
 from symphys.findings.numerics import GRADIENT, GRID, reach
+from symphys.findings.physics import sliding
 from symphys.transcription import Assessment
 
 COLOURS = {GOOD: "green", FAIR: "yellow", BAD: "red", UNKNOWN: "dim"}

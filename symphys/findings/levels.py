@@ -12,7 +12,7 @@ MARKS = {GOOD: "good", FAIR: "look closer", BAD: "do not rely on it", UNKNOWN: "
 
 @dataclass(frozen=True)
 class Finding:
-    """One line: its subject, a level, what was looked at, its number, and what that means.
+    """A line of an examination: its subject, level, check, value and interpretation.
 
     ``doubt``: a clause on why no result that rests on it is to be relied on; empty where that does not follow.
     """
@@ -27,7 +27,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Judged:
-    """How what is examined was judged as it stands.
+    """The judgement of what is examined.
 
     Attributes:
         objective: its value.

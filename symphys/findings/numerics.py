@@ -68,7 +68,7 @@ def unfelt(check: GradientCheck) -> bool:
 
 
 def refined_finding(refined: Refined, judged: Judged) -> Finding:
-    """The same z, simulated more finely; what was met and is missed by far then is refuted."""
+    """Judge a finer simulation of the same z; what was met and is missed by far then is refuted."""
     what = f"Simulated again with {unbroken(refined.what) or 'a refinement'}"
     number = f"objective {show(refined.objective)}"
     if judged.checked and not math.isnan(refined.worst):
@@ -93,7 +93,7 @@ def refined_finding(refined: Refined, judged: Judged) -> Finding:
 
 
 def slope_finding(trust: Examination) -> list[Finding]:
-    """What refinement does to the gradient; nothing where that was not measured, or where nothing is felt."""
+    """Judge how refinement changes the gradient; empty where that was not measured, or where all gradients are 0."""
     if trust.gradient and all(unfelt(check) for check in trust.gradient):
         return []
     changes = [(unbroken(refined.what), refined.change) for refined in trust.refined]
@@ -120,7 +120,7 @@ def unbroken(text: str) -> str:
 
 @dataclass(frozen=True)
 class GradientReach:
-    """How far gradients reach along a growth curve.
+    """The reach of gradients along a growth curve.
 
     Attributes:
         total: the largest magnification of a change by the end.
@@ -138,7 +138,7 @@ class GradientReach:
 
 
 def reach(growth: Growth) -> GradientReach:
-    """How far a gradient reaches.
+    """Compute how far a gradient reaches.
 
     |dx_T/dx_s| <= |dx_T/dx_t| |dx_t/dx_s|: what the curve has fallen from s to t, a change has at least grown. So a
     gradient with respect to the state at s is not to be trusted beyond the t where the curve has fallen by the second
@@ -178,14 +178,14 @@ def growth_finding(growth: Growth) -> Finding:
 
 
 def too_far(far: GradientReach) -> str:
-    """Where a gradient ends, as a clause."""
+    """Write as a clause where a gradient ends."""
     if not math.isfinite(far.end):
         return ""
     return f"; the gradient is not to be trusted beyond {show(far.end, 2)} s"
 
 
 def smoothed_findings(rows: tuple[Smoothed, ...], judged: Judged) -> list[Finding]:
-    """What smoothing changes: of the problem's own what it hides, else how much would do no harm."""
+    """Judge what the problem's own smoothing hides, or else how much smoothing would do no harm."""
     if not rows:
         return []
     what = f"Smoothed over {listed([show(row.smoothing) for row in rows])} m/s"
@@ -206,7 +206,7 @@ def smoothed_findings(rows: tuple[Smoothed, ...], judged: Judged) -> list[Findin
 
 
 def smoothed_level(row: Smoothed, judged: Judged) -> str:
-    """How much this smoothing changes the answer: what is met, what is minimised, and the motion."""
+    """Grade how much this smoothing changes the answer: what is met, what is minimised, and the motion."""
     if judged.met and judged.checked:
         answer = worst_of([graded(row.worst, WORST_LIMITS), graded(share(judged.costs, row.costs), OBJECTIVE_LIMITS)])
     else:

@@ -30,7 +30,7 @@ HELD = "It ends there, and what is minimised falls beyond: the bound holds it ba
 
 
 def obstacle_findings(trust: Examination, judged: Judged) -> list[Finding]:
-    """Every line on what stands in the way; of targets only where something is missed."""
+    """List what stands in the way of an answer; targets only where something is missed."""
     lines = []
     if not judged.met:
         kinds = (
@@ -86,7 +86,7 @@ def said_of(names: tuple[str, ...], clause: str) -> str:
 
 
 def bound_words(bound: HeldBound, knots: bool = True) -> str:
-    """``the upper bound 5 of throw[0]``; ``knots``: with those that lie there, where there are several."""
+    """Write ``the upper bound 5 of throw[0]``; ``knots``: with the number of knots that lie there."""
     value = "" if math.isnan(bound.bound) else f" {show(bound.bound)}"
     where = f" (at {bound.knots} of {bound.of} knots)" if knots and bound.of > 1 else ""
     return f"the {bound.side} bound{value} of {place(bound)}{where}"

@@ -45,7 +45,7 @@ def rule(status: str, judged: Judged, trust: Mapping[str, object] | None) -> Rul
 
 
 def doubts(trust: Examination, judged: Judged) -> tuple[str, ...]:
-    """Why a result is not to be relied on, one clause for each finding that refutes it; empty if none does.
+    """List why a result is not to be relied on, one clause for each finding that refutes it; empty if none does.
 
     That changes grow beyond use spoils gradients. It refutes a result unless finer simulations come to the same: a walk
     may be a walk whatever its last state is.

@@ -32,7 +32,7 @@ def percent(share: float) -> str:
 
 
 def plain(value: float, decimals: int) -> str:
-    """Without an exponent; trailing zeros after the point go, thousands are set apart from 10 000 on."""
+    """Write a number without an exponent or trailing zeros; thousands are set apart from 10 000 on."""
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     if abs(value) >= 10_000:
@@ -52,12 +52,12 @@ def power(exponent: int) -> str:
 
 
 def several(number: int, noun: str, plural: str = "") -> str:
-    """``1 run``, ``3 runs``."""
+    """Write ``1 run``, ``3 runs``."""
     return f"{number} {noun if number == 1 else plural or noun + 's'}"
 
 
 def listed(parts: Sequence[str]) -> str:
-    """``a``, ``a and b``, ``a, b and c``."""
+    """Write ``a``, ``a and b``, ``a, b and c``."""
     return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from symphys import json_values as values
 from symphys.findings import writing
 from symphys.findings.advice import advice, answers, findings, slopes
-from symphys.findings.contacts import sliding
 from symphys.findings.examination import Examination
 from symphys.findings.levels import MARKS, Judged
+from symphys.findings.physics import sliding
 from symphys.findings.writing import capital, show
 from symphys.report.charts.run import component_names, knotted
 from symphys.report.figures import style
@@ -201,7 +201,7 @@ def found(run: Run, pictures: Mapping[str, Drawn]) -> Html:
 
 
 def variable_rows(variable: VariableRecord) -> list[list[str]]:
-    """One row for each component; one for all of a variable with very many, such as the weights of a net."""
+    """Return a row for each component; one for all of a variable with very many, such as the weights of a net."""
     if len(variable.value) > MOST_ROWS:
         return [many_row(variable)]
     rows: list[list[str]] = []
@@ -216,7 +216,7 @@ def variable_rows(variable: VariableRecord) -> list[list[str]]:
 
 
 def sets_of(variable: VariableRecord) -> str:
-    """What it sets, in words."""
+    """Write what a variable sets."""
     *others, last = variable.sets or ("",)
     return f"{', '.join(others)} and {last}, to the same values" if others else last
 
@@ -232,13 +232,13 @@ def many_row(variable: VariableRecord) -> list[str]:
 
 
 def root_mean_square(numbers: Array) -> float:
-    """Of numbers whose squares may be beyond the largest double; nan if one is."""
+    """Return the root mean square of numbers whose squares may overflow; nan if a number is nan."""
     size = float(np.max(np.abs(numbers)))
     return size * math.sqrt(float(((numbers / size) ** 2).mean())) if 0 < size < math.inf else size
 
 
 def between(value: float, guess: float, low: float, high: float) -> Html:
-    """Where value and guess lie between finite bounds; says so where a bound is active."""
+    """Draw where value and guess lie between finite bounds, and say where a bound is active."""
     if not (math.isfinite(low) and math.isfinite(high) and high > low and math.isfinite(value)):
         return tag("small", "free" if math.isinf(low) and math.isinf(high) else "")
     value, guess, low, high = (number / 2 for number in (value, guess, low, high))  # differences may overflow else
@@ -274,7 +274,7 @@ def trusted(run: Run, pictures: Mapping[str, Drawn]) -> Html:
 
 
 def step_note(trust: Examination) -> Html:
-    """What the numbers are, where that is not in the lines."""
+    """Say with what step the gradient was compared; empty where it was not."""
     if not math.isfinite(trust.step):
         return Html("")
     return tag(
@@ -324,7 +324,7 @@ def stage_row(stage: StageRecord, kinds: Sequence[str], checked: bool) -> list[H
 
 
 def remark(run: Run) -> Html:
-    """Says so where an earlier stage came closer than the last; its point is the result then, unless means decided."""
+    """Say where an earlier stage came closer than the last; its point is the result then, unless means decided."""
     last, best = run.stages[-1], min(run.stages, key=rank)
     if run.status == "interrupted" or rank(best) >= rank(last):
         return Html("")
@@ -337,7 +337,7 @@ def remark(run: Run) -> Html:
 
 
 def rank(stage: StageRecord) -> tuple[bool, float]:
-    """What comes closest in the exact rollout is lowest."""
+    """Return a key by which the stage that comes closest in the exact rollout is first."""
     return not stage.solved, stage.exact_objective if math.isfinite(stage.exact_objective) else math.inf
 
 
@@ -372,7 +372,7 @@ def time_split(run: Run) -> Html:
 
 
 def provenance(run: Run) -> Html:
-    """When, with what and by which command."""
+    """Show when the run was made, with which versions and by which command."""
     versions = ", ".join(f"{name} {version}" for name, version in run.versions.items() if name != "platform")
     memory = values.number(run.provenance.get("peak_memory"))
     return facts(
@@ -398,7 +398,7 @@ def machine(run: Run) -> str:
 
 
 def commit(run: Run) -> str:
-    """Of the working folder, and whether there were changes."""
+    """Return the commit of the working folder, and whether there were changes."""
     known = values.name(run.provenance.get("commit"))
     return f"{known}, with changes" if known and run.provenance.get("dirty") is True else known
 
