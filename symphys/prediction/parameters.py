@@ -42,7 +42,7 @@ class NumberBlock:
 
     @cached_property
     def count(self) -> int:
-        """How many they are."""
+        """Return how many numbers the block has."""
         return 3 if self.turns else len(self.where)
 
     @cached_property
@@ -52,7 +52,7 @@ class NumberBlock:
 
 
 def number_blocks(problem: Problem, start: int) -> tuple[tuple[NumberBlock, ...], tuple[NumberBlock, ...]]:
-    """Those of shared variables, then those with a value for each recording; ``start``: where variables begin in z."""
+    """Return the blocks of shared variables, and those of variables with a value for each recording."""
     found: dict[bool, list[NumberBlock]] = {False: [], True: []}
     for variable in problem.variables:
         blocks = found[variable.each]
@@ -115,5 +115,5 @@ def numbers_of(block: NumberBlock) -> dict[str, Array]:
 
 
 def axes(name: str, count: int) -> list[str]:
-    """``size[0]``, ``size[1]``; the name alone of one number."""
+    """Write ``size[0]``, ``size[1]``; the name alone of one number."""
     return [name] if count == 1 else [f"{name}[{k}]" for k in range(count)]

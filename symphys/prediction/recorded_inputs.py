@@ -39,7 +39,7 @@ def delays(recording: Recording) -> Mapping[str, float]:
 
 
 def step_means(recorded: RecordedInput, steps: int, dt: float, delay: float) -> tuple[Array, Array]:
-    """(steps, m) the inputs of the steps, and (steps, m) their derivatives by the delay [s].
+    """Return (steps, m) the inputs of the steps, and (steps, m) their derivatives by the delay [s].
 
     Args:
         recorded: with samples at times (k,) [s].
@@ -53,7 +53,7 @@ def step_means(recorded: RecordedInput, steps: int, dt: float, delay: float) -> 
 
 
 def _signal(recorded: RecordedInput, at: Array, slack: float) -> tuple[Array, Array]:
-    """(n, m) the signal just before times (n,), and its integral from the first sample."""
+    """Return (n, m) the signal just before times (n,), and its integral from the first sample."""
     time, values = recorded.time, recorded.values
     span, rise = np.diff(time)[:, None], np.diff(values, axis=0)
     slopes = rise / span if recorded.interpolation == "linear" else np.zeros_like(rise)

@@ -23,13 +23,13 @@ def turned(q: Array, v: Array) -> tuple[Array, Array]:
 
 
 def rotation_vectors(q: Array, p: Array) -> Array:
-    """(n, 3) [rad]: of conj(q) p, the rotation from q to p (n, 4) in the frame that q turns; at most half a turn."""
+    """Return (n, 3) [rad] the rotation vectors of conj(q) p, from q to p (n, 4), in the frame of q; at most pi long."""
     w, v, _ = _relative(q, p)
     return np.asarray(_factors(w, v)[0] * v)
 
 
 def rotation_slopes(q: Array, p: Array) -> Array:
-    """(n, 3, 4): how these change with p."""
+    """Return (n, 3, 4) the derivatives of ``rotation_vectors`` by p."""
     w, v, rows = _relative(q, p)
     factor, by_w, by_s = _factors(w, v)
     by_v = factor[:, :, None] * np.eye(3) + by_s[:, :, None] * v[:, :, None] * v[:, None, :]

@@ -19,7 +19,7 @@ import numpy as np
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.state import FitOptions, FitOutcome, begin
 from symphys.identification.interface import FitParameters, IdentificationError, RecordedResiduals
-from symphys.results.identification.parts import GlobalSearch
+from symphys.results.identification.record import GlobalSearch
 from symphys.types import Array, Ints
 
 FAR = 0.5
@@ -65,7 +65,7 @@ def search(
     settings: SearchOptions,
     stop: Callable[[], bool] | None = None,
 ) -> tuple[GlobalSearch, FitOutcome]:
-    """What the search found, and the outcome with the lowest merit: ``fitted`` itself where nothing is lower."""
+    """Search for a lower minimum; return the search, and the outcome with the lowest merit, which may be ``fitted``."""
     candidates = strategy(problem, fitted, which, options, settings, stop)
     best = fitted
     for shared in far_apart(candidates, fitted.state.shared, problem.shared.scale)[: settings.starts]:
@@ -80,7 +80,7 @@ def search(
 
 
 def words(fitted: FitOutcome, best: FitOutcome, lower: bool) -> str:
-    """What the search means."""
+    """Say what the search means."""
     if not lower:
         return "CMA-ES, and fits from what it found, came to nothing lower than the fit"
     share = fitted.merit / best.merit if best.merit > 0 else math.inf
@@ -95,7 +95,7 @@ def strategy(
     settings: SearchOptions,
     stop: Callable[[], bool] | None,
 ) -> list[tuple[float, Array]]:
-    """(merit, shared (s,)) of each candidate whose simulations are finite."""
+    """Return (merit, shared (s,)) of each candidate whose simulations are finite."""
     import cma  # late: it takes a second to import
 
     parameters = problem.shared
@@ -132,7 +132,7 @@ def strategy(
 
 
 def elsewhere(parameters: FitParameters, at: Array, free: Ints, away: float, stream: np.random.Generator) -> Array:
-    """(n,) a start of the free numbers, in scales: anywhere between two bounds, else about ``at`` (n,), so far away."""
+    """Draw a start (n,) of the free numbers, in scales: between two bounds, else about ``at`` (n,), so far away."""
     lower, upper = (bound[free] / parameters.scale[free] for bound in (parameters.lower, parameters.upper))
     bounded = np.isfinite(lower) & np.isfinite(upper)
     low, high = np.where(bounded, lower, 0.0), np.where(bounded, upper, 1.0)
@@ -148,7 +148,7 @@ def rated(problem: RecordedResiduals, shared: Array, own: Array, which: Ints, op
 
 
 def sides(bound: Array) -> list[float | None]:
-    """One side of the bounds as pycma takes it: None where there is none."""
+    """Return one side of the bounds as pycma takes it: None where there is none."""
     return [float(value) if math.isfinite(value) else None for value in bound]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.inference.uncertainty import Information
-from symphys.identification.interface import RecordedResiduals, ResidualRows, Rows
+from symphys.identification.interface import DerivedResiduals, RecordedResiduals, ResidualRows, Rows
 from symphys.types import Array, Ints
 
 LEAST = 1e-12
@@ -24,19 +24,17 @@ TURNS, LEAST_CHANGE = 50, 1e-4
 """Turns of Huber's proposal 2 on the same residuals, at most, and the change at which they end."""
 
 
-class RescaledResiduals:
+class RescaledResiduals(DerivedResiduals):
     """A problem whose residuals of each quantity are divided by a factor more."""
 
     def __init__(self, problem: RecordedResiduals, factors: Array) -> None:
-        """``factors`` (q,) by quantity, on the noise that the problem divides by."""
-        self.problem, self.factors = problem, factors
-        self.recordings, self.held_back = problem.recordings, problem.held_back
-        self.shared, self.own = problem.shared, problem.own
-        self.quantities, self.units, self.noise_known = problem.quantities, problem.units, problem.noise_known
+        """Multiply the noise that the problem divides by with ``factors`` (q,) by quantity."""
+        super().__init__(problem)
+        self.factors = factors
         self._divisors: dict[int, Array] = {}
 
     def rows(self, recording: int) -> ResidualRows:
-        """See ``RecordedResiduals``; the noise is the estimated one."""
+        """Describe the residuals of a recording, with the estimated noise."""
         rows = self.problem.rows(recording)
         return replace(rows, noise=rows.noise * self.factors[rows.quantity])
 
@@ -46,12 +44,12 @@ class RescaledResiduals:
         return self._divisors[recording]
 
     def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
-        """See ``RecordedResiduals``."""
+        """Return the rescaled residuals."""
         found = self.problem.residuals(shared, own, which)
         return [r / self._divisor(int(k)) for k, r in zip(which, found, strict=True)]
 
     def jacobian(self, shared: Array, own: Array, which: Ints) -> Rows:
-        """See ``RecordedResiduals``."""
+        """Return the rescaled residuals and derivatives."""
         found = []
         for k, (r, by_shared, by_own) in zip(which, self.problem.jacobian(shared, own, which), strict=True):
             divisor = self._divisor(int(k))
@@ -62,7 +60,7 @@ class RescaledResiduals:
 def noise_factors(
     problem: RecordedResiduals, evaluated: Rows, which: Ints, loss: RobustLoss, information: Information
 ) -> Array:
-    """(q,) noise of each quantity by what its residuals are divided by; 1 where it is given."""
+    """Estimate (q,) the noise of each quantity by what its residuals are divided by; 1 where it is given."""
     count = len(problem.quantities)
     quantities, leverages = [], []
     for at, (k, (_, by_shared, by_own)) in enumerate(zip(which, evaluated, strict=True)):

@@ -12,14 +12,15 @@ weights a product, d log a = -d log b leaves a b.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.square_root import ROUNDING, eliminate, triangle
-from symphys.identification.inference.advice import advice
 from symphys.identification.inference.uncertainty import Information
 from symphys.identification.interface import RecordedResiduals, Rows
-from symphys.results.identification.parts import OpenDirection
+from symphys.results.identification.record import OpenDirection
 from symphys.types import Array, Ints
 
 WIDE = 1.0
@@ -47,7 +48,7 @@ def open_directions(
     loss: RobustLoss,
     information: Information,
 ) -> tuple[OpenDirection, ...]:
-    """Those among the shared numbers that no bound holds, from the recordings in ``which`` without shared priors."""
+    """Find the open directions among the shared numbers that no bound holds, without shared priors."""
     free = np.flatnonzero(information.free_shared)
     if not free.size:
         return ()
@@ -76,7 +77,7 @@ def open_directions(
 def reduced_rows(
     problem: RecordedResiduals, evaluated: Rows, which: Ints, loss: RobustLoss, information: Information
 ) -> Array:
-    """(s, s) triangle R with R'R the Schur complement, by orthogonal elimination: no squares lose digits."""
+    """Compute (s, s) R with R'R the Schur complement, by orthogonal elimination: no squares lose digits."""
     s, o = len(problem.shared.names), len(problem.own.names)
     stacked = [np.zeros((s, s))]
     prior = 1 / problem.own.prior_deviation
@@ -98,7 +99,7 @@ def direction_error(rows: Array, directions: Array, largest: float) -> float:
 
 
 def echelon(basis: Array) -> Array:
-    """(d, n) the same directions with as many zeros as elimination with full pivoting makes, largest component 1."""
+    """Bring directions (d, n) into echelon form by full pivoting; the largest component of each is 1."""
     rows = basis.copy()
     used: list[int] = []
     for i in range(len(rows)):
@@ -132,7 +133,7 @@ def components(rows: Array) -> list[tuple[Ints, Ints]]:
 
 
 def own_moves(problem: RecordedResiduals, information: Information, free: Ints, units: Array, rows: Array) -> list[str]:
-    """Names of own numbers that follow directions (d, n) by more than a share of their scale in most recordings."""
+    """Name the own numbers that follow directions (d, n) by more than a share of their scale in most recordings."""
     moves = np.einsum("kos,ds->kdo", information.gain[:, :, free] * units, rows)
     often = np.median(np.max(np.abs(moves), axis=1), axis=0) if moves.size else np.zeros(0)
     return [name for name, size in zip(problem.own.names, often, strict=True) if size > SMALL]
@@ -141,7 +142,7 @@ def own_moves(problem: RecordedResiduals, information: Information, free: Ints, 
 def describe(
     problem: RecordedResiduals, shared: Array, own: Array, which: Ints, named: Ints, rows: Array, moves: list[str]
 ) -> str:
-    """In words: directions (d, n) of the shared numbers at the indices ``named``, in their own units."""
+    """Describe directions (d, n) of the shared numbers at the indices ``named``, in their own units."""
     names = [problem.shared.names[i] for i in named]
     if moves:
         every = f"{listed(moves)} of each recording"
@@ -192,12 +193,12 @@ def unchanged(problem: RecordedResiduals, shared: Array, own: Array, which: Ints
 
 
 def kernel(directions: Array) -> Array:
-    """(n,) orthogonal to (n - 1, n) directions."""
+    """Compute the direction (n,) orthogonal to (n - 1, n) directions."""
     return np.asarray(np.linalg.svd(directions)[2][-1])
 
 
 def whole_powers(weights: Array) -> Array | None:
-    """(n,) small integers, the first above 0, that weights (n,) are a multiple of; None where there are none."""
+    """Return (n,) small integers, the first above 0, that weights (n,) are a multiple of; None without any."""
     for most in EXPONENTS:
         powers = weights / weights[np.argmax(np.abs(weights))] * most
         near = np.round(powers)
@@ -212,7 +213,7 @@ def ratio(powers: Array) -> bool:
 
 
 def monomial(names: list[str], powers: Array) -> str:
-    """``mass * friction / radius^2``."""
+    """Write ``mass * friction / radius^2``."""
     parts = {True: [], False: []}  # type: dict[bool, list[str]]
     for name, power in zip(names, powers, strict=True):
         parts[power > 0].append(name if abs(power) == 1 else f"{name}^{abs(int(power))}")
@@ -222,5 +223,61 @@ def monomial(names: list[str], powers: Array) -> str:
 
 
 def listed(names: list[str]) -> str:
-    """``a, b and c``."""
+    """Write ``a, b and c``."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+ADVICE: dict[str, tuple[str, ...]] = {
+    "record a collision with a body of known mass, or a motion under a known force or a motor's torque: under gravity "
+    "and contact with fixed surfaces alone, masses cancel": ("mass", "density"),
+    "record spins about several axes that a known torque or an off-centre collision changes": ("inertia", "moments"),
+    "record tosses that spin freely about two axes, or let the body rest in several poses": (
+        "center",
+        "centre",
+        "com",
+        "center_of_mass",
+        "centre_of_mass",
+    ),
+    "record a long slide, or a toss that lands with speed along the ground and little spin": ("friction", "mu"),
+    "record bounces from several heights, up to the second impact": ("restitution", "bounce"),
+    "record a long roll without sliding": ("rolling", "rolling_friction"),
+    "record a spin about the vertical on one contact": ("torsional", "torsion", "torsional_friction", "spinning"),
+    "record free flight, with lengths that are measured by a ruler": ("gravity",),
+    "record a fall of known height, or measure a length by a ruler: without gravity or a known length, scales are "
+    "free": ("scale", "length_scale", "size", "radius", "half_size", "length", "width", "thickness"),
+    "record the body at rest in two places, one of them known": (
+        "position",
+        "offset",
+        "height",
+        "tilt",
+        "x",
+        "y",
+        "z",
+    ),
+    "let the joint swing out freely from several speeds": ("damping", "drag", "viscosity"),
+    "let the joint swing out to rest: its last swings show the dry friction": ("dry_friction", "coulomb", "armature"),
+    "record a deflection under a known force, or the period of free swings with a known mass": ("stiffness", "spring"),
+    "record the motor's answer to steps of known torque, with a known inertia": ("gain", "torque", "kp", "kd", "motor"),
+    "record fast changes of the command: delays act only where something changes": ("delay", "latency", "time_offset"),
+}
+"""Sentence by the words that ask for it."""
+GENERAL = "record motions that differ in this quantity alone, hold it at a known value, or give it a prior"
+
+
+def advice(quantities: Iterable[str]) -> str:
+    """Advise a recording for each kind among quantities such as ``cube.mass``, ``cube.size[2]``, in their order."""
+    found = []
+    for quantity in quantities:
+        last = quantity.split(".")[-1].split("[")[0].strip().lower()
+        fitting = [(len(word), text) for text, words in ADVICE.items() for word in words if is_kind(last, word)]
+        said = max(fitting, default=(0, GENERAL))[1]
+        if said not in found:
+            found.append(said)
+    specific = [text for text in found if text != GENERAL] or found
+    joined = "; or ".join(specific)
+    return joined[0].upper() + joined[1:]
+
+
+def is_kind(name: str, word: str) -> bool:
+    """Whether a name is the word, or ends or begins with it as a word of its own."""
+    return name == word or name.endswith(("_" + word, " " + word)) or name.startswith(word + "_")
