@@ -16,7 +16,7 @@ from symphys.json_values import Text
 
 @dataclass(frozen=True)
 class Config:
-    """One solve.
+    """The settings of one solve.
 
     Attributes:
         problem: the stem of the problem's file.

@@ -26,14 +26,14 @@ def middle(numbers: Sequence[float]) -> float:
 
 @dataclass(frozen=True)
 class Entry:
-    """All runs of one solver on one problem, by seed."""
+    """The runs of one solver on one problem, by seed."""
 
     solver: str
     runs: tuple[Run, ...]
 
     @property
     def solved(self) -> int:
-        """How many runs are solved."""
+        """Return how many runs are solved."""
         return sum(run.solved for run in self.runs)
 
     def median(self, numbers: list[float]) -> float:
@@ -44,7 +44,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Study:
-    """All runs of one problem in one place."""
+    """The runs of one problem in one place."""
 
     problem: str
     place: str
@@ -52,7 +52,7 @@ class Study:
 
     @property
     def runs(self) -> tuple[Run, ...]:
-        """Every run."""
+        """Return the runs of all solvers."""
         return tuple(run for entry in self.entries for run in entry.runs)
 
     @property
@@ -62,7 +62,7 @@ class Study:
 
     @property
     def settings(self) -> str:
-        """What the command line changed in the problem's file; empty if nothing."""
+        """Write what the command line changed in the problem's file; empty if nothing."""
         return settings_words(self.runs[0].settings)
 
     @property
@@ -77,7 +77,7 @@ class Study:
 
 
 def run_folders(root: Path) -> list[Path]:
-    """Every folder at or below ``root`` that looks like a run folder, in order of name. Raises ReportError."""
+    """List the folders at or below ``root`` that look like run folders, in order of name. Raises ReportError."""
     if not root.is_dir():
         raise ReportError(f"{root}: there is no such folder; give one that `symphys solve --out` has written")
     found = []

@@ -71,7 +71,7 @@ class Polytope:
 
     @property
     def sharp(self) -> NDArray[np.bool_]:
-        """(e,): whether an edge is one of the solid, and none that only approximates a curved surface."""
+        """Return (e,) whether an edge is one of the solid, and none that only approximates a curved surface."""
         left, right = self.normals[self.edges[:, 2]], self.normals[self.edges[:, 3]]
         return np.asarray((left * right).sum(axis=1) < SMOOTH)
 
@@ -98,7 +98,7 @@ def steps(loop: list[int]) -> list[tuple[int, int]]:
 
 
 def face_normal(corners: Array) -> Array:
-    """(3,): the unit normal of a polygon (k, 3), to the side from which it is counter-clockwise."""
+    """Return (3,) the unit normal of a polygon (k, 3), to the side from which it is counter-clockwise."""
     arms = corners - corners[0]
     area = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
     return np.asarray(area / np.linalg.norm(area))

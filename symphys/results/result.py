@@ -33,7 +33,7 @@ REACHED = frozenset(
 
 @dataclass(frozen=True)
 class CheckRecord:
-    """One target, constraint or goal: ``error`` and ``tolerance`` in its own unit; met where ``ratio`` <= 1.
+    """A target, constraint or goal: ``error`` and ``tolerance`` in its own unit; met where ``ratio`` <= 1.
 
     ``kind``: "target", "constraint" or "goal". ``name``: as in the problem file. ``unit``: empty where it is not known.
     """
@@ -64,7 +64,7 @@ def _share(error: float, tolerance: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class VariableRecord:
-    """One variable; two are equal if the file has the same of them.
+    """A variable of a result; two are equal if the file has the same of them.
 
     Attributes:
         name: in the problem file; the key in the file.
@@ -82,7 +82,7 @@ class VariableRecord:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> VariableRecord:
-        """One without its name; a shape that does not fit the values is replaced by one knot."""
+        """Read a variable without its name; a shape that does not fit the values is replaced by one knot."""
         entry = values.table(value)
         size = values.numbers(entry.get("value")).size
         shape = [values.whole(number) for number in values.numbers(entry.get("shape"))[:2]]
@@ -112,7 +112,7 @@ class VariableRecord:
 
 @dataclass(frozen=True)
 class StageRecord:
-    """One stage of continuation in the smoothing, and its best point.
+    """A stage of continuation in the smoothing, and its best point.
 
     Attributes:
         smoothing: of the contacts [m/s].
@@ -138,7 +138,7 @@ class StageRecord:
 
 @dataclass(frozen=True)
 class BackendRecord:
-    """What evaluated the functions.
+    """The backend that evaluated the functions.
 
     Attributes:
         name: of the backend.
@@ -158,7 +158,7 @@ class BackendRecord:
     compiled: str = ""
 
     def __str__(self) -> str:
-        """In a line."""
+        """Describe the backend in a line."""
         counts = [f"{n} {what}{'s' * (n > 1)}" for n, what in ((self.lanes, "lane"), (self.threads, "thread")) if n]
         start = {"cold": "compiled anew", "warm": "taken from the cache"}.get(self.compiled, "")
         parts = [self.name, *counts, self.precision and f"{self.precision} precision", self.compiler, start]
@@ -167,7 +167,7 @@ class BackendRecord:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """One solve, judged by the exact rollout at smoothing 0; nan or empty is what is not known.
+    """A solve, judged by the exact rollout at smoothing 0; nan or empty is what is not known.
 
     Two are equal if their files are. A number whose field has a ``label`` is shown under it at the top of the page,
     rounded to so many ``decimals`` if the field says so; a new one is named in ``ADDED_LATER``, so that

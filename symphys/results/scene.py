@@ -26,7 +26,7 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Solid:
-    """All points within ``radius`` of the convex hull of some corners; see ``RoundedHull``.
+    """The points within ``radius`` of the convex hull of some corners, as a ``RoundedHull``.
 
     Attributes:
         radius: [m].
@@ -58,17 +58,17 @@ class Solid:
 
     @property
     def half(self) -> Array:
-        """(3,) [m]: half sizes of the box about its centre, along its own axes, that holds its corners."""
+        """Return the half sizes (3,) [m] of the box about its centre, along its own axes, that holds its corners."""
         return np.asarray(np.abs(self.corners).max(axis=0))
 
     @property
     def girth(self) -> float:
-        """From its centre to the nearest point of its surface [m]."""
+        """Return the distance [m] from its centre to the nearest point of its surface."""
         return self.radius + self.polytope.inradius
 
     @property
     def reach(self) -> float:
-        """From the origin to the farthest point, at most [m]."""
+        """Return the distance [m] from the origin to its farthest point, at most."""
         return float(np.linalg.norm(self.centre) + np.linalg.norm(self.corners, axis=1).max()) + self.radius
 
     @property
@@ -77,14 +77,14 @@ class Solid:
         return len(self.corners) == 1
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``shapes``: kind, sizes as in problem files, centre and, unless round, orientation."""
+        """Return an entry of ``shapes``: kind, sizes as in problem files, centre and, unless round, orientation."""
         sizes = {key: size.tolist() if isinstance(size, np.ndarray) else size for key, size in self.sizes.items()}
         turned = {"orientation": self.orientation.tolist()} if SHAPES[self.kind].turns else {}
         return {"kind": self.kind, **sizes, "centre": self.centre.tolist(), **turned}
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> Solid | None:
-        """One of the shapes; None if it has no size and place that can be drawn."""
+        """Read an entry of ``shapes``; None if it has no size and place that can be drawn."""
         entry = values.table(value)
         kind, centre = str(entry.get("kind", "sphere")), values.vector(entry.get("centre"))
         if kind not in SHAPES:
@@ -103,7 +103,7 @@ class Solid:
 
 
 def _points(value: object) -> Array:
-    """(n, 3): the points of a list of lists; nan for numbers that are missing."""
+    """Read a list of lists as points (n, 3); nan for numbers that are missing."""
     rows = [values.vector(row, np.nan) for row in value] if isinstance(value, list) else []
     return np.array(rows, float).reshape(-1, 3)
 
@@ -113,7 +113,7 @@ SIZES: dict[int, Callable[[object], Any]] = {0: _points, 1: values.number, 3: va
 
 
 def _orientation(value: object) -> Array:
-    """(4,): a unit quaternion; no rotation for anything that is none."""
+    """Read a unit quaternion (4,); no rotation for anything that is none."""
     read = values.numbers(value)
     length = float(np.linalg.norm(read)) if read.size == 4 else 0.0
     return read / length if 0 < length < np.inf else np.array(UPRIGHT)
@@ -128,7 +128,7 @@ class SceneBody:
     mass: float = np.nan
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``bodies``."""
+        """Return an entry of ``bodies``."""
         return {"name": self.name, "mass": self.mass, "shapes": [solid.to_json() for solid in self.solids]}
 
 
@@ -141,7 +141,7 @@ class ScenePlane:
     offset: float = 0.0
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``planes``."""
+        """Return an entry of ``planes``."""
         return {"name": self.name, "normal": self.normal.tolist(), "offset": self.offset}
 
     @classmethod
@@ -163,7 +163,7 @@ class SceneFixture:
     solid: Solid
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``fixtures``."""
+        """Return an entry of ``fixtures``."""
         return {"name": self.name, "shape": self.solid.to_json()}
 
     @classmethod
@@ -184,7 +184,7 @@ class SceneTerrain:
     z: Array
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``terrain``."""
+        """Return an entry of ``terrain``."""
         return {"name": self.name, "x": self.x.tolist(), "y": self.y.tolist(), "z": self.z.tolist()}
 
     @classmethod
@@ -203,7 +203,7 @@ class SceneTerrain:
 
 @dataclass(frozen=True)
 class Scene:
-    """What is drawn around and for the states of a trajectory; ``gravity`` (3) [m/s^2], empty if it is not known."""
+    """The surroundings of a trajectory, and its bodies; ``gravity`` (3) [m/s^2], empty if it is not known."""
 
     gravity: tuple[float, ...] = ()
     bodies: tuple[SceneBody, ...] = ()

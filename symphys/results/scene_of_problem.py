@@ -95,7 +95,7 @@ def make_joint(joint: Joint, bodies: Sequence[str]) -> SceneJoint:
 
 
 def bound(value: Scalar | None, missing: float) -> float:
-    """One end of limits."""
+    """Return one end of limits."""
     return missing if value is None else float(value)
 
 
@@ -129,7 +129,7 @@ class TerrainCrop:
 
 
 def crop(world: World, places: Array) -> TerrainCrop:
-    """Where bodies at (n, 3) places may touch the ground, with room around."""
+    """Return the rectangle where bodies at (n, 3) places may touch the ground, with room around."""
     flat = places[np.isfinite(places).all(axis=1), :2]
     flat = flat if len(flat) else np.zeros((1, 2))
     low, high = flat.min(axis=0), flat.max(axis=0)
@@ -142,7 +142,7 @@ def crop(world: World, places: Array) -> TerrainCrop:
 
 
 def size(body: Body) -> float:
-    """From a body's centre of mass to the farthest point of its surface, at most [m]."""
+    """Return the distance [m] from a body's centre of mass to the farthest point of its surface, at most."""
     return max((float(np.linalg.norm(shape.centre)) + shape.extent for shape in body.shapes), default=0.0)
 
 

@@ -55,7 +55,7 @@ class Trace:
     rows: int
 
     def __getitem__(self, name: str) -> Array:
-        """(rows,): the column called ``name``."""
+        """Return (rows,) the column called ``name``."""
         return self.columns.get(name, np.full(self.rows, np.nan))
 
     @property

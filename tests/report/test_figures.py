@@ -11,9 +11,9 @@ import pytest
 
 from symphys.report.charts.contacts import pair_normals, shown_pairs
 from symphys.report.figures import style
-from symphys.report.figures.checks import limits, ratios
 from symphys.report.figures.convergence import Curve, best_so_far, median_curve, violation_so_far
 from symphys.report.figures.data import thin
+from symphys.report.pages.batch import limits, ratios
 from symphys.report.scene.motion import draw_motion
 from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, turn
 from symphys.results.discovery import read_all, studies

@@ -19,9 +19,18 @@ from symphys.report.charts.contacts import by_surfaces, contacts_chart, pair_nor
 from symphys.report.figures import style
 from symphys.report.scene.animation import motion_data
 from symphys.report.scene.motion import draw_motion
-from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import make_panel
-from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, corners, half_axes
+from symphys.report.scene.views import (
+    SIDE_XZ,
+    SIDE_YZ,
+    TOP,
+    TOP_TURNED,
+    choose_views,
+    corners,
+    half_axes,
+    inner_edges,
+    outline,
+)
 from symphys.results.scene import Scene, Solid, read_scene
 from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory

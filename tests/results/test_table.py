@@ -25,8 +25,9 @@ from symphys.results.result import Result
 from symphys.results.table import Journal, best, columns, ordered, read_rows
 from symphys.results.table import rows as table_rows
 from symphys.results.table.journal import BODY, MARK, Kept, entry, stamp_of
-from symphys.results.table.row import HEAVY, read_row
+from symphys.results.table.row import read_row
 from symphys.results.table.writing import csv_text, json_lines
+from symphys.results.text_files import HEAVY
 
 
 def test_a_row_has_what_the_files_say(tmp_path: Path) -> None:

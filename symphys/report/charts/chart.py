@@ -57,7 +57,7 @@ class Bars:
 
 @dataclass(frozen=True)
 class Panel:
-    """One set of axes.
+    """A set of axes with lines or bars.
 
     Attributes:
         title: what it shows, with the unit.
@@ -119,7 +119,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Key:
-    """What a colour means; ``look`` as of a ``Line``, or "shade" for an area."""
+    """An entry of the legend: a name and its colour; ``look`` as of a ``Line``, or "shade" for an area."""
 
     name: str
     colour: str

@@ -50,7 +50,7 @@ def run_charts(run: Run, motion: Trajectory | None) -> list[Chart]:
 
 @dataclass(frozen=True)
 class HistoryPanel:
-    """One recorded column of the iterations.
+    """A recorded column of the iterations.
 
     Attributes:
         title: of the panel.

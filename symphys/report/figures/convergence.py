@@ -33,19 +33,19 @@ class Curve:
 
 
 def best_so_far(run: Run) -> Array:
-    """(rows,): the lowest objective up to each iteration, as the solver recorded it where it did."""
+    """Return (rows,) the lowest objective up to each iteration, as the solver recorded it where it did."""
     recorded = run.trace["best"]
     known = recorded if np.isfinite(recorded).any() else run.trace["objective"]
     return falling(run, known, "objective", lambda stage: stage.exact_objective)
 
 
 def violation_so_far(run: Run) -> Array:
-    """(rows,): the smallest largest error / tolerance up to each iteration."""
+    """Return (rows,) the smallest largest error / tolerance up to each iteration."""
     return falling(run, run.trace["max_violation"], "worst", lambda stage: stage.exact_worst)
 
 
 def best_output(name: str) -> Quantity:
-    """(rows,): a reported quantity of the best point so far."""
+    """Return a function of a run: (rows,) a reported quantity of the best point so far."""
     return lambda run: np.where(run.trace["smoothing"] > 0, np.nan, run.trace[OUTPUT + name])
 
 
@@ -57,7 +57,7 @@ QUANTITIES: tuple[tuple[str, Quantity], ...] = (
 
 
 def falling(run: Run, recorded: Array, name: str, exact: Callable[[StageRecord], float]) -> Array:
-    """(rows,): the lowest of what is known to hold exactly.
+    """Return (rows,) the lowest value that is known to hold exactly.
 
     A row of a stage with smoothing belongs to another problem: of such a stage only its start and its end count,
     judged exactly. ``name``: the quantity among those of the guess; ``exact``: that of a stage.
@@ -74,7 +74,7 @@ def falling(run: Run, recorded: Array, name: str, exact: Callable[[StageRecord],
 
 
 def curve(run: Run, along: str, quantity: Quantity) -> Curve | None:
-    """One run's curve; None if nothing of it is finite."""
+    """Return a run's curve; None if nothing of it is finite."""
     x, y = run.trace[along], quantity(run)
     known = np.isfinite(x) & np.isfinite(y)
     return Curve(x[known], y[known]) if known.any() else None
@@ -99,7 +99,7 @@ VIOLATION_FLOOR = 1e-3
 
 
 def draw_convergence(study: Study) -> DataFigure | None:
-    """All solvers on one axis: objective, errors and reported quantities against rollout equivalents and time."""
+    """Draw all solvers together: objective, errors and reported quantities against rollout equivalents and time."""
     outputs = dict.fromkeys(name for run in study.runs for name in run.outputs)
     asked = [
         *QUANTITIES,
@@ -126,7 +126,7 @@ def draw_convergence(study: Study) -> DataFigure | None:
 
 
 def keep_runs(axes: Axes, study: Study, columns: Sequence[str], rows: Sequence[tuple[str, Quantity]]) -> None:
-    """Every run's quantities at its iterations, thinned."""
+    """Keep the quantities of every run at its iterations, thinned."""
     names = [*(AXIS_TITLES[along] for along in columns), *(title for title, _ in rows)]
     found: list[tuple[list[str], list[int], Array]] = []
     for run in study.runs:
@@ -227,7 +227,7 @@ def mark_tolerance(panels: Sequence[Axes]) -> None:
 
 
 def add_legend(figure: DataFigure, study: Study) -> None:
-    """Solvers by colour and mark, and what a hollow mark means."""
+    """Explain solvers by colour and mark, and what a hollow mark means."""
     marks = style.solver_marks(entry.solver for entry in study.entries)
     handles = [Line2D([], [], color=c, marker=m, markersize=6, linewidth=1.9) for c, m in marks.values()]
     labels = [style.short(name, 20) for name in marks]

@@ -232,7 +232,7 @@ def apart(low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    """One legend for all panels, in a row above them."""
+    """Draw one legend for all panels, in a row above them."""
     figure.legend(handles, labels, loc="outside upper left", ncols=min(len(labels), 8), borderaxespad=0.2)
 
 

@@ -80,7 +80,7 @@ def write_closed_loop_page(folder: Path) -> Path:
 
 
 def verdict(record: ClosedLoopRecord) -> Html:
-    """Whether the task is done, and whether plans came in time."""
+    """Say whether the task is done, and whether plans came in time."""
     if record.stopped:
         title, level = f"Stopped after {show(record.duration, 3)} s: {record.stopped}", "bad"
     elif not record.targets:
@@ -132,7 +132,7 @@ def targets(record: ClosedLoopRecord) -> Html:
 
 
 def setting(record: ClosedLoopRecord) -> Html:
-    """How it was made."""
+    """Show the settings of the controller and of the plant."""
     plans = f"{show(record.horizon, 4)} s ahead in steps of {show(record.dt, 4)} s, {record.iterations} iteration"
     between = "answer what is measured, by the gains of the plan" if record.feedback else "as planned"
     counted = {"measured": "the wall time of the solver", "cpu": "the processor time of the solver"}

@@ -89,7 +89,7 @@ def identification_folders(root: Path) -> list[Path]:
 
 
 def verdict(found: Identification) -> Html:
-    """How the fit ended, and what raises doubts."""
+    """Say how the fit ended, and what raises doubts."""
     if found.status != "converged":
         doubts = [each for each in found.doubts if found.reason not in each]
         return banner("bad", f"Not converged: {found.reason}", *doubts)
@@ -121,7 +121,7 @@ def estimates(found: Identification) -> Html:
 
 
 def estimate_row(each: ParameterEstimate) -> list[str]:
-    """One of them."""
+    """Return the cells of an estimate."""
     open_ = not math.isfinite(each.error)
     by_jacobian = pill("bad", "not determined") if open_ else interval(each.lower, each.upper, each.value)
     if each.at_bound:
@@ -137,7 +137,7 @@ def estimate_row(each: ParameterEstimate) -> list[str]:
 
 
 def interval(low: float, high: float, value: float) -> str:
-    """From .. to .., with as many digits as their distance has a use for; empty where it is not known."""
+    """Write an interval with as many digits as its width has a use for; empty where it is not known."""
     if not (math.isfinite(low) and math.isfinite(high)):
         return ""
     half = max((high - low) / 2, 1e-12 * abs(value), 1e-300)
@@ -163,7 +163,7 @@ def strong(found: Identification) -> Html:
 
 
 def left(found: Identification) -> Html:
-    """What the fit leaves of each quantity, and what that is."""
+    """Show the residuals that the fit leaves of each quantity, and their verdict."""
     header = ("quantity", "", "residual / noise", "rms", "noise", "from sample to sample", "why")
     rows = []
     for each in found.quantities:
@@ -175,14 +175,14 @@ def left(found: Identification) -> Html:
 
 
 def predictions(found: Identification) -> Html:
-    """How far simulations are from recordings, of those fitted to and of those held back."""
+    """Show the errors of simulations against recordings that were fitted to, and against those held back."""
     rows = [error_row(kind, each) for kind, each in paired(found)]
     header = ("quantity", "recordings", "", "mean error", "standard deviation", "root mean square", "by noise")
     return table(header, rows, "ttnnnnn", "Errors of prediction") if rows else Html("")
 
 
 def paired(found: Identification) -> list[tuple[str, PredictionErrors]]:
-    """By quantity, those held back after those fitted to."""
+    """List errors by quantity, those of recordings held back after those fitted to."""
     back = {each.name: each for each in found.held_back_errors}
     both: list[tuple[str, PredictionErrors]] = []
     for each in found.fitted_errors:
@@ -193,7 +193,7 @@ def paired(found: Identification) -> list[tuple[str, PredictionErrors]]:
 
 
 def error_row(kind: str, each: PredictionErrors) -> list[str]:
-    """One of them."""
+    """Return the cells of an error."""
     values = [f"{show(each.mean)} {each.unit}", f"{show(each.deviation)} {each.unit}", f"{show(each.rmse)} {each.unit}"]
     values[1] = values[1] if math.isfinite(each.deviation) else ""
     return [tag("b", each.name), kind, f"{each.recordings}", *values, show(each.ratio)]
@@ -208,7 +208,7 @@ def worst(replay: RecordingReplay, scene: Scene, curves: Html) -> Html:
 
 
 def setting(found: Identification) -> Html:
-    """How it was made, and how other minima were looked for."""
+    """Show the settings of the fit, and how other minima were looked for."""
     loss = "squares" if math.isinf(found.threshold) else f"Huber's, beyond {show(found.threshold)} standard deviations"
     parts = ", ".join(f"{name} {show(seconds)} s" for name, seconds in found.seconds.items() if seconds > 0)
     work = [f"{several(int(count), name[:-1])}" for name, count in found.evaluations.items()]

@@ -145,7 +145,7 @@ def stats(pairs: Iterable[tuple[str, str]]) -> Html:
 
 
 def facts(pairs: Iterable[tuple[str, Part]]) -> Html:
-    """Names and values below each other; those without a value are left out."""
+    """Show names and values below each other; those without a value are left out."""
     rows = [join([tag("dt", key), tag("dd", value)]) for key, value in pairs if value]
     return tag("dl", *rows, class_="facts") if rows else Html("")
 
@@ -167,7 +167,7 @@ def page(title: str, body: Part, animated: bool = False, rows: bool = False, sta
 
 
 def light_page(title: str, body: Part, animated: bool, stamp: Stamp | None = None) -> str:
-    """The same with its scripts compressed, among them what draws charts."""
+    """Make a document whose scripts are compressed, among them the one that draws charts."""
     first, then, packed = light_scripts(animated)
     held = tag("script", Html(packed), type="text/plain", class_=PACKED, id="scripts")
     return document(title, body, join([held, tag("script", Html(first))]), [first, then], stamp)
@@ -175,7 +175,7 @@ def light_page(title: str, body: Part, animated: bool, stamp: Stamp | None = Non
 
 @cache
 def light_scripts(animated: bool) -> tuple[str, str, str]:
-    """What unpacks, what is unpacked, and that compressed."""
+    """Return the script that unpacks, the script that it unpacks, and the latter compressed."""
     then = squeezed(read_static(*(SCRIPTS if animated else ()), *CHARTS))
     return read_static(UNPACK), then, pack(then)
 

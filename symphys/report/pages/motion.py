@@ -135,7 +135,7 @@ def shortened(shown: int, total: int, noun: str, which: str) -> str:
 
 
 def joint_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> Html:
-    """What joints and motors did; nothing without joints."""
+    """Show the coordinates of joints and the torques of motors; empty without joints."""
     every = channels(trajectory, scene)
     drawn = [pictures[name] for name in ("joints", "motors") if name in pictures]
     few = shown(every)
@@ -151,7 +151,7 @@ def joint_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Draw
 
 
 def motors_sentence(every: Sequence[Channel]) -> str:
-    """How many motors are saturated, and which most of all."""
+    """Say how many motors are saturated, and which most of all."""
     driven = [channel for channel in every if channel.bound > 0]
     full = sorted((c for c in driven if c.share > 0), key=lambda c: -c.share)
     if not driven:
@@ -169,7 +169,7 @@ def motors_sentence(every: Sequence[Channel]) -> str:
 
 
 def limits_sentence(every: Sequence[Channel]) -> str:
-    """Which joints reach their limits."""
+    """Name the joints that reach their limits."""
     names = [channel.name for channel in every if channel.at_limit]
     if not names:
         return ""
@@ -178,7 +178,7 @@ def limits_sentence(every: Sequence[Channel]) -> str:
 
 
 def separation_sentence(trajectory: Trajectory) -> str:
-    """How far joints separate."""
+    """Say how far joints come apart."""
     found = separation(trajectory)
     if found is None:
         return ""
@@ -195,7 +195,7 @@ def use_table(every: Sequence[Channel]) -> Html:
 
 
 def use_row(channel: Channel) -> list[Part]:
-    """Its cells."""
+    """Return the cells of a coordinate."""
     low, high = float(channel.value.min()), float(channel.value.max())
     joint = channel.joint
     bounded = math.isfinite(joint.lower) or math.isfinite(joint.upper)
@@ -210,14 +210,14 @@ def use_row(channel: Channel) -> list[Part]:
 
 
 def motor_words(motor: SceneMotor, channel: Channel) -> str:
-    """Its kind and bounds."""
+    """Write the kind of a motor and its bounds."""
     speed = f", {show(motor.velocity)} {channel.unit}/s" if math.isfinite(motor.velocity) else ""
     most = f", {show(motor.torque)} {channel.torque_unit}" if math.isfinite(motor.torque) else ""
     return f"{motor.kind}{most}{speed}"
 
 
 def share_words(channel: Channel) -> Html:
-    """How long it is saturated."""
+    """Write for how long a motor is saturated."""
     if not channel.bound > 0:
         return Html("")
     if channel.share == 0:
@@ -226,7 +226,7 @@ def share_words(channel: Channel) -> Html:
 
 
 def gait_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> Html:
-    """When which foot stands; nothing where none comes down or leaves the ground."""
+    """Show when each foot stands; empty where none comes down or leaves the ground."""
     if "gait" not in pictures:
         return Html("")
     least = f"{percent(LOADED)} of the weight of {show(weight(trajectory, scene))} N"
@@ -236,7 +236,7 @@ def gait_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Drawn
 
 
 def steps_sentence(trajectory: Trajectory, scene: Scene) -> str:
-    """How many bodies stand at once."""
+    """Say how many bodies stand at once."""
     found = stances(trajectory, scene)
     at_once = np.sum([stance.stands for stance in found], axis=0)
     most = int(at_once.max())

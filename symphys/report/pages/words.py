@@ -37,14 +37,14 @@ def ended(code: str) -> str:
 
 
 def came_to(run: Run) -> str:
-    """How a run ended, in a few words for tables: as its solver did, or its verdict, where that says more."""
+    """Say in a few words how a run ended: as its solver did, or its verdict, where that says more."""
     if run.verdict in (DOUBTED, BEST_FOUND):
         return verdict_words(run.verdict, run.status, bool(run.checks))
     return ended(run.status)
 
 
 def level(run: Run) -> str:
-    """``good``, ``fair`` (nothing went wrong, but not solved) or ``bad``."""
+    """Return ``good``, ``fair`` (nothing went wrong, but not solved) or ``bad``."""
     if run.solved:
         return "good"
     if run.verdict == DOUBTED:
@@ -60,7 +60,7 @@ def headline(run: Run) -> str:
 
 
 def verdict(run: Run) -> str:
-    """What came out, in one or two sentences; the solver's own advice is separate."""
+    """Say in one or two sentences what came out; the solver's own advice is separate."""
     if not run.readable:
         return "No result could be read from this folder."
     missed = [check for check in run.checks if not check.met]
@@ -83,12 +83,12 @@ def verdict(run: Run) -> str:
 
 
 def doubted(run: Run) -> str:
-    """Why a run is not to be relied on, in a sentence; empty where it is, or where it came to nothing anyway."""
+    """Say why a run is not to be relied on; empty where it is, or where it came to nothing anyway."""
     return f"But it is not to be relied on: {'; '.join(run.doubts)}." if run.verdict == DOUBTED else ""
 
 
 def misses(missed: Sequence[CheckRecord], total: int) -> str:
-    """How many checks are missed, and the worst by name."""
+    """Say how many checks are missed, and the worst by name."""
     if not missed:
         return "The run did not end as solved, though no check is missed."
     worst = max(missed, key=lambda check: math.inf if math.isnan(check.ratio) else check.ratio)
@@ -101,7 +101,7 @@ def misses(missed: Sequence[CheckRecord], total: int) -> str:
 
 
 def work(run: Run) -> str:
-    """What a solve took."""
+    """Say what a solve took."""
     counts = [(kind, run.counts.get(kind, 0.0)) for kind in ("rollouts", "gradients")]
     parts = [f"{count(number)} {kind}" for kind, number in counts if number > 0]
     took = run.seconds.get("solve", math.nan)

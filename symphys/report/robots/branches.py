@@ -13,7 +13,7 @@ from symphys.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class KinematicBranch:
-    """Indices of bodies that joints connect once the base body is taken away, which is a branch of its own."""
+    """Bodies that joints connect once the base body is taken away, by index; the base is a branch of its own."""
 
     name: str
     bodies: tuple[int, ...]
@@ -42,7 +42,7 @@ def colours(trajectory: Trajectory, scene: Scene) -> tuple[str, ...]:
 
 
 def keys(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
-    """What colours mean: (name, colour) of bodies, of branches where joints connect many; none where that is plain."""
+    """Return (name, colour) of bodies, or of branches where joints connect many; none where colours are plain."""
     if is_large(trajectory, scene):
         found = [(branch.name, branch.colour) for branch in branches(trajectory, scene)]
     else:
@@ -103,6 +103,6 @@ def base_of(group: Sequence[int], edges: set[frozenset[int]], trajectory: Trajec
 
 
 def branch_name(names: Sequence[str]) -> str:
-    """What the names of its bodies begin with, else the first of them."""
+    """Return the beginning that the names of its bodies share, else the first name."""
     same = itertools.takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
     return "".join(letters[0] for letters in same).rstrip("_-. ") or names[0]

@@ -13,9 +13,8 @@ from matplotlib.patches import Circle, Polygon
 from symphys.report.figures.data import thin
 from symphys.report.robots.branches import colours, linked, traced
 from symphys.report.robots.joint_positions import bones, draw_joint_positions, draw_lines
-from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
-from symphys.report.scene.views import View, centres, corners, reach, turn
+from symphys.report.scene.views import View, centres, corners, inner_edges, outline, reach, turn
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Trajectory
 from symphys.types import Array
@@ -47,7 +46,7 @@ def spaced(trajectory: Trajectory, scene: Scene, view: View) -> list[int]:
 
 
 def extents(trajectory: Trajectory, scene: Scene, view: View, bodies: Sequence[int]) -> tuple[Array, Array]:
-    """(N+1, 2) [m] each: the lowest and highest seen coordinates of these bodies at each time."""
+    """Return the lowest and the highest seen coordinates (N+1, 2) [m] of these bodies at each time."""
     low, high = [], []
     for body in bodies:
         if not scene.solids(trajectory.body_names[body]):
@@ -73,7 +72,7 @@ def draw_paths(axes: Axes, view: View, trajectory: Trajectory, scene: Scene) -> 
 
 @dataclass(frozen=True)
 class RobotDrawing:
-    """All bodies of a scene at one time."""
+    """A drawing of all bodies of a scene at one time."""
 
     axes: Axes
     view: View
@@ -82,7 +81,7 @@ class RobotDrawing:
     shot: int
 
     def draw(self, strength: float = 1.0, order: int = 0) -> None:
-        """From the back to the front; paler with less ``strength``, over poses of a lower ``order``."""
+        """Draw from the back to the front; paler with less ``strength``, over poses of a lower ``order``."""
         colour = colours(self.trajectory, self.scene)
         base = 2.5 + 0.25 * order / MOST
         lines = list(bones(self.trajectory, self.scene, self.shot))
@@ -103,7 +102,7 @@ class RobotDrawing:
         ]
 
     def draw_solid(self, body: int, solid: Solid, colour: Array, zorder: float) -> None:
-        """Its outline, filled, and the edges that are seen in it."""
+        """Draw the outline of a solid, filled, and the edges that are seen in it."""
         turned = self.trajectory.orientation[self.shot, body]
         centre = self.view.flat(self.trajectory.position[self.shot, body] + turn(turned, solid.centre))
         if solid.radius == 0 and solid.is_ball:
@@ -118,6 +117,6 @@ class RobotDrawing:
 
 
 def mixed(colour: str | Array, strength: float) -> Array:
-    """(3,): a colour on white."""
+    """Return a colour (3,) mixed with white."""
     own = np.array(to_rgb(colour if isinstance(colour, str) else tuple(colour)))
     return 1 - strength * (1 - own)

@@ -121,7 +121,7 @@ def make_strip(view: View, trajectory: Trajectory, scene: Scene, shots: Sequence
 
 
 def widened(strip: Strip, width: float, height: float) -> Strip:
-    """As wide as its column, and of a least height [m]."""
+    """Widen sections to the width of their column, and to a least height [m]."""
     lack = np.array([width - strip.size[0], max(height - strip.size[1], 0.0)])
     return Strip(strip.view, strip.low - lack / 2, strip.size + lack)
 

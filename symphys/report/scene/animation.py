@@ -36,7 +36,7 @@ def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = N
 
 
 def light_animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> Html:
-    """The same for a light page: fewer numbers, compressed."""
+    """Make the player of a light page: fewer numbers, compressed."""
     data = packed_json(motion_data(trajectory, scene, guess, LIGHT_NUMBERS))
     return player(trajectory, scene, "The motion plays only with JavaScript.", data)
 
@@ -78,7 +78,7 @@ VIEW_TITLES = (("space", "3D"), ("side", "Side"), ("top", "Top"))
 
 
 def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, numbers: int) -> dict[str, object]:
-    """What animation.js and joints.js read; lists are flat, frame after frame, body after body."""
+    """Return what animation.js and joints.js read; lists are flat, frame after frame, body after body."""
     bodies = len(trajectory.body_names)
     frames = int(np.clip(numbers // (7 * bodies), 40, MOST_FRAMES))
     chosen = even(len(trajectory.time), frames)
@@ -152,7 +152,7 @@ def guess_data(guess: Trajectory, scene: Scene) -> list[list[float]]:
 
 
 def even(count: int, most: int) -> Array:
-    """At most ``most`` indices below ``count``, evenly apart, the first and the last among them."""
+    """Return at most ``most`` indices below ``count``, evenly apart, the first and the last among them."""
     return np.linspace(0, count - 1, min(count, most)).round().astype(int)
 
 
@@ -168,7 +168,7 @@ FAR = 2.5
 
 
 def joint_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
-    """Both sides of each joint, index of the body (-1: the world) and point, and its axes: [side, direction]."""
+    """Return the sides of each joint, index of the body (-1: the world) and point, and its axes: [side, direction]."""
     index = {name: body for body, name in enumerate(trajectory.body_names)} | {"": -1}
     return [
         {

@@ -43,7 +43,7 @@ def with_ghosts(replay: RecordingReplay, scene: Scene) -> tuple[Trajectory, Scen
 
 
 def _between(time: Array, sampled: Array, values: Array) -> Array:
-    """(N + 1, m) at the times of the motion, from (n, m) samples of which some are missing."""
+    """Interpolate (n, m) samples, of which some are missing, at the times of the motion: (N + 1, m)."""
     known = np.isfinite(values).all(axis=1)
     if not known.any():
         return np.zeros((len(time), values.shape[1]))

@@ -12,9 +12,8 @@ from matplotlib.ticker import MaxNLocator
 
 from symphys.findings import writing
 from symphys.report.figures import style
-from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
-from symphys.report.scene.views import View, corners
+from symphys.report.scene.views import View, corners, inner_edges, outline
 from symphys.results.scene import UPRIGHT, Scene, SceneTerrain, Solid
 from symphys.trajectory import Trajectory
 
@@ -26,7 +25,7 @@ LINES = 8
 
 
 def draw_ground(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene) -> None:
-    """All static surfaces; planes and terrain hide what is below them."""
+    """Draw all static surfaces; planes and terrain hide what is below them."""
     for ground in scene.terrain:
         if panel.view.depth == 2:
             draw_heights(axes, panel, ground)
@@ -63,7 +62,7 @@ def draw_profile(axes: Axes, panel: ViewPanel, trajectory: Trajectory, ground: S
 
 
 def draw_heights(axes: Axes, panel: ViewPanel, ground: SceneTerrain) -> None:
-    """Lines of height, and in the title how far apart they are."""
+    """Draw contour lines of terrain, and write their distance into the title."""
     low, high = np.nanmin(ground.z, initial=np.inf), np.nanmax(ground.z, initial=-np.inf)
     if not high - low > 1e-9 * max(abs(high), abs(low)):
         return

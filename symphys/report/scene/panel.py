@@ -30,7 +30,7 @@ class ViewPanel:
 
     @property
     def span(self) -> Array:
-        """(2,) [m]: width and height."""
+        """Return width and height (2,) [m]."""
         return self.high - self.low
 
 
@@ -64,14 +64,14 @@ def include(plane: ScenePlane, view: View, low: Array, high: Array, room: float)
 
 
 def of_fixture(fixture: SceneFixture) -> Array:
-    """(2, 3) [m]: the lowest and highest coordinates of a fixture."""
+    """Return the lowest and the highest coordinates (2, 3) [m] of a fixture."""
     solid = fixture.solid
     around = solid.centre + corners(np.array(UPRIGHT), solid)
     return np.array([around.min(axis=0) - solid.radius, around.max(axis=0) + solid.radius])
 
 
 def of_terrain(ground: SceneTerrain) -> Array:
-    """(2, 3) [m]: how low and high terrain goes, in the middle of its sides: a picture need not show all of it."""
+    """Return the lowest and the highest point (2, 3) [m] of terrain, in the middle of its sides."""
     middle = [(ground.x[0] + ground.x[-1]) / 2, (ground.y[0] + ground.y[-1]) / 2]
     known = ground.z[np.isfinite(ground.z)]
     return np.array([[*middle, z] for z in (known.min(initial=np.inf), known.max(initial=-np.inf))])

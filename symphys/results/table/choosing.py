@@ -122,7 +122,7 @@ def sorting(key: str, known: Sequence[str]) -> tuple[str, bool]:
 
 
 def ranked(column: str, row: Row) -> tuple[bool, Any]:
-    """By which rows are sorted that have a column."""
+    """Return the key by which rows are sorted that have a column."""
     return rank(row[column])
 
 

@@ -73,7 +73,7 @@ def find_column(name: str, known: Sequence[str]) -> str:
 
 
 def short_names(column: str) -> set[str]:
-    """What else a column may be called: ``speed [m/s]`` or ``speed`` for ``output: speed [m/s]``."""
+    """Return other names of a column: ``speed [m/s]`` or ``speed`` for ``output: speed [m/s]``."""
     for prefix in (OUTPUT, COST, SETTING):
         if column.startswith(prefix):
             bare = column.removeprefix(prefix)

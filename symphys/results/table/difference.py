@@ -31,7 +31,7 @@ CONTEXT = 3
 
 @dataclass(frozen=True)
 class Difference:
-    """One thing that differs.
+    """A difference between two runs.
 
     Attributes:
         part: "asked for", "settings", "options", "problem.toml", "found", "checks", "outputs", "costs", "variables",
@@ -46,7 +46,7 @@ class Difference:
     second: Any = None
 
     def __str__(self) -> str:
-        """In a line."""
+        """Write the difference in a line."""
         if self.part == TEXT:
             return self.name
         if self.part == FILES:
@@ -56,7 +56,7 @@ class Difference:
 
     @property
     def faults(self) -> tuple[tuple[str, Any], ...]:
-        """What could not be read of which run."""
+        """Return what could not be read, by run."""
         return ("first", self.first), ("second", self.second)
 
     @property
@@ -70,7 +70,7 @@ class Difference:
 
 
 def differences(first: Path, second: Path) -> list[Difference]:
-    """All that differs between two run folders; a file that only one of them has, or that cannot be read, is named.
+    """List what differs between two run folders, and the files that only one has or that cannot be read.
 
     Raises:
         FileError: one is no folder.
@@ -91,7 +91,7 @@ def differences(first: Path, second: Path) -> list[Difference]:
 
 
 def result_differences(*results: Mapping[str, Any]) -> Iterator[Difference]:
-    """What differs between two results."""
+    """Yield what differs between two results."""
     yield from compared("found", *(chosen(result, FOUND) for result in results))
     yield from compared("checks", *(errors(result) for result in results))
     for part in ("outputs", "costs"):
@@ -152,7 +152,7 @@ def same(first: Any, second: Any) -> bool:
 
 
 def chosen(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
-    """Some entries of a table."""
+    """Return some entries of a table."""
     return {name: table.get(name) for name in names}
 
 
@@ -171,7 +171,7 @@ def errors(result: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def variable_differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> Iterator[Difference]:
-    """Of every variable the component that differs most."""
+    """Yield the component that differs most of every variable."""
     read = [
         {name: VariableRecord.from_json(entry).value for name, entry in values.table(each.get("z")).items()}
         for each in (first, second)

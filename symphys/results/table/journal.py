@@ -119,7 +119,7 @@ class Journal:
 
 
 def stamp_of(status: os.stat_result) -> Stamp:
-    """By which a changed file is recognised."""
+    """Return the stamp by which a changed file is recognised."""
     return status.st_mtime_ns, status.st_size
 
 

@@ -13,16 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from symphys import json_values as values
-from symphys.files import check_regular, emptied, strict
+from symphys.files import strict
 from symphys.findings.verdict import NOT_SOLVED
 from symphys.results.case_name import case_name
 from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.result import CheckRecord, Result
+from symphys.results.run import is_result, read_or_note
 from symphys.results.table.columns import COST, MOST_EXACT, OUTPUT, UNFINISHED, UNREADABLE, Row, setting_column
-from symphys.results.text_files import ReportError, reason
+from symphys.results.text_files import ReportError, read_light_table
 
-HEAVY = ("z", "trust")
-"""Tables of result.json that no row needs."""
 WAITING = "there is no result yet: the run goes on, or was stopped before its end"
 
 
@@ -36,7 +35,7 @@ def read_row(folder: Path) -> Row:
 
 
 def row_of(folder: Path, config: dict[str, Any], result: dict[str, Any]) -> Row:
-    """``read_row`` of a run whose config.json and result.json hold this."""
+    """Return the row of a run whose config.json and result.json hold this, as ``read_row`` does."""
     row = make_row(folder, config, result, [])
     return {column: value for column, value in row.items() if value is not None and value != ""}
 
@@ -44,16 +43,16 @@ def row_of(folder: Path, config: dict[str, Any], result: dict[str, Any]) -> Row:
 def whole_row(folder: Path) -> Row:
     """The row with None and empty texts for what is not known."""
     faults: list[str] = []
-    config = read_or_note(folder / CONFIG, faults)
+    config = read_or_note(folder / CONFIG, faults, read_light_table)
     try:
-        result = read_light(folder / RESULT)
-    except FileNotFoundError:
-        return without_result(folder, config, UNFINISHED, WAITING, faults)
+        result = read_light_table(folder / RESULT)
     except ReportError as error:
+        if not (folder / RESULT).exists():
+            return without_result(folder, config, UNFINISHED, WAITING, faults)
         return without_result(folder, config, UNREADABLE, str(error), [str(error), *faults])
-    if not ("solver" in result and "problem" in result):
-        why = f"{RESULT}: not a result of symphys (it names no problem and solver)"
-        return without_result(folder, config, UNREADABLE, why, [why, *faults])
+    wrong: list[str] = []
+    if not is_result(result, wrong):
+        return without_result(folder, config, UNREADABLE, wrong[0], [*wrong, *faults])
     try:
         return make_row(folder, config, result, faults)
     except (OSError, ValueError, RecursionError) as error:
@@ -146,7 +145,7 @@ def worst(checks: object) -> float | int | None:
 
 
 def why_not(ruled: Mapping[str, Any], result: Mapping[str, Any]) -> str:
-    """Why a run is not to be trusted, or what its solver says; empty for one that is solved."""
+    """Say why a run is not to be trusted, or what its solver says; empty for one that is solved."""
     doubts = values.names(ruled.get("doubts"))
     if doubts:
         return values.name("; ".join(doubts))
@@ -157,35 +156,3 @@ def whole_result(folder: Path) -> dict[str, Any]:
     """Verdict, solved and doubts of a file that is older than verdicts: it is ruled on anew, which needs all of it."""
     found = Result.from_json(json.loads((folder / RESULT).read_bytes()))
     return {"verdict": found.verdict, "solved": found.solved, "doubts": list(found.doubts)}
-
-
-def read_or_note(path: Path, faults: list[str]) -> dict[str, Any]:
-    """The object in a file; empty, with a clause in ``faults``, where there is none."""
-    try:
-        return read_light(path)
-    except FileNotFoundError:
-        faults.append(f"{path.name}: there is no such file")
-    except ReportError as error:
-        faults.append(str(error))
-    return {}
-
-
-def read_light(path: Path) -> dict[str, Any]:
-    """The JSON object in a file without the tables in HEAVY.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ReportError: names the file and says why it cannot be read.
-    """
-    try:
-        check_regular(path)
-        found = json.loads(emptied(path.read_bytes(), HEAVY))
-    except FileNotFoundError:
-        raise
-    except OSError as error:
-        raise ReportError(f"{path.name}: {reason(error)}") from error
-    except (ValueError, RecursionError) as error:
-        raise ReportError(f"{path.name}: not valid JSON, perhaps half written ({values.name(str(error))})") from error
-    if not isinstance(found, dict):
-        raise ReportError(f"{path.name}: a JSON object is expected, this is a {type(found).__name__}")
-    return found

@@ -26,7 +26,7 @@ STALE = 2
 
 @dataclass
 class Rows:
-    """All runs below a folder, by problem, case, solver and seed.
+    """The runs below a folder, by problem, case, solver and seed.
 
     Attributes:
         rows: one for each run folder.
@@ -41,7 +41,7 @@ class Rows:
 
 @dataclass
 class Scan:
-    """What lies below a folder.
+    """The run folders and journals below a folder.
 
     Attributes:
         runs: the stamp of the result of every run folder by its place; None where there is no result.
@@ -106,7 +106,7 @@ def scanned(root: Path) -> Scan:
 
 
 def stamp(entry: os.DirEntry[str] | None) -> Stamp | None:
-    """Of a result.json; None where there is none, or only a link that leads nowhere."""
+    """Return the stamp of a result.json; None where there is none, or only a link that leads nowhere."""
     try:
         return stamp_of(entry.stat()) if entry else None
     except OSError:
@@ -114,7 +114,7 @@ def stamp(entry: os.DirEntry[str] | None) -> Stamp | None:
 
 
 def journal_of(root: Path) -> Journal:
-    """That of the folder, or of the nearest above it that has one: of its own where there is none."""
+    """Return the journal of the folder, or of the nearest above it that has one; its own where there is none."""
     here = root.resolve()
     for folder in (here, *here.parents[:ANCESTORS]):
         if (folder / NAME).is_file():
@@ -123,7 +123,7 @@ def journal_of(root: Path) -> Journal:
 
 
 def below(out: Path, root: Path) -> str:
-    """What comes before the places of runs below ``root`` in the journal of ``out``: empty, or it ends in a slash."""
+    """Return what precedes the places of runs below ``root`` in the journal of ``out``: empty, or with a slash."""
     place = root.resolve().relative_to(out).as_posix()
     return "" if place == "." else f"{place}/"
 
@@ -199,7 +199,7 @@ def restored(column: str, value: object) -> object:
 
 
 def usual_order(row: Row) -> tuple[str, str, str, float, str]:
-    """By problem, case, solver and seed."""
+    """Return the key of a row in the usual order: problem, case, solver and seed."""
     return row.get("problem", ""), row.get("case", ""), row.get("solver", ""), row.get("seed", -1), row["run"]
 
 

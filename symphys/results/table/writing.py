@@ -136,7 +136,7 @@ def best_frame(folder: str | Path, by: str = "objective", overall: bool = False)
 
 
 def framed(rows: Sequence[Row], found: Rows) -> Any:
-    """Some of the rows that were found as a pandas.DataFrame with all of their columns."""
+    """Return some of the rows that were found as a pandas.DataFrame with all of their columns."""
     try:
         import pandas as pd  # late, as above
     except ImportError:
