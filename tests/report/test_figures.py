@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from symphys.report.charts.contacts import pair_normals, shown_pairs
+from symphys.report.charts.convergence import Curve, best_so_far, median_curve, violation_so_far
 from symphys.report.figures import style
-from symphys.report.figures.convergence import Curve, best_so_far, median_curve, violation_so_far
 from symphys.report.figures.data import thin
 from symphys.report.pages.batch import limits, ratios
 from symphys.report.scene.motion import draw_motion

@@ -48,7 +48,7 @@ def is_whole(page: Path) -> bool:
 @pytest.fixture
 def two_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Start them however few pages there are."""
-    monkeypatch.setattr(run_pages, "WORTH", {False: 1, True: 1})
+    monkeypatch.setattr(run_pages, "MIN_PAGES_PER_WORKER", {False: 1, True: 1})
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from symphys.types import Array
 
 POINTS = 240
 """Largest number of samples of a line in a light page, about: a panel is some 300 pixels wide."""
-STEPS = 4000
+RESOLUTION = 4000
 """Numbers of a linear panel are rounded to this share of their range; a panel is some 150 pixels high."""
 DIGITS = 4
 
@@ -31,6 +31,7 @@ class Line:
         look: words. "steps": a value holds until the next; "middles": until half way to the next; "dashed", "dotted",
             "pale" (translucent); "plain": without dots at few samples; "area": shaded down to 0. "points", "dots" and
             "rings" are marks alone: small, large, and hollow ones.
+        mark: matplotlib's name of "dots" and "rings" in a figure.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Line:
     y: Array
     width: float = 1.4
     look: str = ""
+    mark: str = "D"
 
     def has(self, word: str) -> bool:
         """Whether ``look`` has this word."""
@@ -64,6 +66,7 @@ class Panel:
         lines: in the order in which they are drawn.
         along: title of the horizontal axis.
         scale: 0 for linear, -1 for logarithmic, else linear up to this size and logarithmic beyond.
+        across: -1 for a logarithmic horizontal axis, which only figures have.
         edges: heights of horizontal lines, such as bounds.
         beyond: (low, high) heights that are shaded, such as those past a limit; infinite at an open end.
         met: whether a value of 1 or below is met, which is marked.
@@ -79,6 +82,7 @@ class Panel:
     lines: tuple[Line, ...] = ()
     along: str = ""
     scale: float = 0.0
+    across: float = 0.0
     edges: tuple[float, ...] = ()
     beyond: tuple[tuple[float, float], ...] = ()
     met: bool = False
@@ -119,11 +123,12 @@ class Panel:
 
 @dataclass(frozen=True)
 class Key:
-    """An entry of the legend: a name and its colour; ``look`` as of a ``Line``, or "shade" for an area."""
+    """An entry of the legend; ``look`` and ``mark`` as of a ``Line``, or "shade" for an area; a line has no mark."""
 
     name: str
     colour: str
     look: str = ""
+    mark: str = ""
 
 
 @dataclass(frozen=True)
@@ -188,7 +193,7 @@ def differences(values: Array) -> Any:
     span = float(np.ptp(values)) if values.size else 0.0
     if not math.isfinite(span) or span == 0:
         return rounded(values)
-    step = float(f"{span / STEPS:.2e}")
+    step = float(f"{span / RESOLUTION:.2e}")
     whole = np.round(values / step) if step > 0 else np.full(values.shape, np.inf)
     if not np.all(np.abs(whole) < 2**53):
         return rounded(values)

@@ -19,7 +19,7 @@ from symphys.trajectory import Trajectory
 from symphys.types import Array
 
 MOST_PAIRS = 6
-POINT = re.compile(r"(.*):\d+", re.DOTALL)
+CONTACT_POINT = re.compile(r"(.*):\d+", re.DOTALL)
 """Surfaces that may touch in several points have a contact for each: ``box-ground:3``."""
 
 
@@ -55,7 +55,7 @@ def contacts_chart(trajectory: Trajectory, scene: Scene) -> Chart | None:
 
 def pair_of(name: str) -> str:
     """Return the two surfaces of a contact, without the number of its point."""
-    match = POINT.fullmatch(name)
+    match = CONTACT_POINT.fullmatch(name)
     return match[1] if match else name
 
 

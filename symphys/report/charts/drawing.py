@@ -23,23 +23,24 @@ DOTS: Any = (0, (1, 1.5))
 BEYOND = "#e9edf0"
 TICKS = {1: 8, 2: 6, 3: 5}
 """Numbers along the bottom of a panel, about, by the columns of its chart; 4 of narrower ones."""
-FEW = 40
+MAX_MARKED_SAMPLES = 40
 """Samples up to which a plain line has a dot at each."""
-FAR = 16
+FAR_EDGE = 16
 """An edge farther from the curves than so many times their range is not drawn."""
 LETTERS = 14.0
 """Letters of a panel's title in an inch."""
-NARROWEST = 0.09
+MIN_STAGE_WIDTH = 0.09
 """Share of the axis that a stage needs for its name."""
 HEADROOM = 0.16
 """Room above and below the curves where stages are named, as a share of the axis."""
-BAR = 0.64
+BAR_HEIGHT = 0.64
 """Height of a bar, as a share of its row."""
 
 
-def chart_pictures(charts: Sequence[Chart]) -> list[Picture]:
-    """Draw charts, each as a picture."""
-    return [each for chart in charts for each in style.picture(chart.name, chart.alt, draw_chart(chart))]
+def chart_pictures(charts: Sequence[Chart | None]) -> list[Picture]:
+    """Draw charts, each as a picture; None is left out."""
+    known = [chart for chart in charts if chart is not None]
+    return [each for chart in known for each in style.picture(chart.name, chart.alt, draw_chart(chart))]
 
 
 def draw_chart(chart: Chart) -> DataFigure:
@@ -48,7 +49,8 @@ def draw_chart(chart: Chart) -> DataFigure:
     tall = 0.5 + 0.25 * bool(chart.keys) + chart.height * rows
     figure = DataFigure(figsize=(style.WIDTH, tall), layout="constrained")
     widths = chart.widths or (1.0,) * chart.columns
-    grid = figure.subplots(rows, chart.columns, sharex=one_range(chart), squeeze=False, width_ratios=widths)
+    shared = one_range(chart)
+    grid = figure.subplots(rows, chart.columns, sharex=shared, squeeze=False, width_ratios=widths)
     panels = [*chart.panels, *[None] * (grid.size - len(chart.panels))]
     for place, (axes, panel) in enumerate(zip(grid.flat, panels, strict=True)):
         if panel is None:
@@ -57,7 +59,7 @@ def draw_chart(chart: Chart) -> DataFigure:
         room = LETTERS * (style.WIDTH * widths[place % chart.columns] / sum(widths) - 0.4)
         draw_panel(axes, panel, chart, int(room))
         lowest = place + chart.columns >= len(panels) or panels[place + chart.columns] is None
-        axes.tick_params(labelbottom=lowest)
+        axes.tick_params(labelbottom=lowest or not shared)
         axes.set_xlabel(panel.along if lowest else "")
     for table in chart.tables:
         keep(figure, thinned(table, chart.points))
@@ -105,7 +107,10 @@ def values_of(panel: Panel) -> Array:
 
 
 def set_scale(axes: Axes, panel: Panel) -> None:
-    """Set the vertical scale of a panel."""
+    """Set the scales of a panel."""
+    if panel.across < 0:
+        places = np.concatenate([line.x for line in panel.lines])
+        style.set_log(axes, "x", places[np.isfinite(places)])
     if panel.scale < 0:
         style.set_log(axes, "y", np.concatenate([values_of(panel), panel.least, [1.0] * panel.met]))
     elif panel.scale > 0:
@@ -118,7 +123,7 @@ def draw_line(axes: Axes, line: Line, x: Array, y: Array) -> None:
     """Draw a line of a panel, thinned to (samples,) x and y."""
     if line.has("dots") or line.has("rings"):
         face = line.colour if line.has("dots") else "white"
-        axes.plot(x, y, "D", color=line.colour, markerfacecolor=face, markersize=5.5, zorder=4, clip_on=False)
+        axes.plot(x, y, line.mark, color=line.colour, markerfacecolor=face, markersize=5.5, zorder=4, clip_on=False)
         return
     if line.has("points"):
         axes.plot(x, y, ".", color=line.colour, markersize=3, alpha=0.7, zorder=3.5)
@@ -127,7 +132,7 @@ def draw_line(axes: Axes, line: Line, x: Array, y: Array) -> None:
     if line.has("area"):
         step = {"steps-post": "post", "steps-mid": "mid"}.get(kind)
         axes.fill_between(x, y, step=step, color=line.colour, alpha=0.14, linewidth=0)  # type: ignore[arg-type]
-    marker = "o" if len(x) <= FEW and not line.look else ""
+    marker = "o" if len(x) <= MAX_MARKED_SAMPLES and not line.look else ""
     alpha = 0.25 if line.has("pale") else 1.0
     look = {"color": line.colour, "linewidth": line.width, "linestyle": stroke(line), "alpha": alpha}
     axes.plot(x, y, drawstyle=kind, marker=marker, markersize=3, zorder=3 - line.has("pale"), **look)
@@ -144,7 +149,7 @@ def fit_heights(axes: Axes, panel: Panel) -> None:
     if values.size and panel.scale == 0 and np.ptp(values) < 1e-9 * max(1.0, float(np.abs(values).max())):
         half = max(1.0, 0.1 * abs(float(values[0])))
         low, high = float(values[0]) - half, float(values[0]) + half
-    far = FAR * (high - low)
+    far = FAR_EDGE * (high - low)
     near = [edge for edge in panel.edges if low - far <= edge <= high + far]
     for edge in near:
         axes.axhline(edge, color=style.GROUND_EDGE, linewidth=0.9, linestyle=DOTS, zorder=1.5)
@@ -175,7 +180,7 @@ def draw_stages(axes: Axes, panel: Panel) -> None:
             axes.axvspan(left, right, color=style.GROUND, linewidth=0, alpha=0.7, zorder=0.2)
         if index:
             axes.axvline(left, color=style.FAINT, linewidth=0.8, zorder=0.4)
-        if text and right - left >= NARROWEST * (panel.stages[-1][1] - panel.stages[0][0]):
+        if text and right - left >= MIN_STAGE_WIDTH * (panel.stages[-1][1] - panel.stages[0][0]):
             place = {"xycoords": ("data", "axes fraction"), "xytext": (0, -3), "textcoords": "offset points"}
             middle = (0.5 * (left + right), 1)
             axes.annotate(text, middle, ha="center", va="top", color=style.SOFT, fontsize=7.5, **place)  # type: ignore[arg-type]
@@ -202,9 +207,9 @@ def name_lines(axes: Axes, named: Sequence[Line]) -> None:
 def draw_bars(axes: Axes, panel: Panel) -> None:
     """Draw rows of bars, named on the left and noted on the right."""
     for row, bar in enumerate(panel.bars):
-        axes.axhspan(row - BAR / 2, row + BAR / 2, color=style.GROUND, linewidth=0, zorder=1)
+        axes.axhspan(row - BAR_HEIGHT / 2, row + BAR_HEIGHT / 2, color=style.GROUND, linewidth=0, zorder=1)
         parts = [(start, stop - start) for start, stop in bar.spans]
-        axes.broken_barh(parts, (row - BAR / 2, BAR), facecolor=bar.colour, linewidth=0, zorder=3)
+        axes.broken_barh(parts, (row - BAR_HEIGHT / 2, BAR_HEIGHT), facecolor=bar.colour, linewidth=0, zorder=3)
         axes.text(1.007, row, bar.note, va="center", color=style.SOFT, transform=axes.get_yaxis_transform())
     axes.set_yticks(range(len(panel.bars)), [style.short(bar.name, 24) for bar in panel.bars])
     axes.set(xlim=panel.least, ylim=(len(panel.bars) - 0.5, -0.5))
@@ -218,9 +223,10 @@ def handle(key: Key) -> Artist:
     if key.look == "shade":
         return Patch(facecolor=key.colour, edgecolor=style.GROUND_EDGE, linewidth=0.8)
     line = Line(key.name, key.colour, np.zeros(0), np.zeros(0), look=key.look)
-    if line.has("dots") or line.has("rings"):
-        face = key.colour if line.has("dots") else "white"
-        return Line2D([], [], color=key.colour, marker="D", markersize=5.5, linestyle="none", markerfacecolor=face)
+    face, mark = "white" if line.has("rings") else key.colour, key.mark or "D"
     if line.has("points"):
         return Line2D([], [], color=key.colour, marker=".", linestyle="none")
-    return Line2D([], [], color=key.colour, linewidth=1.0 if line.look else 1.5, linestyle=stroke(line))
+    if line.has("dots") or line.has("rings"):
+        return Line2D([], [], color=key.colour, marker=mark, markersize=5.5, linestyle="none", markerfacecolor=face)
+    width = 1.0 if line.look else 1.5
+    return Line2D([], [], color=key.colour, linewidth=width, linestyle=stroke(line), marker=key.mark, markersize=6)

@@ -15,8 +15,8 @@ from symphys.findings.examination import Energy, Growth
 from symphys.findings.numerics import reach
 from symphys.findings.writing import capital, show
 from symphys.report.charts.chart import Chart, Key, Line, Panel, lines
+from symphys.report.charts.convergence import AXIS_TITLES, VIOLATION_FLOOR, WORK
 from symphys.report.figures import style
-from symphys.report.figures.convergence import AXIS_TITLES, VIOLATION_FLOOR, WORK
 from symphys.report.figures.data import TIME, Table
 from symphys.results.result import StageRecord, VariableRecord, smoothed
 from symphys.results.run import Run

@@ -67,9 +67,9 @@ def thin(time: Array, columns: Array, points: int = 700) -> tuple[Array, Array]:
 
 
 def thinned(columns: Table, points: int) -> Table:
-    """Keep at most about ``points`` rows of a table of numbers, as ``thin`` does."""
+    """Keep at most about ``points`` rows of a table of numbers, as ``thin`` does; all of one with words."""
     first, *others = (np.asarray(column) for column in columns.values())
-    if len(first) <= points:
+    if len(first) <= points or first.dtype.kind == "U":
         return columns
     chosen = kept_rows(np.stack(others or [first], axis=1).astype(float), points)
     return {name: np.asarray(column)[chosen] for name, column in columns.items()}

@@ -18,7 +18,7 @@ from symphys.results.text_files import ReportError
 
 MOST_NAMED = 3
 
-Told = Callable[[int], None]
+Progress = Callable[[int], None]
 """Receives how many pages of runs are done; all of them: that of the batch begins."""
 
 
@@ -83,7 +83,7 @@ def make_pages(
     wanted: WantedPages,
     kind: str = AUTO,
     jobs: int = 1,
-    tell: Told = lambda _: None,
+    tell: Progress = lambda _: None,
     limit: float = math.inf,
 ) -> MadePages:
     """Make the pages of runs, then that of the batch, which links to them.

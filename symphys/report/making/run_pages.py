@@ -24,7 +24,7 @@ from symphys.report.pages.run import PAGE, write_light_report, write_run_report
 from symphys.results.text_files import ReportError
 
 AUTO = "auto"
-KINDS = (AUTO, FULL, LIGHT)
+PAGE_KINDS = (AUTO, FULL, LIGHT)
 MOST_FULL = 50
 """With "auto", so many pages made at once are full at most; of more all are light."""
 
@@ -43,8 +43,8 @@ class PageFault:
 
 def is_light(kind: str, count: int) -> bool:
     """Whether ``count`` pages that are made at once are light; ReportError for a kind that there is not."""
-    if kind not in KINDS:
-        raise ReportError(f"there are no pages of the kind {kind!r}; there are {', '.join(KINDS)}")
+    if kind not in PAGE_KINDS:
+        raise ReportError(f"there are no pages of the kind {kind!r}; there are {', '.join(PAGE_KINDS)}")
     return kind == LIGHT or (kind == AUTO and count > MOST_FULL)
 
 
@@ -73,9 +73,9 @@ def attempt(page: Path, make: Callable[[], object]) -> PageFault | None:
 
 DIED = "the process that made it died: killed from outside, out of memory, or a crash in compiled code"
 SLOW = "it was not made within {:g} s"
-PATIENCE = 20.0
+STOP_TIMEOUT = 20.0
 """[s] that a worker has for the end of its page once it is asked to stop."""
-WORTH = {False: 4, True: 80}
+MIN_PAGES_PER_WORKER = {False: 4, True: 80}
 """A worker takes a second to start: it is started for so many pages at least, full ones and (True) light ones."""
 
 Done = Callable[[Path, PageFault | None], None]
@@ -89,7 +89,7 @@ def make_run_pages(folders: Sequence[Path], light: bool, jobs: int, done: Done, 
 
     KeyboardInterrupt ends it: pages that are begun in workers are finished, and every page is whole or as it was.
     """
-    count = min(jobs, len(folders) // WORTH[light])
+    count = min(jobs, len(folders) // MIN_PAGES_PER_WORKER[light])
     left = deque(folders)
     if count > 1 or limit < math.inf:
         PagePool(left, light, done, limit).run(max(count, 1))
@@ -135,7 +135,7 @@ class PagePool:
             while workers:
                 ready = wait([worker.pipe for worker in workers], self.end_slow(workers))
                 for worker in [each for each in workers if each.pipe in ready]:
-                    self.hear(worker, workers)
+                    self.receive(worker, workers)
         finally:
             end(workers)
 
@@ -149,7 +149,7 @@ class PagePool:
         until = min((worker.until for worker in workers if not worker.ended), default=math.inf)
         return None if until == math.inf else max(until - now, 0.0)
 
-    def hear(self, worker: PageWorker, workers: list[PageWorker]) -> None:
+    def receive(self, worker: PageWorker, workers: list[PageWorker]) -> None:
         """Take what a worker has made, and give it the next page; replace one that died over a page."""
         try:
             fault: PageFault | None = worker.pipe.recv()
@@ -175,7 +175,7 @@ class PagePool:
 
 
 def start(light: bool) -> PageWorker:
-    """A new worker process."""
+    """Return a new worker process."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=work, args=(there, light), daemon=True)
@@ -190,7 +190,7 @@ def end(workers: Sequence[PageWorker]) -> None:
         for worker in workers:
             worker.stop()
         for worker in workers:
-            worker.process.join(PATIENCE)
+            worker.process.join(STOP_TIMEOUT)
             if worker.process.is_alive():
                 worker.process.terminate()
                 worker.process.join()

@@ -84,7 +84,7 @@ def is_current(page: Path, digest: str, kinds: Iterable[str] = (FULL,)) -> bool:
 
 
 def read_stamp(page: Path) -> Stamp | None:
-    """The stamp of a page; None where there is no page, or none with a stamp."""
+    """Read the stamp of a page; None where there is no page, or none with a stamp."""
     try:
         if not stat.S_ISREG(page.stat().st_mode):
             return None
@@ -149,5 +149,5 @@ def drawing_digest() -> str:
 
 
 def sources(path: Path) -> list[Path]:
-    """A module, or those of a room and what its pages hold."""
+    """Return a module, or those of a room and what its pages hold."""
     return [path] if path.is_file() else [each for each in path.rglob("*") if each.suffix in SOURCES]

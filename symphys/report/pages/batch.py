@@ -12,25 +12,24 @@ from matplotlib.lines import Line2D
 from symphys import files
 from symphys.findings import writing
 from symphys.findings.verdict import ACCEPTED
+from symphys.report.charts.convergence import convergence_chart
+from symphys.report.charts.drawing import chart_pictures
 from symphys.report.figures import style
-from symphys.report.figures.convergence import draw_convergence
 from symphys.report.figures.data import Column, DataFigure, keep
 from symphys.report.figures.style import Picture, write_figures
 from symphys.report.making.stamps import BATCH_PAGE, FULL, Stamp, batch_digest
 from symphys.report.pages import comparison
 from symphys.report.pages.comparison import page_links, run_card, study_card
 from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag
+from symphys.report.pages.run import read_motions
 from symphys.report.robots.strip import draw_strip
 from symphys.report.scene.animation import NUMBERS, animation
 from symphys.report.scene.motion import draw_motion
 from symphys.results.discovery import Entry, Study, read_all, sample, studies
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.file_names import FIGURES, GUESS, SCENE, TRAJECTORY
+from symphys.results.file_names import FIGURES
 from symphys.results.run import BriefReader, Run, with_trace
-from symphys.results.scene import Scene, read_scene
 from symphys.results.text_files import ReportError
-from symphys.results.trajectories import POSES, read_trajectory
-from symphys.trajectory import Trajectory
 from symphys.types import Array
 
 PAGE = BATCH_PAGE
@@ -81,7 +80,7 @@ def write_batch_report(batch_dir: Path, unmade: Mapping[Path, str] | None = None
 
 
 def unmade_card(root: Path, unmade: Mapping[Path, str]) -> Html:
-    """The runs whose pages could not be made, and why; nothing without any."""
+    """Return the runs whose pages could not be made, and why; nothing without any."""
     named = list(unmade.items())[: comparison.MOST_BROKEN]
     rows = [[tag("code", folder.relative_to(root).as_posix()), why] for folder, why in named]
     more = f" The first {len(named)} of {len(unmade)}." if len(named) < len(unmade) else ""
@@ -96,7 +95,7 @@ def build_tables(found: Sequence[Study]) -> list[Html]:
 
 
 def build_studies(found: Sequence[Study], root: Path) -> list[Html]:
-    """The problems one after the other; with links to each and headings where there are several."""
+    """Return the problems one after the other; with links to each and headings where there are several."""
     if not found:
         return []
     names = anchors(found)
@@ -113,17 +112,17 @@ def build_studies(found: Sequence[Study], root: Path) -> list[Html]:
 
 
 def linked(study: Study) -> str:
-    """The title, with the settings that tell it from another study of the same problem."""
+    """Return the title, with the settings that tell it from another study of the same problem."""
     return f"{study.title}, {study.settings}" if study.settings else study.title
 
 
 def name_of(folder: Path) -> str:
-    """The folder's own name, whatever path it was given by."""
+    """Return the folder's own name, whatever path it was given by."""
     return folder.resolve().name or "this folder"
 
 
 def anchors(found: Sequence[Study]) -> list[str]:
-    """A file-name stem and anchor for each study, all different."""
+    """Return a file-name stem and anchor for each study, all different."""
     names: list[str] = []
     for study in found:
         name, count = slug(study.problem), 1
@@ -149,7 +148,7 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, curves: int
     whole = Study(few.problem, few.place, tuple(Entry(e.solver, tuple(map(with_trace, e.runs))) for e in few.entries))
     moved, played = best_motion(study.best, anchor, numbers)
     with style.paper():
-        converged = style.picture(f"{anchor}-convergence", "Objective and errors", draw_convergence(drawable(whole)))
+        converged = chart_pictures([convergence_chart(f"{anchor}-convergence", drawable(whole))])
         checked = style.picture(f"{anchor}-checks", "Errors against tolerances", draw_checks(study))
     write_figures(root / FIGURES, converged + checked + moved)
     best = study.best
@@ -174,32 +173,19 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, curves: int
 
 
 def best_motion(run: Run, anchor: str, numbers: int) -> tuple[list[Picture], Html]:
-    """Pictures of the motion of a run, and its animation; in its place why there is none, which ends no page."""
+    """Draw the motion of a run, and play it; or say why there is none, which ends no page."""
     try:
-        motion, guess, scene = read_motion(run)
+        recording = read_motions(run.folder)
+        motion, scene, guess = recording.trajectory, recording.scene, recording.guess
+        if motion is None:
+            return [], tag("p", f"There is no motion to draw: {recording.faults[0]}.")
         played = animation(motion, scene, guess, numbers)
         with style.paper():
             drawn = style.picture(f"{anchor}-strip", "The motion at even times", draw_strip(motion, scene))
             drawn += style.picture(f"{anchor}-motion", "Path and poses over time", draw_motion(motion, scene, guess))
-    except ReportError as error:
-        return [], tag("p", f"There is no motion to draw: {error}.")
     except Exception as error:  # what one run has recorded must not take the page of all with it
         return [], tag("p", f"The motion could not be drawn: {type(error).__name__}: {error}.")
     return drawn, played
-
-
-def read_motion(run: Run) -> tuple[Trajectory, Trajectory | None, Scene]:
-    """Motion, guess and scene of a run; ReportError where there is no motion."""
-    motion = read_trajectory(run.folder / TRAJECTORY)
-    try:
-        scene = read_scene(run.folder / SCENE)
-    except ReportError:
-        scene = Scene()
-    try:
-        guess = read_trajectory(run.folder / GUESS, POSES)
-    except ReportError:
-        guess = None
-    return motion, guess, scene
 
 
 def targets(study: Study, pictures: list[Picture]) -> Html:
@@ -262,14 +248,14 @@ def ratios(study: Study) -> Ratios:
 
 
 def shown_checks(found: Ratios) -> list[str]:
-    """The checks that get a row: all, or those with the largest medians, in the file's order."""
+    """Return the checks that get a row: all, or those with the largest medians, in the file's order."""
     worst = {name: max(float(np.median(seeds)) for seeds in solvers.values()) for name, solvers in found.items()}
     kept = set(sorted(worst, key=lambda name: -worst[name])[:MOST_CHECKS])
     return [name for name in found if name in kept]
 
 
 def draw_checks(study: Study) -> DataFigure | None:
-    """A row for each check, a lane for each solver: small dots for seeds, a mark for their median, a line at 1."""
+    """Draw a row for each check, a lane for each solver: dots for seeds, a mark for their median, a line at 1."""
     found = ratios(study)
     if not found:
         return None
@@ -307,7 +293,7 @@ def keep_ratios(axes: Axes, study: Study, names: list[str]) -> None:
 
 
 def limits(found: Ratios) -> tuple[float, float]:
-    """The range of the axis: whole decades around the ratios and 1."""
+    """Return the range of the axis: whole decades around the ratios and 1."""
     every = np.concatenate([seeds for solvers in found.values() for seeds in solvers.values()])
     positive = every[np.isfinite(every) & (every > 0)]
     low = 10 ** np.floor(np.log10(min(positive.min(initial=1.0), 0.3)))
@@ -331,7 +317,7 @@ def dress(axes: Axes, names: list[str], low: float, high: float) -> None:
 
 
 def draw_lane(axes: Axes, height: float, seeds: Array, mark: tuple[str, str], ends: tuple[float, float]) -> None:
-    """The seeds of one solver in one check."""
+    """Draw the seeds of one solver in one check."""
     colour, marker = mark
     middle = float(np.median(seeds))
     if seeds.size > 1:

@@ -36,7 +36,7 @@ from symphys.types import Array
 MOST_PANELS = 6
 BINS = 60
 """Of the histogram of latencies."""
-ENOUGH = 0.99
+MIN_IN_TIME = 0.99
 """Share of ticks in time that counts as keeping up."""
 LATE = (
     "A plan acts from the moment it is ready. Until then the plan before goes on. While the solver works, ticks are "
@@ -53,7 +53,7 @@ def write_closed_loop_page(folder: Path) -> Path:
     record = read_closed_loop(folder)
     trajectory, scene = read_trajectory(folder / TRAJECTORY), read_scene(folder / SCENE)
     pictures = motion_pictures(trajectory, scene)
-    charts = [chart for chart in (plans_chart(record), commands_chart(record)) if chart is not None]
+    charts = [plans_chart(record), commands_chart(record)]
     with style.paper():
         made = chart_pictures(charts) + style.picture("latencies", "How long plans took", draw_latencies(record))
     pictures |= {picture.name: picture for picture in made}
@@ -90,7 +90,7 @@ def verdict(record: ClosedLoopRecord) -> Html:
     else:
         missed = ", ".join(target.name for target in record.targets if not target.met)
         title, level = f"Not met at the end: {missed}", "bad"
-    if level == "good" and record.share < ENOUGH:
+    if level == "good" and record.share < MIN_IN_TIME:
         level = "fair"
     period = 1e3 / record.rate
     sentence = (

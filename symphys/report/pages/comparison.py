@@ -50,7 +50,7 @@ def summary(found: Sequence[Study], broken: Sequence[Run]) -> str:
 
 
 def study_verdict(study: Study) -> Html:
-    """A banner: which solvers solved it, and which with the least work and time."""
+    """Return a banner: which solvers solved it, and which with the least work and time."""
     entries = [entry for entry in study.entries if any(run.status != "not_applicable" for run in entry.runs)]
     full = [entry for entry in entries if entry.solved == len(entry.runs)]
     none = [entry for entry in entries if entry.solved == 0]
@@ -93,7 +93,7 @@ def tally(entries: Sequence[Entry], full: Sequence[Entry], none: Sequence[Entry]
 
 
 def thrift(study: Study) -> str:
-    """The solver with the least work and the one with the least time, among those that solved every run."""
+    """Return the solver with the least work and the one with the least time, among those that solved every run."""
     full = [entry for entry in study.entries if entry.solved == len(entry.runs)]
     work = {e.solver: e.median([run.equivalents for run in e.runs]) for e in full}
     time = {e.solver: e.median([solve_time(run) for run in e.runs]) for e in full}
@@ -138,7 +138,7 @@ LEAST_IS_BEST = ("work in rollouts", "solve")
 
 
 def solver_table(study: Study) -> Html:
-    """A row for each solver, medians over its seeds."""
+    """Return a row for each solver, medians over its seeds."""
     marks = style.solver_marks(entry.solver for entry in study.entries)
     shown = columns(study)
     medians = [[entry.median([read(run) for run in entry.runs]) for _, read, _ in shown] for entry in study.entries]
@@ -156,14 +156,14 @@ def solver_table(study: Study) -> Html:
 
 
 def least(study: Study, numbers: Sequence[float]) -> float:
-    """The smallest number among solvers that solved every run, if there are two to compare."""
+    """Return the smallest number among solvers that solved every run, if there are two to compare."""
     full = [n for entry, n in zip(study.entries, numbers, strict=True) if entry.solved == len(entry.runs)]
     known = [n for n in full if math.isfinite(n)]
     return min(known) if len(known) > 1 else math.nan
 
 
 def seeds(entry: Entry) -> Html:
-    """A chip for each run, linked to its page if there is one; of many runs how many ended in which way."""
+    """Return a chip for each run, linked to its page if there is one; of many runs how many ended in which way."""
     if len(entry.runs) > MOST_CHIPS:
         counted = Counter(map(words.level, entry.runs))
         chips = [pill(level, str(counted[level])) for level in ICONS if counted[level]]
@@ -172,7 +172,7 @@ def seeds(entry: Entry) -> Html:
 
 
 def seed_chip(run: Run) -> Html:
-    """A seed with the sign of how its run ended."""
+    """Return a seed with the sign of how its run ended."""
     level = words.level(run)
     content = join([tag("i", ICONS[level], aria_hidden="true"), str(run.seed)])
     label = f"{run.solver}, seed {run.seed}: {words.headline(run).lower()}"
@@ -226,12 +226,12 @@ def smoothing_note(study: Study) -> str:
 
 
 def stages_of(run: Run) -> str:
-    """The smoothing of its stages."""
+    """Return the smoothing of its stages."""
     return writing.listed([show(stage.smoothing) for stage in run.stages])
 
 
 def convergence_note(study: Study, curves: int) -> str:
-    """The caption: what the figure does not show; ``curves``: runs of a solver that it shows at most."""
+    """Return the caption: what the figure does not show; ``curves``: runs of a solver that it shows at most."""
     most = max(len(entry.runs) for entry in study.entries)
     some = f"Drawn are {curves} of up to {most} runs of a solver, evenly among the seeds. " if most > curves else ""
     marked = any(len(entry.runs) > 1 for entry in study.entries)
@@ -243,7 +243,7 @@ def convergence_note(study: Study, curves: int) -> str:
 
 
 def checks_by_solver(study: Study) -> dict[tuple[str, str], list[CheckRecord]]:
-    """The checks of all seeds, by their name and the solver."""
+    """Return the checks of all seeds, by their name and the solver."""
     found: dict[tuple[str, str], list[CheckRecord]] = {}
     for run in study.runs:
         for check in run.checks:
@@ -252,7 +252,7 @@ def checks_by_solver(study: Study) -> dict[tuple[str, str], list[CheckRecord]]:
 
 
 def check_cell(found: Sequence[CheckRecord]) -> Html:
-    """The median error of one check for one solver, and how many seeds met it."""
+    """Return the median error of one check for one solver, and how many seeds met it."""
     if not found:
         return Html(writing.DASH)
     met = sum(check.met for check in found)
@@ -331,7 +331,7 @@ Column = NumberColumn | WordColumn | LinkColumn
 
 
 def short(value: float) -> float | int | str | None:
-    """A number as JSON has it, with ``DIGITS`` digits; infinite ones as words, null for nan."""
+    """Return a number as JSON has it, with ``DIGITS`` digits; infinite ones as words, null for nan."""
     if not math.isfinite(value):
         return None if math.isnan(value) else ("inf" if value > 0 else "-inf")
     if value == int(value) and abs(value) < 2**53:
@@ -340,7 +340,7 @@ def short(value: float) -> float | int | str | None:
 
 
 def row_table(columns: Sequence[Column], noun: str) -> Html:
-    """The place of a table, and its rows; ``noun``: what a row is."""
+    """Return the place of a table, and its rows; ``noun``: what a row is."""
     data = {"columns": [column.to_json() for column in columns], "noun": noun, "page": PER_PAGE}
     return tag(
         "div",
@@ -351,7 +351,7 @@ def row_table(columns: Sequence[Column], noun: str) -> Html:
 
 
 def run_card(found: Sequence[Study], links: Mapping[str, str]) -> Html:
-    """The table of all runs; ``links``: pages by the places of runs."""
+    """Return the table of all runs; ``links``: pages by the places of runs."""
     pairs = [(study, run) for study in found for run in study.runs]
     runs = [run for _, run in pairs]
     status = [words.headline(run) for run in runs]
@@ -376,7 +376,7 @@ def run_card(found: Sequence[Study], links: Mapping[str, str]) -> Html:
 
 
 def output_columns(runs: Sequence[Run]) -> list[Column]:
-    """The reported quantities that any run has, if they are few."""
+    """Return the reported quantities that any run has, if they are few."""
     names = dict.fromkeys(name for run in runs for name in run.outputs)
     if len(names) > MOST_KEYS:
         return []
@@ -384,7 +384,7 @@ def output_columns(runs: Sequence[Run]) -> list[Column]:
 
 
 def setting_columns(settings: Sequence[Mapping[str, object]]) -> list[Column]:
-    """A column for each setting, or one for all where they are many; none where no run has any."""
+    """Return a column for each setting, or one for all where they are many; none where no run has any."""
     keys = sorted({key for each in settings for key in each})
     if len(keys) > MOST_KEYS:
         return [WordColumn("settings", [", ".join(f"{k}={written(v)}" for k, v in each.items()) for each in settings])]
@@ -400,12 +400,12 @@ def setting_columns(settings: Sequence[Mapping[str, object]]) -> list[Column]:
 
 
 def written(value: object) -> str:
-    """A setting as it is typed."""
+    """Return a setting as it is typed."""
     return value if isinstance(value, str) else json.dumps(files.strict(value))
 
 
 def study_card(found: Sequence[Study], links: Mapping[str, str], most: int) -> Html:
-    """The table of problems and settings that are too many for a section each."""
+    """Return the table of problems and settings that are too many for a section each."""
     entries = [(study, entry) for study in found for entry in study.entries]
     studies = [study for study, _ in entries]
     best = [Study(study.problem, study.place, (entry,)).best for study, entry in entries]

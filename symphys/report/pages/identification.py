@@ -37,7 +37,7 @@ INTERVALS = (
     "is the wider one where recordings differ by more than noise."
 )
 GHOST = "What was measured is seen through; what is simulated with the estimates is solid."
-STRONG = 0.9
+STRONG_CORRELATION = 0.9
 """Correlations that are named."""
 MOST_NAMES = 30
 """Numbers of which a figure shows correlations and intervals."""
@@ -84,7 +84,7 @@ def write_identification_page(folder: Path) -> Path:
 
 
 def identification_folders(root: Path) -> list[Path]:
-    """The folders at or below one that hold an identification."""
+    """Return the folders at or below one that hold an identification."""
     return sorted(path.parent for path in root.rglob(IDENTIFICATION))
 
 
@@ -153,11 +153,11 @@ def unidentifiable(found: Identification) -> Html:
 
 
 def strong(found: Identification) -> Html:
-    """The pairs that change together."""
+    """Return the pairs that change together."""
     names, rows = [each.name for each in found.parameters], list[str]()
     for i, j in zip(*np.triu_indices(len(names), 1), strict=True):
         value = float(found.correlation[i, j])
-        if abs(value) > STRONG:
+        if abs(value) > STRONG_CORRELATION:
             rows.append(f"{names[i]} and {names[j]}: {show(value, 3)}")
     return tag("p", f"Strong: {'; '.join(rows)}.") if rows else Html("")
 
@@ -200,7 +200,7 @@ def error_row(kind: str, each: PredictionErrors) -> list[str]:
 
 
 def worst(replay: RecordingReplay, scene: Scene, curves: Html) -> Html:
-    """A recording played beside its simulation."""
+    """Return a recording played beside its simulation."""
     motion, both = with_ghosts(replay, scene)
     kind = "held back" if replay.held_back else "fitted to"
     note = f"{kind}; residuals {show(replay.ratio)} times the noise. {GHOST if replay.bodies else ''}"
@@ -236,7 +236,7 @@ def draw_pictures(found: Identification, replays: Sequence[RecordingReplay]) -> 
         made = style.picture("intervals", "Estimates with their intervals", draw_intervals(found))
         made += style.picture("correlations", "Correlations of the estimates", draw_correlations(found))
         made += style.picture("residuals", "Residuals over time", draw_residuals(found))
-        made += chart_pictures([chart for chart in charts if chart is not None])
+        made += chart_pictures(charts)
     return {picture.name: picture for picture in made}
 
 
@@ -274,7 +274,7 @@ def draw_intervals(found: Identification) -> DataFigure | None:
 
 
 def draw_correlations(found: Identification) -> DataFigure | None:
-    """The correlations of the shared numbers."""
+    """Draw the correlations of the shared numbers."""
     names = [each.name for each in found.parameters][:MOST_NAMES]
     if len(names) < 2 or not np.isfinite(found.correlation).any():
         return None

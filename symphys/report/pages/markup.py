@@ -50,14 +50,14 @@ def join(parts: Iterable[Part]) -> Html:
 
 
 def tag(name: str, /, *children: Part, **attributes: str | None) -> Html:
-    """An element. ``class_`` stands for class, ``_`` for a hyphen; an attribute that is None is left out."""
+    """Return an element. ``class_`` stands for class, ``_`` for a hyphen; an attribute that is None is left out."""
     pairs = [(key.rstrip("_").replace("_", "-"), value) for key, value in attributes.items() if value is not None]
     opening = "".join([name, *(f' {key}="{html.escape(value)}"' for key, value in pairs)])
     return Html(f"<{opening}>" if name in VOID else f"<{opening}>{join(children)}</{name}>")
 
 
 def card(title: str, *children: Part, anchor: str | None = None, note: Part = "") -> Html:
-    """A section with a heading; nothing if there is nothing in it."""
+    """Return a section with a heading; nothing if there is nothing in it."""
     body = [child for child in children if child]
     if not body:
         return Html("")
@@ -66,7 +66,7 @@ def card(title: str, *children: Part, anchor: str | None = None, note: Part = ""
 
 
 def table(header: Sequence[Part], rows: Iterable[Sequence[Part]], kinds: str, label: str = "") -> Html:
-    """A table; ``kinds`` has one letter a column: ``t`` for text, ``n`` for a number."""
+    """Return a table; ``kinds`` has one letter a column: ``t`` for text, ``n`` for a number."""
     classes = ["number" if kind == "n" else None for kind in kinds]
     head = [tag("th", cell, class_=kind, scope="col") for cell, kind in zip(header, classes, strict=True)]
     body = [tag("tr", *(tag("td", cell, class_=kind) for cell, kind in zip(row, classes, strict=True))) for row in rows]
@@ -75,19 +75,19 @@ def table(header: Sequence[Part], rows: Iterable[Sequence[Part]], kinds: str, la
 
 
 def pill(level: str, text: str) -> Html:
-    """A short coloured word with a sign, so that colour is never alone."""
+    """Return a short coloured word with a sign, so that colour is never alone."""
     return tag("span", tag("i", ICONS[level], aria_hidden="true"), text, class_=f"pill {level}")
 
 
 def banner(level: str, title: str, *sentences: str) -> Html:
-    """A coloured box with a sign, a title and what there is to say."""
+    """Return a coloured box with a sign, a title and what there is to say."""
     lines = [tag("p", sentence) for sentence in sentences if sentence]
     sign = tag("span", ICONS[level], class_="sign", aria_hidden="true")
     return tag("div", sign, tag("div", tag("b", title), *lines), class_=f"verdict {level}")
 
 
 def dot(colour: str) -> Html:
-    """A spot of a solver's or body's colour."""
+    """Return a spot of a solver's or body's colour."""
     return tag("span", class_="dot", style=f"background:{colour}", aria_hidden="true")
 
 
@@ -109,7 +109,7 @@ def named_figure(pictures: Mapping[str, Drawn], name: str, caption: Part = "") -
 
 
 def figure(picture: Picture) -> Html:
-    """A picture embedded in the page, with links to its files, which lie in a folder beside the page."""
+    """Return a picture embedded in the page, with links to its files, which lie in a folder beside the page."""
     code = base64.b64encode(picture.svg.encode()).decode("ascii")
     svg, data = (f"{FIGURES}/{quote(picture.name)}.{kind}" for kind in ("svg", "csv"))
     links = tag("figcaption", tag("a", "SVG", href=svg), " ", tag("a", "CSV", href=data, title="the numbers drawn"))
@@ -117,7 +117,7 @@ def figure(picture: Picture) -> Html:
 
 
 def chart(found: Chart) -> Html:
-    """The place of a chart, and its numbers, compressed."""
+    """Return the place of a chart, and its numbers, compressed."""
     place = tag("div", role="img", aria_label=found.alt)
     return tag("figure", place, packed_json(found.to_json()), class_="chart", data_name=found.name)
 
@@ -134,7 +134,7 @@ def packed_json(value: object) -> Html:
 
 
 def embedded(data: str) -> Html:
-    """A text of JSON for scripts of the page, harmless in HTML whatever it holds."""
+    """Return a text of JSON for scripts of the page, harmless in HTML whatever it holds."""
     inert = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
     return tag("script", Html(inert), type="application/json")
 
@@ -151,12 +151,12 @@ def facts(pairs: Iterable[tuple[str, Part]]) -> Html:
 
 
 def fold(title: str, text: str) -> Html:
-    """A long text behind a line that opens it; nothing for an empty one."""
+    """Return a long text behind a line that opens it; nothing for an empty one."""
     return tag("details", tag("summary", title), tag("pre", text)) if text.strip() else Html("")
 
 
 def page(title: str, body: Part, animated: bool = False, rows: bool = False, stamp: Stamp | None = None) -> str:
-    """The whole document: no part of it is loaded from elsewhere, and no script but our own may run.
+    """Return the whole document: no part of it is loaded from elsewhere, and no script but our own may run.
 
     ``animated``: whether it plays a motion; ``rows``: whether it has a table that is shown a page at a time; ``stamp``:
     what it was made from.
@@ -181,7 +181,7 @@ def light_scripts(animated: bool) -> tuple[str, str, str]:
 
 
 def squeezed(script: str) -> str:
-    """The script without indentation and comments that end a line."""
+    """Return the script without indentation and comments that end a line."""
     return "\n".join(filter(None, (re.sub(r"(^|\s+)// [^\"'`]*$", "", line).strip() for line in script.split("\n"))))
 
 
@@ -209,5 +209,5 @@ def document(title: str, body: Part, scripts: Html, allowed: Sequence[str], stam
 
 
 def slug(text: str) -> str:
-    """A name that is safe as a file name and as an anchor."""
+    """Return a name that is safe as a file name and as an anchor."""
     return re.sub(r"[^a-z0-9_]+", "-", text.lower()).strip("-")[:60] or "unnamed"

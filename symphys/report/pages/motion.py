@@ -19,7 +19,7 @@ from symphys.report.charts.motion import MOST_BODIES, controlled_bodies, motion_
 from symphys.report.figures.style import Picture, paper, picture, write_figures
 from symphys.report.pages.markup import Drawn, Html, Part, card, figures, join, named_figure, page, pill, table, tag
 from symphys.report.robots.branches import is_large
-from symphys.report.robots.gait import LOADED, stances, weight
+from symphys.report.robots.gait import LOADED_SHARE, stances, weight
 from symphys.report.robots.joint_charts import shown
 from symphys.report.robots.joint_use import Channel, channels, separation
 from symphys.report.robots.strip import draw_strip
@@ -31,7 +31,7 @@ from symphys.results.scene_joints import SceneMotor
 from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory
 
-OFTEN = 0.25
+OFTEN_SATURATED = 0.25
 """A motor that is saturated for this share of the time is marked in the table."""
 MOST_ROWS = 60
 MOST_NAMED = 4
@@ -187,7 +187,7 @@ def separation_sentence(trajectory: Trajectory) -> str:
 
 
 def use_table(every: Sequence[Channel]) -> Html:
-    """A row for each coordinate."""
+    """Return a row for each coordinate."""
     rows = [use_row(channel) for channel in every[:MOST_ROWS]]
     more = f"and {len(every) - MOST_ROWS} more, in trajectory.npz"
     note = tag("p", more, class_="note") if len(every) > MOST_ROWS else ""
@@ -222,14 +222,14 @@ def share_words(channel: Channel) -> Html:
         return Html("")
     if channel.share == 0:
         return tag("small", "never")
-    return pill("fair", percent(channel.share)) if channel.share >= OFTEN else Html(percent(channel.share))
+    return pill("fair", percent(channel.share)) if channel.share >= OFTEN_SATURATED else Html(percent(channel.share))
 
 
 def gait_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> Html:
     """Show when each foot stands; empty where none comes down or leaves the ground."""
     if "gait" not in pictures:
         return Html("")
-    least = f"{percent(LOADED)} of the weight of {show(weight(trajectory, scene))} N"
+    least = f"{percent(LOADED_SHARE)} of the weight of {show(weight(trajectory, scene))} N"
     caption = f"A bar: the body carries more than {least}. The duty factor is the share of the time that it does."
     figure = named_figure(pictures, "gait", caption)
     return card("Gait", tag("p", steps_sentence(trajectory, scene)), figure, anchor="gait")

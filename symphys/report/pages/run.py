@@ -165,7 +165,7 @@ def sources(run: Run) -> Html:
 
 
 def read_text(path: Path) -> str:
-    """Return a file's text, JSON set out in lines; empty if it cannot be read."""
+    """Read a file's text, JSON set out in lines; empty if it cannot be read."""
     try:
         text = tables.read_words(path)
         return json.dumps(json.loads(text), indent=2, ensure_ascii=False) if path.suffix == ".json" else text

@@ -12,6 +12,7 @@ import numpy as np
 from symphys import json_values as values
 from symphys.findings import writing
 from symphys.findings.advice import advice, answers, findings, slopes
+from symphys.findings.endings import ending
 from symphys.findings.examination import Examination
 from symphys.findings.levels import MARKS, Judged
 from symphys.findings.physics import sliding
@@ -108,7 +109,7 @@ def header(run: Run, cards: Sequence[Html]) -> Html:
 
 
 def key_numbers(run: Run) -> Html:
-    """The strip of numbers below the verdict."""
+    """Return the strip of numbers below the verdict."""
     if not run.readable:
         return Html("")
     derivatives = [(kind, run.counts.get(kind, 0.0)) for kind in ("gradients", "jacobians", "hessians")]
@@ -127,7 +128,7 @@ def key_numbers(run: Run) -> Html:
 
 
 def labelled(run: Run) -> list[tuple[str, str]]:
-    """The numbers of a result whose definition has a label."""
+    """Return the numbers of a result whose definition has a label."""
     found = []
     for each in dataclasses.fields(Result):
         if "label" in each.metadata:
@@ -165,12 +166,12 @@ def checks(run: Run) -> Html:
 
 
 def joined(number: str, unit: str) -> str:
-    """A number and its unit, where it has one."""
+    """Return a number and its unit, where it has one."""
     return f"{number} {unit}" if unit else number
 
 
 def output_line(run: Run, name: str) -> str:
-    """A number of the result, and what it was at the guess."""
+    """Return a number of the result, and what it was at the guess."""
     return f"{show(run.outputs[name], 4)} (at the guess {show(run.guess.get(OUTPUT + name, math.nan), 4)})"
 
 
@@ -222,7 +223,7 @@ def sets_of(variable: VariableRecord) -> str:
 
 
 def many_row(variable: VariableRecord) -> list[str]:
-    """The range of very many components, and how far they are from the guess."""
+    """Return the range of very many components, and how far they are from the guess."""
     guess, value = variable.guess[:, 0], variable.value[:, 0]
     label = join([tag("b", variable.name), f" {len(value)} numbers ", tag("small", sets_of(variable))])
     ranges = [f"{show(float(of.min()))} to {show(float(of.max()))}" for of in (guess, value)]
@@ -283,7 +284,7 @@ def step_note(trust: Examination) -> Html:
 
 
 def refined(trust: Examination, judged: Judged) -> Html:
-    """The refinements as tables; nothing without any."""
+    """Return the refinements as tables; nothing without any."""
     if not trust.refined:
         return Html("")
     header, rows = answers(trust, judged)
@@ -298,7 +299,7 @@ def refined(trust: Examination, judged: Judged) -> Html:
 
 
 def stage_card(run: Run) -> Html:
-    """The stages in a table; nothing for a run without smoothing."""
+    """Return the stages in a table; nothing for a run without smoothing."""
     if not smoothed(run.stages):
         return Html("")
     every = ("rollouts", "gradients", "jacobians", "hessians")
@@ -313,9 +314,9 @@ def stage_card(run: Run) -> Html:
 
 
 def stage_row(stage: StageRecord, kinds: Sequence[str], checked: bool) -> list[Html | str]:
-    """The cells of one stage."""
+    """Return the cells of one stage."""
     cells: list[Html | str] = [f"{show(stage.smoothing)} m/s" if stage.smoothing else "0, exact"]
-    cells += [words.ended(stage.status), show(stage.objective), tag("b", show(stage.exact_objective))]
+    cells += [ending(stage.status).brief_words, show(stage.objective), tag("b", show(stage.exact_objective))]
     if checked:
         cells += [show(stage.worst), tag("b", show(stage.exact_worst))]
         cells.append(pill("good", "met") if stage.solved else pill("bad", "missed"))
@@ -385,7 +386,7 @@ def provenance(run: Run) -> Html:
             ("Versions", versions),
             ("Evaluated by", str(run.backend)),
             ("Compiler flags", values.name(run.provenance.get("flags"))),
-            ("Ended as", words.status(run.status)),
+            ("Ended as", ending(run.status).words),
             ("Iterations", words.count(run.iterations) if math.isfinite(run.iterations) else ""),
         ]
     )
@@ -404,7 +405,7 @@ def commit(run: Run) -> str:
 
 
 def source(title: str, text: str) -> Html:
-    """A file behind a line that opens it; of a long log the end."""
+    """Return a file behind a line that opens it; of a long log the end."""
     if len(text) > LOG_TAIL and title.startswith("Log"):
         text = "…\n" + text[-LOG_TAIL:]
     return fold(title, text)

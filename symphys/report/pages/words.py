@@ -13,12 +13,12 @@ from symphys.results.run import Run
 
 
 def count(value: float) -> str:
-    """A count in full; medians of an even number of counts may end in a half."""
+    """Return a count in full; medians of an even number of counts may end in a half."""
     return plain(value, 1) if math.isfinite(value) else show(value)
 
 
 def seconds(value: float) -> str:
-    """A duration with a unit that suits it."""
+    """Return a duration with a unit that suits it."""
     if math.isnan(value) or math.isinf(value):
         return show(value)
     if value < 0.0995:
@@ -26,21 +26,11 @@ def seconds(value: float) -> str:
     return f"{show(value, 3)} s" if value < 600 else f"{show(value / 60, 3)} min"
 
 
-def status(code: str) -> str:
-    """A status in plain words; one that is not known stands as it is."""
-    return ending(code).words
-
-
-def ended(code: str) -> str:
-    """A status in two words at most, for tables."""
-    return ending(code).in_table or ending(code).words
-
-
 def came_to(run: Run) -> str:
     """Say in a few words how a run ended: as its solver did, or its verdict, where that says more."""
     if run.verdict in (DOUBTED, BEST_FOUND):
         return verdict_words(run.verdict, run.status, bool(run.checks))
-    return ended(run.status)
+    return ending(run.status).brief_words
 
 
 def level(run: Run) -> str:
@@ -53,7 +43,7 @@ def level(run: Run) -> str:
 
 
 def headline(run: Run) -> str:
-    """A few words for a run."""
+    """Return a few words for a run."""
     if run.verdict in (SOLVED, DOUBTED, BEST_FOUND):
         return capital(verdict_words(run.verdict, run.status, bool(run.checks)))
     return ending(run.status).headline

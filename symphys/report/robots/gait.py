@@ -15,7 +15,7 @@ from symphys.results.scene import Scene
 from symphys.trajectory import Trajectory
 from symphys.types import Array, Bools
 
-LOADED = 0.02
+LOADED_SHARE = 0.02
 """A body stands where it carries more than this share of the weight of all that joints hold."""
 MOST_ROWS = 24
 """Bodies in a gait diagram, at most: those that come down most often."""
@@ -48,7 +48,7 @@ def weight(trajectory: Trajectory, scene: Scene) -> float:
 
 def stances(trajectory: Trajectory, scene: Scene) -> list[Stance]:
     """Return the bodies that ever stand; none where no weight is known."""
-    least = LOADED * weight(trajectory, scene)
+    least = LOADED_SHARE * weight(trajectory, scene)
     if not least > 0:
         return []
     ground = [static.name for kind in (scene.planes, scene.fixtures, scene.terrain) for static in kind]

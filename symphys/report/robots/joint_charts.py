@@ -20,17 +20,17 @@ from symphys.trajectory import Trajectory
 from symphys.types import Array
 
 SATURATED, COMMAND = style.VERMILION, style.INK
-NEAR = 16
+NEAR_LIMIT = 16
 """Limits farther away than so many times the range of a coordinate are not drawn."""
 LEAST_TURN, LEAST_SLIDE = 0.1, 0.02
 """[rad], [m]: the smallest range of an axis."""
-MOST = 24
+MAX_COORDINATES = 24
 """Coordinates in a figure, at most."""
-FEW = 4
+MAX_WIDE_ROWS = 4
 """So many have a row each, with coordinate and torque side by side."""
-WIDE, TALL = 4, 6
+MAX_COLUMNS, MAX_COLUMN_LENGTH = 4, 6
 """Columns side by side, and joints in a column, at most."""
-UNEVEN = 2
+MAX_COLUMN_RATIO = 2
 """The longest column has at most so many times the joints of the shortest."""
 
 Grid = list[list[Channel | None]]
@@ -46,7 +46,7 @@ def joint_charts(trajectory: Trajectory, scene: Scene) -> list[Chart]:
     driven = [channel for channel in every if channel.driven]
     values = [table for channel in every for table in value_tables(channel, time)]
     torques = [table for channel in driven for table in torque_tables(channel, time)]
-    if len(every) <= FEW:
+    if len(every) <= MAX_WIDE_ROWS:
         both = [
             (
                 value_panel(each, time, colour[id(each)], f": {each.quantity}"),
@@ -124,7 +124,7 @@ def axis_range(values: Array, edges: Sequence[float], least: float) -> tuple[flo
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
     lack = max(least - (high - low), 0.0) / 2
     low, high = low - lack, high + lack
-    far = NEAR * (high - low)
+    far = NEAR_LIMIT * (high - low)
     for edge in [edge for edge in edges if low - far <= edge <= high + far]:
         low, high = min(low, edge), max(high, edge)
     margin = 0.1 * (high - low)
@@ -148,9 +148,9 @@ def torque_keys(driven: Sequence[Channel]) -> tuple[Key, ...]:
 
 def shown(channels: Sequence[Channel]) -> list[Channel]:
     """Choose all coordinates, or of many those that move most, in the file's order."""
-    if len(channels) <= MOST:
+    if len(channels) <= MAX_COORDINATES:
         return list(channels)
-    most = np.argsort([-np.ptp(channel.value) for channel in channels], kind="stable")[:MOST]
+    most = np.argsort([-np.ptp(channel.value) for channel in channels], kind="stable")[:MAX_COORDINATES]
     return [channels[index] for index in sorted(most)]
 
 
@@ -158,10 +158,10 @@ def make_grid(channels: Sequence[Channel], trajectory: Trajectory, scene: Scene)
     """Place a column for each branch where there are several of like size; else row by row in the file's order."""
     columns = by_branch(channels, trajectory, scene)
     sizes = [len(column) for column in columns]
-    if len(columns) < 2 or max(sizes) > min(TALL, UNEVEN * min(sizes)):
-        rows = [list(channels[start : start + WIDE]) for start in range(0, len(channels), WIDE)]
-        return [[*row, *[None] * (WIDE - len(row))] for row in rows]
-    bands = [columns[start : start + WIDE] for start in range(0, len(columns), WIDE)]
+    if len(columns) < 2 or max(sizes) > min(MAX_COLUMN_LENGTH, MAX_COLUMN_RATIO * min(sizes)):
+        rows = [list(channels[start : start + MAX_COLUMNS]) for start in range(0, len(channels), MAX_COLUMNS)]
+        return [[*row, *[None] * (MAX_COLUMNS - len(row))] for row in rows]
+    bands = [columns[start : start + MAX_COLUMNS] for start in range(0, len(columns), MAX_COLUMNS)]
     wide = max(map(len, bands))
     return [[*row, *[None] * (wide - len(row))] for band in bands for row in map(list, itertools.zip_longest(*band))]
 

@@ -11,9 +11,9 @@ from symphys.results.scene_joints import SceneJoint
 from symphys.trajectory import Trajectory
 from symphys.types import Array, Bools
 
-FULL = 1 - 1e-3
+SATURATED_SHARE = 1 - 1e-3
 """A motor is saturated from this share of its largest torque on."""
-AT_LIMIT = 1e-3
+LIMIT_TOLERANCE = 1e-3
 """[rad] or [m]: how near to a limit a coordinate counts as there."""
 
 
@@ -63,13 +63,13 @@ class Channel:
 
     @property
     def bound(self) -> float:
-        """The most that its motor can give; nan without one."""
+        """Return the most that its motor can give; nan without one."""
         return np.nan if self.joint.motor is None else self.joint.motor.torque
 
     @property
     def saturated(self) -> Bools:
         """Return (N,) whether its motor gives the most that it can."""
-        found: Bools = (np.abs(self.torque) >= FULL * self.bound) & (self.bound > 0)
+        found: Bools = (np.abs(self.torque) >= SATURATED_SHARE * self.bound) & (self.bound > 0)
         return found
 
     @property
@@ -87,7 +87,7 @@ class Channel:
     @property
     def at_limit(self) -> bool:
         """Whether it reached one of its limits."""
-        near = (self.value <= self.joint.lower + AT_LIMIT) | (self.value >= self.joint.upper - AT_LIMIT)
+        near = (self.value <= self.joint.lower + LIMIT_TOLERANCE) | (self.value >= self.joint.upper - LIMIT_TOLERANCE)
         return bool(near.any())
 
 

@@ -19,9 +19,9 @@ from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Trajectory
 from symphys.types import Array
 
-APART = 0.75
+MIN_POSE_DISTANCE = 0.75
 """Poses in one picture are apart by this share of the robot's length at least."""
-MOST = 8
+MAX_POSES = 8
 
 
 def draw_robots(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
@@ -35,13 +35,13 @@ def draw_robots(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
 
 
 def spaced(trajectory: Trajectory, scene: Scene, view: View) -> list[int]:
-    """The poses: first, last and between at even distances, if linked bodies go far enough; else the last."""
+    """Return the poses: first, last and between at even distances, if linked bodies go far enough; else the last."""
     low, high = extents(trajectory, scene, view, linked(trajectory, scene))
     middle = (low + high) / 2 - (low[0] + high[0]) / 2
-    least = np.abs(middle).max() / (APART * MOST)  # of robots without extent, all poses may be drawn
+    least = np.abs(middle).max() / (MIN_POSE_DISTANCE * MAX_POSES)  # of robots without extent, all poses may be drawn
     gone = middle / np.maximum((high - low).max(axis=0), least if least > 0 else 1.0)
     along = gone[:, np.abs(gone[-1]).argmax()]
-    parts = min(int(abs(along[-1]) / APART), MOST)
+    parts = min(int(abs(along[-1]) / MIN_POSE_DISTANCE), MAX_POSES)
     return sorted({int(np.abs(along - along[-1] * part / parts).argmin()) for part in range(parts)} | {len(along) - 1})
 
 
@@ -62,7 +62,7 @@ def extents(trajectory: Trajectory, scene: Scene, view: View, bodies: Sequence[i
 
 
 def draw_paths(axes: Axes, view: View, trajectory: Trajectory, scene: Scene) -> None:
-    """The paths of base bodies and of the bodies at the ends of branches."""
+    """Draw the paths of base bodies and of the bodies at the ends of branches."""
     kept = traced(trajectory, scene)
     for body, colour in enumerate(colours(trajectory, scene)):
         if trajectory.body_names[body] in kept:
@@ -83,7 +83,7 @@ class RobotDrawing:
     def draw(self, strength: float = 1.0, order: int = 0) -> None:
         """Draw from the back to the front; paler with less ``strength``, over poses of a lower ``order``."""
         colour = colours(self.trajectory, self.scene)
-        base = 2.5 + 0.25 * order / MOST
+        base = 2.5 + 0.25 * order / MAX_POSES
         lines = list(bones(self.trajectory, self.scene, self.shot))
         for each in dict.fromkeys(colour[body] for body, _ in lines):
             ends = [self.view.flat(line) for body, line in lines if colour[body] == each]

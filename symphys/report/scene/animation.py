@@ -163,7 +163,7 @@ def rounded(values: Array, share: float) -> list[float]:
     return [entry + 0.0 for entry in np.round(values.ravel(), max(decimals, 0)).tolist()]
 
 
-FAR = 2.5
+FOLLOW_DISTANCE = 2.5
 """The camera follows where bodies connected by joints travel farther than so many times their size."""
 
 
@@ -193,6 +193,6 @@ def follow_data(trajectory: Trajectory, scene: Scene) -> dict[str, object] | Non
     middle[:, 2] = middle[:, 2].mean()
     sizes = [reach(trajectory, scene, body) for body in bodies]
     radius = float((np.linalg.norm(place - middle[:, None], axis=2) + sizes).max())
-    if np.ptp(middle, axis=0).max() <= FAR * 2 * radius:
+    if np.ptp(middle, axis=0).max() <= FOLLOW_DISTANCE * 2 * radius:
         return None
     return {"bodies": bodies, "height": round(float(middle[0, 2]), 6), "radius": round(radius, 6)}

@@ -17,7 +17,7 @@ MEASURED = " measured"
 
 
 def with_ghosts(replay: RecordingReplay, scene: Scene) -> tuple[Trajectory, Scene]:
-    """The simulated motion and its scene, with a further body for each whose position was measured.
+    """Return the simulated motion and its scene, with a further body for each whose position was measured.
 
     Between samples ghosts go evenly; before the first and after the last they stand.
     """

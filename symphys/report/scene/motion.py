@@ -75,7 +75,7 @@ def keep_paths(axes: Axes, trajectory: Trajectory, names: Sequence[str], whose: 
 
 
 def draw_guess(axes: Axes, panel: ViewPanel, guess: Trajectory, names: Sequence[str]) -> None:
-    """The guess's paths of these bodies, thin and grey."""
+    """Draw the guess's paths of these bodies, thin and grey."""
     for body in (index for index, name in enumerate(guess.body_names) if name in names):
         path = panel.view.flat(guess.position[:, body])
         _, path = thin(guess.time, path, 300)
@@ -93,8 +93,8 @@ def add_legend(figure: DataFigure, trajectory: Trajectory, scene: Scene, guessed
         figure.legend(handles=handles, loc="upper right", bbox_to_anchor=anchor, ncols=len(handles), borderaxespad=0)
 
 
-MOST_LABELLED = 3
-SHAPES = 220
+MAX_LABELLED_BODIES = 3
+MAX_SOLIDS = 220
 """How many solids are drawn in a panel, at most about."""
 
 
@@ -102,7 +102,7 @@ def draw_bodies(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
     """Path and poses of every body; the first and last one of few, which no joint holds, are named."""
     bodies = range(len(trajectory.body_names))
     total = sum(len(solids_of(trajectory, scene, body)) for body in bodies)
-    shots = np.linspace(0, len(trajectory.time) - 1, int(np.clip(SHAPES // total, 3, 10))).round().astype(int)
+    shots = np.linspace(0, len(trajectory.time) - 1, int(np.clip(MAX_SOLIDS // total, 3, 10))).round().astype(int)
     for body in bodies:
         colour = style.BODIES[body % len(style.BODIES)]
         _, path = thin(trajectory.time, panel.view.flat(trajectory.position[:, body]), 500)
@@ -112,12 +112,12 @@ def draw_bodies(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
             strength = 0.08 + 0.3 * shot / max(int(shots[-1]), 1)
             for solid in solids:
                 BodyDrawing(axes, panel.view, colour, strength, shot == shots[-1]).draw(trajectory, body, solid, shot)
-        if len(bodies) <= MOST_LABELLED and not scene.joints:
+        if len(bodies) <= MAX_LABELLED_BODIES and not scene.joints:
             name_ends(axes, panel, trajectory, reach(trajectory, scene, body), body, scale)
 
 
 def apart(trajectory: Trajectory, view: View, body: int, solids: Sequence[Solid], shots: Array) -> list[int]:
-    """The poses in which some solid lies well off its place in the one kept after them; the last is kept."""
+    """Return the poses in which some solid lies well off its place in the one kept after them; the last is kept."""
     marks = np.stack([marked(trajectory, view, body, solid) for solid in solids], axis=1)
     least = np.array([0.35 * (solid.radius + solid.half.max()) for solid in solids])
     kept = [int(shots[-1])]
@@ -169,7 +169,7 @@ class BodyDrawing:
         return 1.4 if self.last else 0.8
 
     def fill(self, patch: Circle | Polygon) -> None:
-        """A pale area with a line around it."""
+        """Draw a pale area with a line around it."""
         edge = copy(patch)
         patch.set(facecolor=self.colour, alpha=self.strength, linewidth=0, zorder=2.5)
         edge.set(fill=False, edgecolor=self.colour, linewidth=self.width, zorder=3)
@@ -177,7 +177,7 @@ class BodyDrawing:
         self.axes.add_patch(edge)
 
     def line(self, centre: Array, ends: Array) -> None:
-        """A line inside the outline."""
+        """Draw a line inside the outline."""
         self.axes.plot(*(centre + ends).T, color=self.colour, linewidth=self.width, zorder=3.2)
 
 

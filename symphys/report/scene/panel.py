@@ -16,7 +16,7 @@ from symphys.types import Array
 
 LEFT, RIGHT, BOTTOM, TOP, GAP = 0.62, 0.15, 0.5, 0.5, 0.62
 """[in] margins of the figure and between its panels"""
-LEAST = 1.1
+MIN_PANEL_SIZE = 1.1
 """[in] smallest width or height of a panel"""
 
 
@@ -35,7 +35,7 @@ class ViewPanel:
 
 
 def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajectory | None) -> ViewPanel:
-    """The rectangle that holds every body, nearby static surfaces, and the guess unless it goes far away."""
+    """Return the rectangle that holds every body, nearby static surfaces, and the guess unless it goes far away."""
     sizes = np.array([reach(trajectory, scene, body) for body in range(len(trajectory.body_names))])[:, None]
     flat = view.flat(trajectory.position)
     low, high = style.apart((flat - sizes).min(axis=(0, 1)), (flat + sizes).max(axis=(0, 1)))
@@ -96,14 +96,14 @@ def arrange(panels: list[ViewPanel]) -> tuple[bool, float]:
 
 def widen(panel: ViewPanel, scale: float) -> ViewPanel:
     """Make room on both sides where a panel would be too thin to read."""
-    lack = np.maximum(LEAST / scale - panel.span, 0) / 2
+    lack = np.maximum(MIN_PANEL_SIZE / scale - panel.span, 0) / 2
     return ViewPanel(panel.view, panel.low - lack, panel.high + lack)
 
 
 def lay_out(
     panels: list[ViewPanel], stacked: bool, scale: float
 ) -> tuple[DataFigure, list[tuple[float, float, float, float]]]:
-    """The figure, and (left, bottom, width, height) of each panel in shares of it."""
+    """Return the figure, and (left, bottom, width, height) of each panel in shares of it."""
     sizes = [panel.span * scale for panel in panels]
     gaps = GAP * (len(panels) - 1)
     height = (sum(s[1] for s in sizes) + gaps if stacked else max(s[1] for s in sizes)) + BOTTOM + TOP

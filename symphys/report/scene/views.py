@@ -12,7 +12,7 @@ from symphys.trajectory import Trajectory
 from symphys.types import Array
 
 NAMES = "xyz"
-STILL = 1e-3
+STILL_SHARE = 1e-3
 """A motion whose extent is below this share of the largest one counts as none."""
 
 
@@ -58,7 +58,7 @@ def choose_views(trajectory: Trajectory, scene: Scene) -> list[View]:
     """Side view along the main horizontal direction and top view; without ground and height only the top view."""
     extent = np.ptp(trajectory.position, axis=0).max(axis=0)
     spread = np.ptp(trajectory.position, axis=(0, 1))
-    least = STILL * max(float(spread.max()), 1e-9)
+    least = STILL_SHARE * max(float(spread.max()), 1e-9)
     if max(extent[0], extent[1]) <= least:
         extent = spread
     has_floor = any(abs(plane.normal[2]) > 0.5 for plane in scene.planes) or scene.fixtures or scene.terrain
@@ -95,7 +95,7 @@ def half_axes(orientation: Array, solid: Solid) -> Array:
 
 
 def solids_of(trajectory: Trajectory, scene: Scene, body: int) -> tuple[Solid, ...]:
-    """The surface of a body; a point for one that has none."""
+    """Return the surface of a body; a point for one that has none."""
     return scene.solids(trajectory.body_names[body]) or (Solid(),)
 
 
@@ -107,9 +107,9 @@ def reach(trajectory: Trajectory, scene: Scene, body: int) -> float:
     return max([solid.reach for solid in scene.solids(name)] or held, default=0.0)
 
 
-ROUND = 16
+ARC_PIECES = 16
 """Straight pieces of a half circle."""
-SEEN = 1e-6
+EDGE_ON = 1e-6
 """A face whose normal has less than this share of its length towards the viewer is seen from its edge."""
 
 
@@ -129,7 +129,7 @@ def outline(points: Array, radius: float) -> Array:
 
 def directions(start: float, stop: float) -> Array:
     """Return unit vectors (n, 2) from one angle to another."""
-    angles = np.linspace(start, stop, max(int(np.ceil(abs(stop - start) / np.pi * ROUND)), 1) + 1)
+    angles = np.linspace(start, stop, max(int(np.ceil(abs(stop - start) / np.pi * ARC_PIECES)), 1) + 1)
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
@@ -143,6 +143,6 @@ def inner_edges(orientation: Array, solid: Solid, front: Array) -> Array:
     """
     polytope = solid.polytope
     normals, ends = (turn(orientation, turn(solid.orientation, own)) for own in (polytope.normals, solid.corners))
-    seen = normals @ front > SEEN
+    seen = normals @ front > EDGE_ON
     between = polytope.edges[polytope.sharp & seen[polytope.edges[:, 2:]].all(axis=1), :2]
     return np.asarray(ends[between])
