@@ -190,5 +190,5 @@ def of_physics(lines: Sequence[Finding], level: dict[str, str]) -> str:
 
 
 def sentence(clause: str) -> str:
-    """A clause with a capital letter and a full stop."""
+    """Return a clause with a capital letter and a full stop."""
     return capital(clause) + "."

@@ -29,6 +29,11 @@ class Ending:
     usable: bool = True
     faulty: bool = False
 
+    @property
+    def brief_words(self) -> str:
+        """Return what happened in few words, for tables."""
+        return self.in_table or self.words
+
 
 ENDINGS = {
     "met": Ending("everything met", "met", in_table="met", stationary=True),

@@ -48,7 +48,7 @@ class Refined:
 
     @property
     def change(self) -> float:
-        """The largest change of a gradient that is known; nan if none is."""
+        """Return the largest change of a gradient that is known; nan if none is."""
         known = [change for change in self.gradient.values() if not np.isnan(change)]
         return max(known, default=np.nan)
 
@@ -251,7 +251,7 @@ class Examination:
 
     @classmethod
     def from_json(cls, value: object, text: Text = name) -> Examination:
-        """The record; what is absent or no number becomes nan."""
+        """Read the record; what is absent or no number becomes nan."""
         return record(cls, value, text)
 
     @property

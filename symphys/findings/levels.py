@@ -45,14 +45,14 @@ class Judged:
 
 
 def graded(value: float, limits: tuple[float, float]) -> str:
-    """The level of a number that had better be small."""
+    """Return the level of a number that had better be small."""
     if math.isnan(value):
         return UNKNOWN
     return GOOD if value <= limits[0] else FAIR if value <= limits[1] else BAD
 
 
 def worst_of(levels: Iterable[str]) -> str:
-    """The worst level; unknown without any."""
+    """Return the worst level; unknown without any."""
     return max(levels, key=(UNKNOWN, GOOD, FAIR, BAD).index, default=UNKNOWN)
 
 

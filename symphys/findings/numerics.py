@@ -14,7 +14,7 @@ from symphys.findings.writing import listed, percent, show
 GRADIENT, GRID, GROWTH, SMOOTHING = "gradient", "grid", "growth", "smoothing"
 INFLUENCE = "influence"
 
-NOTHING = 1e-8
+NO_INFLUENCE_SHARE = 1e-8
 """A variable whose change by its scale changes no more, as a share of the value, changes nothing; what friction holds
 creeps by about a hundredth of that."""
 NO_INFLUENCE = "Nothing that the problem asks for depends on it here, so no solver that follows gradients moves it."
@@ -23,9 +23,9 @@ GRADIENT_LIMITS = (1e-4, 1e-2)
 """Relative errors of a gradient: below the first it agrees, above the second it must not be used."""
 JUMP_LIMITS = (1e-3, 1e-1)
 """Of jumps: a solver does not notice those below the first."""
-FLAT = 1e-6
+FLAT_GRADIENT = 1e-6
 """A gradient whose norm is below this is too small to be compared."""
-TINY = 1e-12
+NO_COSTS = 1e-12
 """A sum of costs below this is none."""
 OBJECTIVE_LIMITS = (0.05, 0.3)
 """Relative changes of the objective under refinement."""
@@ -40,12 +40,12 @@ ORDERS = (0.3, 5.0)
 
 
 def gradient_finding(check: GradientCheck) -> Finding:
-    """The adjoint gradient against central differences, for one variable."""
+    """Return the adjoint gradient against central differences, for one variable."""
     what, number = f"Gradient of {check.variable}", show(check.error, 2)
     if unfelt(check):
         return Finding(INFLUENCE, FAIR, what, show(check.scale), NO_INFLUENCE)
     level = graded(check.error, GRADIENT_LIMITS)
-    if level in (FAIR, BAD) and check.scale <= FLAT:
+    if level in (FAIR, BAD) and check.scale <= FLAT_GRADIENT:
         return Finding(
             GRADIENT, UNKNOWN, what, number, "The gradient is almost zero here, so the comparison says little."
         )
@@ -64,7 +64,7 @@ def gradient_finding(check: GradientCheck) -> Finding:
 
 def unfelt(check: GradientCheck) -> bool:
     """Whether nothing that is asked for depends on the variable here."""
-    return check.felt <= NOTHING
+    return check.felt <= NO_INFLUENCE_SHARE
 
 
 def refined_finding(refined: Refined, judged: Judged) -> Finding:
@@ -114,7 +114,7 @@ def slope_finding(trust: Examination) -> list[Finding]:
 
 
 def unbroken(text: str) -> str:
-    """The text on one line."""
+    """Return the text on one line."""
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
@@ -160,7 +160,7 @@ def reach(growth: Growth) -> GradientReach:
 
 
 def growth_finding(growth: Growth) -> Finding:
-    """The growth of changes along the horizon."""
+    """Return the growth of changes along the horizon."""
     what, far = "Growth of a change until the end", reach(growth)
     if not math.isnan(far.lost):
         meaning = f"The derivatives are not finite before t = {show(far.lost)} s: nothing before can be optimised."
@@ -215,5 +215,5 @@ def smoothed_level(row: Smoothed, judged: Judged) -> str:
 
 
 def share(before: float, after: float) -> float:
-    """The relative change; 0 where both are rounding, nan where one is not known."""
-    return 0.0 if max(abs(before), abs(after)) < TINY else relative_change(before, after)
+    """Return the relative change; 0 where both are rounding, nan where one is not known."""
+    return 0.0 if max(abs(before), abs(after)) < NO_COSTS else relative_change(before, after)

@@ -81,7 +81,7 @@ def residual_finding(trust: Examination, judged: Judged) -> Finding:
 
 
 def residual_level(trust: Examination) -> str:
-    """The level of the residual as a share of the largest impulse, and of the velocity that it leaves."""
+    """Return the level of the residual as a share of the largest impulse, and of the velocity that it leaves."""
     share = trust.residual / trust.impulse if trust.impulse > 0 else math.nan
     by_impulse = GOOD if trust.residual == 0 else graded(share, RESIDUAL_LIMITS)
     return worst_of([by_impulse, graded(trust.left, LEFT_LIMITS)])
@@ -94,26 +94,26 @@ def holds_elsewhere(trust: Examination, judged: Judged) -> bool:
 
 
 def refuted(trust: Examination, judged: Judged) -> str:
-    """A clause on what another number of sweeps does to the result, where it is another."""
+    """Return a clause on what another number of sweeps does to the result, where it is another."""
     found = [refined_finding(row, judged).doubt for row in trust.resettled]
     return next((f", and {clause}" for clause in found if clause), "")
 
 
 def elsewhere(trust: Examination) -> str:
-    """A sentence on what other numbers of sweeps lead to."""
+    """Return a sentence on what other numbers of sweeps lead to."""
     rows = [f"{show(row.objective)} with {row.what}" for row in trust.resettled]
     return f"The result does not rest on where the sweeps end: the objective is {listed(rows)}."
 
 
 def in_steps(trust: Examination) -> str:
-    """A clause on how many steps have impulses that have not settled, as far as they were counted."""
+    """Return a clause on how many steps have impulses that have not settled, as far as they were counted."""
     if not (trust.unsettled > 0 and math.isfinite(trust.steps)):
         return ""
     return f" in {int(trust.unsettled)} of {several(int(trust.steps), 'step')}"
 
 
 def velocity_left(trust: Examination) -> str:
-    """A clause on the velocity that more sweeps would find, where it matters."""
+    """Return a clause on the velocity that more sweeps would find, where it matters."""
     if graded(trust.left, LEFT_LIMITS) not in (FAIR, BAD) or not trust.left_of:
         return ""
     when = f"after the step at t = {show(trust.left_time)} s"
@@ -121,7 +121,7 @@ def velocity_left(trust: Examination) -> str:
 
 
 def more_sweeps(trust: Examination) -> str:
-    """A clause on what more sweeps would do, as far as that was measured."""
+    """Return a clause on what more sweeps would do, as far as that was measured."""
     if math.isnan(trust.residual_finer):
         return ""
     twice = f"twice the sweeps leave {show(trust.residual_finer, 2)} N s"
@@ -186,7 +186,7 @@ def resolved(trust: Examination) -> bool:
 
 
 def sliding(trust: Examination) -> str:
-    """A sentence on how far surfaces slid; empty where none did beyond rounding."""
+    """Return a sentence on how far surfaces slid; empty where none did beyond rounding."""
     slides = [
         f"{slide.contact} {show(slide.distance, 2)} m (up to {show(slide.speed, 2)} m/s)"
         for slide in trust.slides
@@ -206,7 +206,7 @@ SPREAD = 1.0
 
 
 def miss_findings(trust: Examination) -> list[Finding]:
-    """A line for each that lies within a small step or within the spread of seeds."""
+    """Return a line for each that lies within a small step or within the spread of seeds."""
     return [miss_finding(miss) for miss in trust.misses if miss.steps <= STEP or miss.spreads <= SPREAD]
 
 
@@ -277,7 +277,7 @@ def stop_findings(trust: Examination) -> list[Finding]:
 
 
 def jump_findings(trust: Examination) -> list[Finding]:
-    """A change of place that no velocity explains, if there is one that matters."""
+    """Return a change of place that no velocity explains, if there is one that matters."""
     level = graded(trust.jump, JUMP_LIMITS)
     if level not in (FAIR, BAD) or not trust.jump_of:
         return []

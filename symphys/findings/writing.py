@@ -8,11 +8,11 @@ from collections.abc import Sequence
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MINUS = "\N{MINUS SIGN}"
 DASH = "\N{EN DASH}"
-THIN = "\N{NARROW NO-BREAK SPACE}"
+THIN_SPACE = "\N{NARROW NO-BREAK SPACE}"
 
 
 def show(value: float, digits: int = 3) -> str:
-    """A number with ``digits`` significant digits, as people write it; a dash for nan."""
+    """Return a number with ``digits`` significant digits, as people write it; a dash for nan."""
     if math.isnan(value):
         return DASH
     if math.isinf(value):
@@ -25,7 +25,7 @@ def show(value: float, digits: int = 3) -> str:
 
 
 def percent(share: float) -> str:
-    """A share >= 0 in percent; a dash for nan."""
+    """Return a share >= 0 in percent; a dash for nan."""
     if not math.isfinite(share):
         return show(share)
     return f"{show(100 * share, 2)} %" if share == 0 or share >= 1e-6 else "< 0.0001 %"
@@ -37,17 +37,17 @@ def plain(value: float, decimals: int) -> str:
     text = text.rstrip("0").rstrip(".") if "." in text else text
     if abs(value) >= 10_000:
         whole, point, rest = text.partition(".")
-        text = f"{int(whole):,}".replace(",", THIN) + point + rest
+        text = f"{int(whole):,}".replace(",", THIN_SPACE) + point + rest
     return sign("0" if text == "-0" else text)
 
 
 def sign(text: str) -> str:
-    """A true minus sign."""
+    """Return a true minus sign."""
     return text.replace("-", MINUS)
 
 
 def power(exponent: int) -> str:
-    """An exponent in superscripts."""
+    """Return an exponent in superscripts."""
     return str(exponent).translate(SUPERSCRIPTS)
 
 

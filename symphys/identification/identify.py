@@ -87,7 +87,7 @@ def identify(
 ) -> Identification:
     """Identify the numbers of a problem from its recordings.
 
-    ``start`` goes on from an interrupted fit; ``stop`` is asked after each iteration, ``monitor`` told of each.
+    ``start`` goes on from an interrupted fit; ``stop`` and ``monitor`` are called after each iteration.
 
     Raises:
         IdentificationError: nothing to fit to, or a simulation that is not finite at the guess, by name.
@@ -119,7 +119,7 @@ def assessed(
     name: str = "",
     title: str = "",
 ) -> Identification:
-    """The record of a fit of the recordings in ``which``; ``source`` is the problem with its first noise."""
+    """Return the record of a fit of the recordings in ``which``; ``source`` is the problem with its first noise."""
     problem, outcome, known = fitted.problem, fitted.outcome, fitted.uncertainty
     assert known is not None
     shared, own = outcome.state.shared, outcome.state.own
@@ -196,7 +196,7 @@ def arrays(
 def resampled(
     fitted: FittedRecordings, which: Ints, options: IdentificationOptions, stop: Callable[[], bool] | None
 ) -> Bootstrap:
-    """The bootstrap, with some draws fitted in full where that is asked for."""
+    """Return the bootstrap, with some draws fitted in full where that is asked for."""
     problem, outcome, known = fitted.problem, fitted.outcome, fitted.uncertainty
     assert known is not None
     state = outcome.state
@@ -211,16 +211,16 @@ def resampled(
     return found
 
 
-NARROW = 1.5
+DOUBTED_RATIO = 1.5
 """Ratio of residuals to a given noise, or of both intervals, above which those of the Jacobian are doubted."""
-BENT = 0.5
+DOUBTED_DIFFERENCE = 0.5
 """Difference of a refitted draw from its step, in standard deviations of the draws, above which steps are doubted."""
 
 
 def estimates(
     problem: RecordedResiduals, outcome: FitOutcome, known: Uncertainty, drawn: Bootstrap
 ) -> tuple[ParameterEstimate, ...]:
-    """The shared numbers with both intervals; at a kink that of the Jacobian reaches to that of its side."""
+    """Return the shared numbers with both intervals; at a kink that of the Jacobian reaches to that of its side."""
     parameters, shared = problem.shared, outcome.state.shared
     away = outcome.one_sided if outcome.one_sided.size else np.zeros(len(shared))
     interval = known.interval(shared) + np.stack([np.minimum(away, 0), np.maximum(away, 0)], axis=1)
@@ -253,7 +253,7 @@ def doubts(
     drawn: Bootstrap,
     freedom: int,
 ) -> tuple[str, ...]:
-    """A sentence for each reason not to rely on the estimates or on their intervals.
+    """Return a sentence for each reason not to rely on the estimates or on their intervals.
 
     ``freedom``: residuals less numbers that were estimated.
     """
@@ -264,9 +264,9 @@ def doubts(
     for quantity in quantities:
         if quantity.verdict == "missing effect":
             found.append(f"the model misses an effect on {quantity.name}: {quantity.text}")
-        elif quantity.noise_known and quantity.ratio > NARROW:
+        elif quantity.noise_known and quantity.ratio > DOUBTED_RATIO:
             found.append(f"residuals of {quantity.name} are {quantity.ratio:.2g} times the given noise")
-    wider = [each.name for each in parameters if bootstrap_share(each) > NARROW]
+    wider = [each.name for each in parameters if bootstrap_share(each) > DOUBTED_RATIO]
     if wider:
         found.append(
             "recordings differ by more than the noise explains: rely on the bootstrap's intervals, which are wider, of "
@@ -276,7 +276,7 @@ def doubts(
         spread = drawn.draws.std(axis=0)
         away = np.abs(drawn.refits - drawn.draws[: len(drawn.refits)])
         worst = float(np.max(away / np.where(spread > 0, spread, np.inf)))
-        if worst > BENT:
+        if worst > DOUBTED_DIFFERENCE:
             found.append(
                 f"draws of the bootstrap that were fitted in full differ from its steps by up to {worst:.2g} standard "
                 "deviations: within the intervals the model is not linear"
@@ -285,6 +285,6 @@ def doubts(
 
 
 def bootstrap_share(each: ParameterEstimate) -> float:
-    """The bootstrap's interval by that of the Jacobian; nan where either is not known."""
+    """Return the bootstrap's interval by that of the Jacobian; nan where either is not known."""
     width = each.upper - each.lower
     return (each.bootstrap_upper - each.bootstrap_lower) / width if width > 0 else np.nan

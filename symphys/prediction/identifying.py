@@ -52,8 +52,8 @@ def identify(
         problem: what ``load`` takes, with [[recording]] tables.
         folder: gets identification.json and identification.npz, and what an interrupted fit goes on from; None: none.
         threads: that share the simulations; None: one for each processor.
-        monitor: is told of each iteration.
-        stop: is asked after each iteration whether to stop there.
+        monitor: is called with each iteration.
+        stop: is called after each iteration; True ends the fit there.
         settings: in place of those in [identify]: ``loss="huber"``, ``bootstrap=200``, ``check="cma"``,
             ``horizons=(0.3, 0.5, 0.7, 0.85, 1)``, ``held_back_starts="before impact"``.
 
@@ -79,7 +79,7 @@ def identify(
         key = state_key(loaded, chosen)
         start = None if place is None else saved_state(place, key, residuals)
 
-        def told(step: FitStep, state: FitState) -> None:
+        def save_step(step: FitStep, state: FitState) -> None:
             if place is not None:
                 files.write_json(place / STATE, {"key": key, **state.plain()})
             if monitor is not None:
@@ -87,7 +87,7 @@ def identify(
 
         if place is not None:
             files.make_folder(place)
-        found = numbers.identify(residuals, options_of(chosen), start, told, stop, loaded.name, loaded.title)
+        found = numbers.identify(residuals, options_of(chosen), start, save_step, stop, loaded.name, loaded.title)
     if place is not None:
         write_replays(place, *worst_replays(loaded, residuals, found))
         found.write(place)
@@ -138,7 +138,7 @@ POSE = re.compile(r"(?P<body>[^.]+)\.(?P<field>position|orientation)(\[(?P<compo
 def worst_replays(
     problem: Problem, residuals: RecordingResiduals, found: Identification
 ) -> tuple[tuple[RecordingReplay, ...], Scene]:
-    """The recordings with the largest residuals, and the world of the first of them."""
+    """Return the recordings with the largest residuals, and the world of the first of them."""
     names = [name for name, _ in found.worst(MOST)]
     shared = np.array([each.value for each in found.parameters])
     replays = tuple(_replay(residuals, found, shared, found.recordings.index(name)) for name in names)

@@ -20,12 +20,12 @@ from symphys.problem import RecordedInput, Recording, Variable, VariableSlot
 from symphys.transcription.randomization.sampler import hidden
 from symphys.types import Array
 
-SLACK = 1e-9
+JUMP_TOLERANCE = 1e-9
 """Of a step: a jump so near to the end of a step is there."""
 
 
 def input_variables(recordings: Iterable[Recording], steps: int) -> tuple[Variable, ...]:
-    """A variable for each recorded input, with a knot for each step, that nobody chooses; 0 at its guess."""
+    """Return a variable for each recorded input, with a knot for each step, that nobody chooses; 0 at its guess."""
     sizes = {name: each.values.shape[1] for recording in recordings for name, each in recording.inputs.items()}
     return tuple(
         hidden(f"{name}:recorded", "control", VariableSlot(name, tuple(range(size))), np.zeros(size * steps), steps)
@@ -48,7 +48,7 @@ def step_means(recorded: RecordedInput, steps: int, dt: float, delay: float) -> 
         delay: [s] by which what was recorded acts later, on the clock of the simulation.
     """
     edges = np.arange(steps + 1, dtype=np.float64) * dt - delay
-    values, integral = _signal(recorded, edges, SLACK * dt)
+    values, integral = _signal(recorded, edges, JUMP_TOLERANCE * dt)
     return np.diff(integral, axis=0) / dt, -np.diff(values, axis=0) / dt
 
 

@@ -132,7 +132,7 @@ class RecordingResiduals:
 
 
 def residuals_of(problem: Problem, threads: int | None = None) -> RecordingResiduals:
-    """The residuals of all recordings of a problem; IdentificationError where there is nothing to identify."""
+    """Return the residuals of all recordings of a problem; IdentificationError where there is nothing to identify."""
     if not problem.recordings:
         raise IdentificationError("there is no [[recording]] to identify from; see docs/identification.md")
     if not problem.variables:

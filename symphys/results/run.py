@@ -55,7 +55,7 @@ class Run(Result):
 
     @property
     def variables(self) -> tuple[VariableRecord, ...]:
-        """The variables in the file's order."""
+        """Return the variables in the file's order."""
         return tuple(self.z.values())
 
     @property
@@ -119,7 +119,7 @@ def read_or_note(path: Path, faults: list[str], read: Callable[[Path], dict[str,
 
 
 def read_problem(path: Path) -> dict[str, object]:
-    """The tables of a problem file; empty if it cannot be read: it is shown as text elsewhere."""
+    """Read the tables of a problem file; empty if it cannot be read: it is shown as text elsewhere."""
     try:
         return tomllib.loads(read_words(path))
     except (ReportError, tomllib.TOMLDecodeError, RecursionError):

@@ -46,14 +46,14 @@ class Solid:
 
     @classmethod
     def of(cls, kind: str, sizes: Mapping[str, Any], centre: Array, orientation: Array) -> Solid:
-        """The solid that a shape of this kind draws."""
+        """Return the solid that a shape of this kind draws."""
         whole = {key: tuple(size) if isinstance(size, np.ndarray) else size for key, size in sizes.items()}
         hull = SHAPES[kind].from_sizes(whole, tuple(centre), UPRIGHT).rounded_hull
         return cls(hull.radius, np.array(hull.corners, float), centre, orientation, kind, sizes)
 
     @property
     def polytope(self) -> Polytope:
-        """The faces and edges of the hull of its corners."""
+        """Return the faces and edges of the hull of its corners."""
         return make_polytope(tuple(map(tuple, self.corners.tolist())))
 
     @property
@@ -146,7 +146,7 @@ class ScenePlane:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> ScenePlane | None:
-        """A plane; None if it has no direction."""
+        """Read a plane; None if it has no direction."""
         normal = values.vector(values.table(value).get("normal"))
         length = float(np.linalg.norm(normal))
         if not 0 < length < np.inf:
@@ -168,7 +168,7 @@ class SceneFixture:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> SceneFixture | None:
-        """A fixture; None if its shape cannot be read."""
+        """Read a fixture; None if its shape cannot be read."""
         entry = values.table(value)
         solid = Solid.from_json(entry.get("shape"))
         return None if solid is None else cls(text(entry.get("name")), solid)
@@ -214,15 +214,15 @@ class Scene:
 
     @property
     def weight_per_mass(self) -> float:
-        """The size of gravity [m/s^2]; nan if it is not known."""
+        """Return the size of gravity [m/s^2]; nan if it is not known."""
         return float(np.linalg.norm(self.gravity)) if self.gravity else np.nan
 
     def solids(self, name: str) -> tuple[Solid, ...]:
-        """The surface of the body called ``name``; none if the scene has no such body."""
+        """Return the surface of the body called ``name``; none if the scene has no such body."""
         return next((body.solids for body in self.bodies if body.name == name), ())
 
     def to_json(self) -> dict[str, Any]:
-        """The object of scene.json."""
+        """Return the object of scene.json."""
         kinds = {key: getattr(self, key) for key in ("bodies", "planes", "fixtures", "terrain", "joints")}
         return {
             "gravity": list(self.gravity),
@@ -231,11 +231,11 @@ class Scene:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> Scene:
-        """The scene, as far as it can be read."""
+        """Read the scene, as far as it can be read."""
         gravity = tuple(values.numbers(values.table(value).get("gravity")).tolist())
         return values.record(cls, value, text, gravity=gravity)
 
 
 def read_scene(path: Path) -> Scene:
-    """The scene in a file. Raises ReportError."""
+    """Read the scene in a file. Raises ReportError."""
     return Scene.from_json(read_table(path))

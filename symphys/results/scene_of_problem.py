@@ -112,9 +112,9 @@ def plain(vector: Any) -> Array:
     return np.array([float(component) for component in vector])
 
 
-MOST = 49
+MAX_HEIGHTS = 49
 """Heights along the longer side."""
-LEAST_SHARE = 0.3
+MIN_ASPECT = 0.3
 """Of the shorter side in the longer one."""
 MARGIN = 0.15
 """On each side, as a share of the longer one."""
@@ -136,7 +136,7 @@ def crop(world: World, places: Array) -> TerrainCrop:
     reach = max(size(body) for body in world.bodies)
     side = float((high - low).max()) + 2 * reach
     side = side if side > 0 else 1.0
-    room = np.maximum(high - low + 2 * reach, LEAST_SHARE * side) / 2 + MARGIN * side
+    room = np.maximum(high - low + 2 * reach, MIN_ASPECT * side) / 2 + MARGIN * side
     middle = (low + high) / 2
     return TerrainCrop(middle - room, middle + room)
 
@@ -149,7 +149,7 @@ def size(body: Body) -> float:
 def sample(terrain: Terrain, near: TerrainCrop) -> SceneTerrain:
     """The heights there."""
     sides = near.high - near.low
-    columns, rows = (int(count) for count in np.maximum(np.round(MOST * sides / sides.max()), 2))
+    columns, rows = (int(count) for count in np.maximum(np.round(MAX_HEIGHTS * sides / sides.max()), 2))
     x, y = (np.linspace(near.low[k], near.high[k], count) for k, count in enumerate((columns, rows)))
     a, b = ca.SX.sym("x"), ca.SX.sym("y")
     height = ca.Function("height", [a, b], [terrain.height(a, b)])

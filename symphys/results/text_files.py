@@ -24,7 +24,7 @@ class ReportError(SymphysError):
 
 
 def read_words(path: Path) -> str:
-    """The text of a file; bytes that are no UTF-8 are replaced. Raises ReportError."""
+    """Read the text of a file; bytes that are no UTF-8 are replaced. Raises ReportError."""
     try:
         check_regular(path)
         return words(path.read_text(encoding="utf-8", errors="replace"))
@@ -33,7 +33,7 @@ def read_words(path: Path) -> str:
 
 
 def read_table(path: Path) -> dict[str, object]:
-    """The JSON object in a file. Raises ReportError that names the file and the fault."""
+    """Read the JSON object in a file. Raises ReportError that names the file and the fault."""
     try:
         check_regular(path)
         content = json.loads(path.read_text(encoding="utf-8"))

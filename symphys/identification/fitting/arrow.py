@@ -48,7 +48,7 @@ class ArrowSystem:
 
     @property
     def s(self) -> int:
-        """The number of shared numbers."""
+        """Return the number of shared numbers."""
         return len(self.prior_block)
 
     @property
@@ -125,7 +125,7 @@ def assemble(
     weights: Array,
     curvature: Weighting | None = None,
 ) -> ArrowSystem:
-    """The system at shared (s,), own (K, o) of the recordings in ``which``, whose costs count ``weights`` times.
+    """Return the system at shared (s,), own (K, o) of the recordings in ``which``, whose costs count ``weights`` times.
 
     ``evaluated`` is their Jacobian there, ``curvature`` the weights C of its rows in the blocks, by default the loss's.
     """

@@ -50,7 +50,7 @@ class KinkedModel:
         return len(self.gaps)
 
     def add(self, there: ArrowSystem, shared: Array, own: Array) -> None:
-        """The side of a point at the step (s,), (K, o) from here."""
+        """Add the side of a point at the step (s,), (K, o) from here."""
         step = np.concatenate([np.broadcast_to(shared, (len(own), len(shared))), own], axis=1)
         bent = np.einsum("kij,kj->ki", there.blocks, step)
         costs = there.costs - 2 * np.sum(there.gradients * step, axis=1) + np.sum(bent * step, axis=1)

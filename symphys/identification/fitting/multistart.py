@@ -22,7 +22,7 @@ from symphys.identification.interface import FitParameters, IdentificationError,
 from symphys.results.identification.record import GlobalSearch
 from symphys.types import Array, Ints
 
-FAR = 0.5
+MIN_START_DISTANCE = 0.5
 """Candidates are other starts if they are farther than this, in scales."""
 
 
@@ -141,7 +141,7 @@ def elsewhere(parameters: FitParameters, at: Array, free: Ints, away: float, str
 
 
 def rated(problem: RecordedResiduals, shared: Array, own: Array, which: Ints, options: FitOptions, steps: int) -> float:
-    """The merit after so many steps of the own numbers; inf where a simulation is not finite."""
+    """Return the merit after so many steps of the own numbers; inf where a simulation is not finite."""
     iterations = steps if own.shape[1] else 0
     fit = RecordingFit(problem, replace(options, iterations=iterations), which, hold_shared=True)
     return fit.run(begin(shared, own)).merit
@@ -153,10 +153,10 @@ def sides(bound: Array) -> list[float | None]:
 
 
 def far_apart(candidates: list[tuple[float, Array]], start: Array, scale: Array) -> list[Array]:
-    """The best candidate, then the best of those that are far from the start and from all before, and so on."""
+    """Return the best candidate, then the best of those that are far from the start and from all before, and so on."""
     ordered = [shared for _, shared in sorted(candidates, key=lambda each: each[0])]
     chosen = ordered[:1]
     for shared in ordered[1:]:
-        if all(np.linalg.norm((shared - other) / scale) > FAR for other in (start, *chosen)):
+        if all(np.linalg.norm((shared - other) / scale) > MIN_START_DISTANCE for other in (start, *chosen)):
             chosen.append(shared)
     return chosen

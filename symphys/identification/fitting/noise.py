@@ -18,9 +18,9 @@ from symphys.types import Array, Ints
 
 LEAST = 1e-12
 """A factor on the guess of a noise is at least so large: recordings that are met exactly have none."""
-ENOUGH = 0.5
+MIN_FREEDOM = 0.5
 """Residuals less their leverage that an estimate needs."""
-TURNS, LEAST_CHANGE = 50, 1e-4
+MAX_ITERATIONS, MIN_CHANGE = 50, 1e-4
 """Turns of Huber's proposal 2 on the same residuals, at most, and the change at which they end."""
 
 
@@ -71,14 +71,14 @@ def noise_factors(
         leverages.append(np.sum((ahead @ information.shared.whitener) ** 2, axis=1) + np.sum(alone**2, axis=1))
     r, quantity, leverage = (np.concatenate(each) for each in ([r for r, _, _ in evaluated], quantities, leverages))
     factors = np.ones(count)
-    for _ in range(TURNS):
+    for _ in range(MAX_ITERATIONS):
         scaled = r / factors[quantity]
         squares = np.bincount(quantity, loss.influence(scaled) ** 2, minlength=count)
         freedom = np.bincount(quantity, 1 - leverage * loss.inside(scaled), minlength=count)
-        enough = (freedom > ENOUGH) & ~problem.noise_known
+        enough = (freedom > MIN_FREEDOM) & ~problem.noise_known
         change = np.sqrt(squares / (loss.normal_square * np.where(enough, freedom, 1.0)))
         change = np.where(enough, np.maximum(change, LEAST), 1.0)
         factors = np.maximum(factors * change, LEAST)
-        if np.all(np.abs(change - 1) < LEAST_CHANGE):
+        if np.all(np.abs(change - 1) < MIN_CHANGE):
             break
     return factors

@@ -58,7 +58,7 @@ class RobustLoss:
 
     @property
     def normal_square(self) -> float:
-        """The mean of psi^2 under standard normal residuals."""
+        """Return the mean of psi^2 under standard normal residuals."""
         if not self.robust:
             return 1.0
         k = self.threshold

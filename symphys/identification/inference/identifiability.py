@@ -2,8 +2,9 @@
 
 Each number has a unit: its scale, or its own size where that is larger. In these units the Jacobian, with the own
 numbers eliminated and without priors of the shared ones, has a singular value for each direction, whose inverse is the
-standard error along it. A direction is open where that is above ``WIDE``: the recordings leave it open by more than the
-numbers' own size. Above ``NOTHING``, or where the singular value is rounding, there is no information at all.
+standard error along it. A direction is open where that is above ``OPEN_ERROR``: the recordings leave it open by more
+than the numbers' own size. Above ``NO_INFORMATION_ERROR``, or where the singular value is rounding, there is no
+information at all.
 
 A basis of the open directions is brought into echelon form, so that numbers that have nothing to do with each other
 fall apart. If n numbers share n - 1 open directions, one combination of them is determined: with logarithms of integer
@@ -23,19 +24,19 @@ from symphys.identification.interface import RecordedResiduals, Rows
 from symphys.results.identification.record import OpenDirection
 from symphys.types import Array, Ints
 
-WIDE = 1.0
+OPEN_ERROR = 1.0
 """Standard error of a direction, in units of the numbers, above which it is called open."""
-SMALL = 0.02
+ZERO_COMPONENT = 0.02
 """A component of a direction is none if it is smaller, relative to the largest."""
 EXPONENTS = (1, 2, 3)
 """Largest powers that are tried."""
-NOTHING = 1e3
+NO_INFORMATION_ERROR = 1e3
 """Standard error, in units of the numbers, above which a direction has no information at all."""
-FAR = 0.1
+TRIAL_DISTANCE = 0.1
 """How far along an open direction a claim of every value is tried, as a share of the numbers."""
-SAME = 1e-3
+SAME_RESIDUALS = 1e-3
 """Residuals that change by less than this share of what one number alone changes are the same."""
-CLOSE = 0.03
+POWER_TOLERANCE = 0.03
 """A power is recognised within this share of the largest."""
 
 
@@ -56,7 +57,7 @@ def open_directions(
     units = np.maximum(np.abs(shared), parameters.scale)[free]
     rows = reduced_rows(problem, evaluated, which, loss, information)[:, free] * units
     _, sizes, basis = np.linalg.svd(rows)
-    wanted = sizes < 1 / WIDE
+    wanted = sizes < 1 / OPEN_ERROR
     if not wanted.any():
         return ()
     found, directions = [], echelon(basis[wanted])
@@ -69,8 +70,8 @@ def open_directions(
             text = f"{text}, or nearly so: the standard error is {error:.2g} times their size"
         prior = bool(np.isfinite(parameters.prior_deviation[named]).any())
         names = tuple(parameters.names[i] for i in named)
-        told = advice([parameters.sets[i] for i in named])
-        found.append(OpenDirection(names, tuple(moves), text, told, error, prior))
+        advised = advice([parameters.sets[i] for i in named])
+        found.append(OpenDirection(names, tuple(moves), text, advised, error, prior))
     return tuple(found)
 
 
@@ -95,7 +96,7 @@ def direction_error(rows: Array, directions: Array, largest: float) -> float:
     """Standard error along the least determined of directions (d, n); inf where there is no information."""
     span = np.linalg.qr(directions.T)[0]
     size = float(np.linalg.svd(rows @ span, compute_uv=False)[-1])
-    return np.inf if size <= max(ROUNDING * largest, 1 / NOTHING) else 1 / size
+    return np.inf if size <= max(ROUNDING * largest, 1 / NO_INFORMATION_ERROR) else 1 / size
 
 
 def echelon(basis: Array) -> Array:
@@ -112,7 +113,7 @@ def echelon(basis: Array) -> Array:
         rows[others] -= np.outer(rows[others, pivot], rows[i])
         used.append(pivot)
     rows /= np.max(np.abs(rows), axis=1, keepdims=True)
-    return np.where(np.abs(rows) < SMALL, 0.0, rows)
+    return np.where(np.abs(rows) < ZERO_COMPONENT, 0.0, rows)
 
 
 def components(rows: Array) -> list[tuple[Ints, Ints]]:
@@ -136,7 +137,7 @@ def own_moves(problem: RecordedResiduals, information: Information, free: Ints, 
     """Name the own numbers that follow directions (d, n) by more than a share of their scale in most recordings."""
     moves = np.einsum("kos,ds->kdo", information.gain[:, :, free] * units, rows)
     often = np.median(np.max(np.abs(moves), axis=1), axis=0) if moves.size else np.zeros(0)
-    return [name for name, size in zip(problem.own.names, often, strict=True) if size > SMALL]
+    return [name for name, size in zip(problem.own.names, often, strict=True) if size > ZERO_COMPONENT]
 
 
 def describe(
@@ -156,7 +157,7 @@ def describe(
         exponents = rows / shared[named]
         if powers is not None:
             exponents = exponents - np.outer(exponents @ powers, powers) / (powers @ powers)
-        far = shared[named] * np.exp(FAR * exponents / np.max(np.abs(exponents), axis=1, keepdims=True))
+        far = shared[named] * np.exp(TRIAL_DISTANCE * exponents / np.max(np.abs(exponents), axis=1, keepdims=True))
         if powers is not None and unchanged(problem, shared, own, which, named, far):
             kind = "their product" if np.all(powers == 1) else "the ratio" if ratio(powers) else "the combination"
             return f"{listed(names)} appear only as {kind} {monomial(names, powers)}"
@@ -164,7 +165,7 @@ def describe(
     weights = weights / weights[np.argmax(np.abs(weights))]
     sums = " + ".join(f"{weight:.3g} {name}" for weight, name in zip(weights, names, strict=True)).replace("+ -", "- ")
     size = np.maximum(np.abs(shared), problem.shared.scale)[named]
-    far = shared[named] + FAR * rows / np.max(np.abs(rows / size), axis=1, keepdims=True)
+    far = shared[named] + TRIAL_DISTANCE * rows / np.max(np.abs(rows / size), axis=1, keepdims=True)
     local = "" if unchanged(problem, shared, own, which, named, far) else " near the estimate"
     return f"{listed(names)} appear only as {sums}{local}"
 
@@ -187,7 +188,7 @@ def unchanged(problem: RecordedResiduals, shared: Array, own: Array, which: Ints
         at = int(np.argmax(np.abs(point - shared[named])))
         alone = shared[named].copy()
         alone[at] = point[at]
-        if not change(point) <= SAME * change(alone):
+        if not change(point) <= SAME_RESIDUALS * change(alone):
             return False
     return True
 
@@ -202,7 +203,7 @@ def whole_powers(weights: Array) -> Array | None:
     for most in EXPONENTS:
         powers = weights / weights[np.argmax(np.abs(weights))] * most
         near = np.round(powers)
-        if np.all(np.abs(powers - near) <= CLOSE * most) and np.all(near != 0):
+        if np.all(np.abs(powers - near) <= POWER_TOLERANCE * most) and np.all(near != 0):
             return np.asarray(near * np.sign(near[0]))
     return None
 

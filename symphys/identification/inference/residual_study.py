@@ -63,7 +63,7 @@ class ResidualSamples:
 
 
 def samples(problem: RecordedResiduals, shared: Array, own: Array, which: Ints) -> ResidualSamples:
-    """The residuals of the recordings in ``which``."""
+    """Return the residuals of the recordings in ``which``."""
     rows = [problem.rows(int(k)) for k in which]
     found = problem.residuals(shared, own, which)
     joined = [np.concatenate([np.zeros(0), *(getattr(each, name) for each in rows)]) for name in COLUMNS]
@@ -130,7 +130,7 @@ def judged(found: QuantityResiduals, courses: Sequence[str]) -> QuantityResidual
 
 
 def series(part: ResidualSamples) -> list[Array]:
-    """The residuals of each recording and component over time."""
+    """Return the residuals of each recording and component over time."""
     order = np.lexsort((part.rows.time, part.rows.component, part.recording))
     ends = np.diff(part.recording[order]) | np.diff(part.rows.component[order])
     return np.split(part.residual[order], np.flatnonzero(ends) + 1)

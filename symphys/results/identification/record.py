@@ -235,7 +235,7 @@ class Identification:
     residual_impact: Array = field(repr=False, metadata=ARRAY)
 
     def __getitem__(self, name: str) -> ParameterEstimate:
-        """The estimate of a shared number; KeyError lists the names."""
+        """Return the estimate of a shared number; KeyError lists the names."""
         found = {each.name: each for each in self.parameters}
         if name not in found:
             raise KeyError(f"no shared number {name}: there are {', '.join(found)}")
@@ -252,13 +252,13 @@ class Identification:
         return {name: (float(value), float(error)) for name, value, error in pairs}
 
     def worst(self, count: int = 5) -> tuple[tuple[str, float], ...]:
-        """The recordings whose residuals are largest, and their root mean square by noise."""
+        """Return the recordings whose residuals are largest, and their root mean square by noise."""
         order = np.argsort(np.where(np.isnan(self.recording_ratio), -np.inf, -self.recording_ratio))
         known = [int(k) for k in order if not np.isnan(self.recording_ratio[k])]
         return tuple((self.recordings[k], float(self.recording_ratio[k])) for k in known[:count])
 
     def to_json(self) -> dict[str, Any]:
-        """The object of identification.json, which has all but the arrays."""
+        """Return the object of identification.json, which has all but the arrays."""
         found = {each.name: getattr(self, each.name) for each in fields(self) if not is_array(each)}
         for name in ("parameters", "open", "quantities", "fitted_errors", "held_back_errors"):
             found[name] = [vars(each) for each in found[name]]
@@ -279,7 +279,7 @@ def is_array(each: Any) -> bool:
 
 
 def read_identification(folder: Path) -> Identification:
-    """The record in a folder.
+    """Read the record in a folder.
 
     Raises:
         ReportError: a file is missing, or is none of this kind.

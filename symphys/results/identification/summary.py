@@ -8,7 +8,7 @@ import numpy as np
 
 from symphys.results.identification.record import Identification, ParameterEstimate, PredictionErrors
 
-STRONG = 0.9
+STRONG_CORRELATION = 0.9
 """Correlations that are named."""
 
 
@@ -77,7 +77,7 @@ def correlations(found: Identification) -> list[str]:
         (names[i], names[j], float(found.correlation[i, j]))
         for i in range(len(names))
         for j in range(i)
-        if abs(found.correlation[i, j]) > STRONG
+        if abs(found.correlation[i, j]) > STRONG_CORRELATION
     ]
     return [f"{a} and {b} are correlated by {value:.3f}" for a, b, value in pairs]
 
@@ -109,7 +109,7 @@ def residuals(found: Identification) -> str:
 
 
 def predictions(what: str, errors: Sequence[PredictionErrors]) -> str:
-    """A table of how far simulations are from recordings."""
+    """Return a table of how far simulations are from recordings."""
     rows = [
         (
             each.name,
@@ -128,7 +128,7 @@ def spread(deviation: float) -> str:
 
 
 def worst(found: Identification) -> str:
-    """The recordings whose residuals are largest."""
+    """Return the recordings whose residuals are largest."""
     return "worst recordings: " + ", ".join(f"{name} ({ratio:.3g} times the noise)" for name, ratio in found.worst())
 
 
