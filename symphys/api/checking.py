@@ -19,10 +19,10 @@ from symphys.api.transcriptions import transcribed
 from symphys.api.values import vector
 from symphys.api.views import html_table
 from symphys.findings import advice
-from symphys.findings.contacts import sliding
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, MARKS, UNKNOWN, Finding, Judged
 from symphys.findings.numerics import GRADIENT, GRID, reach
+from symphys.findings.physics import sliding
 from symphys.problem import Problem, require_solvable
 from symphys.problem.loading import Source, load
 from symphys.runs import check_tables

@@ -13,8 +13,8 @@ from rich.text import Text
 from symphys.api.checking import IN_TABLES, WIDTH
 from symphys.api.checking import Examined as Examined
 from symphys.findings.advice import NO_SLOPE, VERDICTS, advice, answers, of_influence, slopes
-from symphys.findings.contacts import sliding
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN
+from symphys.findings.physics import sliding
 
 COLOURS = {GOOD: "green", FAIR: "yellow", BAD: "red", UNKNOWN: "dim"}
 WORDS = {text: COLOURS[level] for words in (MARKS, VERDICTS) for level, text in words.items()} | {

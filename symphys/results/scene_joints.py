@@ -18,18 +18,18 @@ AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
 
 @dataclass(frozen=True)
 class SceneJointFrame:
-    """Where a joint is on one side, in the frame of the body or the world: ``point`` (3,) [m], ``orientation`` (4,)."""
+    """The frame of a joint on one side, in that of the body or the world: ``point`` (3,) [m], ``orientation`` (4,)."""
 
     point: Array = field(default_factory=lambda: np.zeros(3))
     orientation: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0, 0.0]))
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``sockets``."""
+        """Return an entry of ``sockets``."""
         return {"point": self.point.tolist(), "orientation": self.orientation.tolist()}
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> SceneJointFrame | None:
-        """One side; None if its place is not finite or its orientation none."""
+        """Read one side; None if its place is not finite or its orientation none."""
         read = values.record(cls, {"point": None, "orientation": None, **values.table(value)}, text)
         length = float(np.linalg.norm(read.orientation))
         if read.point.size != 3 or not np.isfinite(read.point).all():
@@ -86,7 +86,7 @@ class SceneMotor:
 
 @dataclass(frozen=True)
 class SceneJoint:
-    """What holds two bodies together, or a body to the world; coordinates are those of the first against the second.
+    """A joint between two bodies, or a body and the world; coordinates are those of the first against the second.
 
     Attributes:
         name, kind: as in the problem file.
@@ -116,7 +116,7 @@ class SceneJoint:
 
     @property
     def turns(self) -> tuple[bool, ...]:
-        """For each coordinate whether it is an angle."""
+        """Return for each coordinate whether it is an angle."""
         return tuple(coordinate.turns for coordinate in self.coordinates)
 
     @property
@@ -132,7 +132,7 @@ class SceneJoint:
         return any(self.turns) or not (self.turns or self.kind == "fixed")
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``joints``."""
+        """Return an entry of ``joints``."""
         return {
             "name": self.name,
             "kind": self.kind,

@@ -11,7 +11,8 @@ from symphys import files
 from symphys import verification as trust
 from symphys.errors import SymphysError
 from symphys.findings.examination import Examination
-from symphys.findings.obstacles import capital, obstacles
+from symphys.findings.obstacles import obstacles
+from symphys.findings.writing import capital
 from symphys.results.file_names import CHECKPOINT, GAINS, GUESS, MULTIPLIERS, SCENE, TRAJECTORY
 from symphys.results.result import Result
 from symphys.results.scene_of_problem import make_scene

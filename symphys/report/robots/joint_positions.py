@@ -21,7 +21,7 @@ BAR = 0.065
 
 
 def on_side(trajectory: Trajectory, joint: SceneJoint, side: int, vector: Array, shot: int, is_point: bool) -> Array:
-    """(3,): a point or direction that one side of a joint carries, in the world."""
+    """Return a point or direction (3,) that one side of a joint carries, in the world."""
     name = joint.bodies[side] if side < len(joint.bodies) else ""
     if not name:
         return vector
@@ -36,7 +36,7 @@ def drawable(trajectory: Trajectory, scene: Scene) -> list[SceneJoint]:
 
 
 def position(trajectory: Trajectory, joint: SceneJoint, shot: int) -> Array:
-    """(3,) [m]: the point of the first side."""
+    """Return the position (3,) [m] of the first side, in the world."""
     return on_side(trajectory, joint, 0, joint.frames[0].point, shot, True)
 
 
@@ -46,7 +46,7 @@ def axes_of(joint: SceneJoint) -> list[tuple[int, Array]]:
 
 
 def bones(trajectory: Trajectory, scene: Scene, shot: int) -> Iterator[tuple[int, Array]]:
-    """Lines (2, 3) [m] from the centres of bodies to their joints, and to solids beside them, each with its body."""
+    """Yield a body and a line (2, 3) [m] from its centre to each of its joints, and to each solid beside it."""
     for joint in drawable(trajectory, scene):
         for side, name in enumerate(joint.bodies):
             body = trajectory.body_names.index(name)
@@ -76,7 +76,7 @@ def draw_joint_positions(axes: Axes, view: View, trajectory: Trajectory, scene: 
 
 
 def draw_lines(axes: Axes, ends: Array, colour: Any, width: float, zorder: float) -> None:
-    """Lines between each two of these points, as one path; ``ends`` holds (2,) points, in any shape."""
+    """Draw lines between each two of these points as one path; ``ends`` holds (2,) points, in any shape."""
     if ends.size:
         pairs = ends.reshape(-1, 2, 2)
         parts = np.concatenate([pairs, np.full((len(pairs), 1, 2), np.nan)], axis=1).reshape(-1, 2)

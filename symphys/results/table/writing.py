@@ -13,7 +13,7 @@ from symphys import files
 from symphys.errors import SymphysError
 from symphys.results.table.choosing import best, chosen, ordered
 from symphys.results.table.columns import FIXED, Row, columns, numeric
-from symphys.results.table.rows import Rows, Tell, read_rows
+from symphys.results.table.rows import Progress, Rows, read_rows
 
 CSV, PARQUET = "runs.csv", "runs.parquet"
 """The names of the files, in the folder that `symphys solve --out` names."""
@@ -24,7 +24,7 @@ class MissingPackage(SymphysError):
     """A package that need not be there is needed; says how to get it."""
 
 
-def write_table(out: Path, tell: Tell | None = None) -> list[Path]:
+def write_table(out: Path, tell: Progress | None = None) -> list[Path]:
     """Write the rows of all runs below a folder as runs.csv, and as runs.parquet where pyarrow is installed.
 
     Args:
@@ -117,7 +117,7 @@ def best_frame(folder: str | Path, by: str = "objective", overall: bool = False)
 
 
 def framed(rows: Sequence[Row], found: Rows) -> Any:
-    """Some of the rows that were found as a pandas.DataFrame with all of their columns."""
+    """Return some of the rows that were found as a pandas.DataFrame with all of their columns."""
     try:
         import pandas as pd  # late, as above
     except ImportError:

@@ -63,7 +63,7 @@ class TargetRecord:
 
 @dataclass(frozen=True)
 class ClosedLoopRecord:
-    """What happened.
+    """The settings, latencies, commands and motion of a closed loop.
 
     Attributes:
         problem, title: names.
@@ -126,7 +126,7 @@ class ClosedLoopRecord:
 
     @property
     def share(self) -> float:
-        """Of the ticks whose plan was ready before the next one."""
+        """Return the share of the ticks whose plan was ready before the next one."""
         return self.in_time / max(self.ticks, 1)
 
     @property
@@ -141,13 +141,13 @@ class ClosedLoopRecord:
 
     @property
     def counted(self) -> Array:
-        """(T,) [s] the latencies that counted."""
+        """Return (T,) [s] the latencies that counted."""
         if self.latency_kind == "measured":
             return self.latency
         return self.work if self.latency_kind == "cpu" else np.full(len(self.asked), float(self.latency_kind))
 
     def write(self, folder: Path) -> None:
-        """Both files; the table last, since nothing counts without it."""
+        """Write both files; the table last, since nothing counts without it."""
         files.write_npz(folder / PLANS, {name: getattr(self, name) for name in ARRAYS})
         plain = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in ARRAYS}
         plain["targets"] = [asdict(target) for target in self.targets]

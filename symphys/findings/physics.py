@@ -1,13 +1,18 @@
-"""Whether contacts are resolved: settled, not too deep, no tunnelling, every impact in time, no near misses."""
+"""Whether the physics holds: contacts are resolved, energy and momentum are what physics allows.
+
+Contacts: settled, not too deep, no tunnelling, every impact in time, no near misses.
+"""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from symphys.findings.examination import Examination, Miss
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded, worst_of
 from symphys.findings.numerics import refined_finding
-from symphys.findings.writing import listed, several, show
+from symphys.findings.writing import listed, percent, several, show
 
 CONTACTS = "contacts"
 
@@ -47,14 +52,14 @@ NOT_SOUND = "There were none; but other lines here say that not every impact was
 
 
 def contact_findings(trust: Examination, judged: Judged) -> list[Finding]:
-    """Every line on contacts for which there is a number."""
+    """List a finding for each number on contacts that is known."""
     settled = [] if math.isnan(trust.residual) else [residual_finding(trust, judged)]
     numbers = ((trust.deepest, depth_finding), (trust.passed, passage_finding))
     return settled + [find(trust) for number, find in numbers if not math.isnan(number)] + impact_findings(trust)
 
 
 def residual_finding(trust: Examination, judged: Judged) -> Finding:
-    """How far the contact solver was from its end.
+    """Judge how far the contact solver was from convergence.
 
     Impulses that have not settled refute a result unless the same comes out where the sweeps end elsewhere. Where more
     sweeps would settle them at other velocities, it is refuted in any case: such a motion can be had, and is another.
@@ -76,7 +81,7 @@ def residual_finding(trust: Examination, judged: Judged) -> Finding:
 
 
 def residual_level(trust: Examination) -> str:
-    """The level of the residual as a share of the largest impulse, and of the velocity that it leaves."""
+    """Return the level of the residual as a share of the largest impulse, and of the velocity that it leaves."""
     share = trust.residual / trust.impulse if trust.impulse > 0 else math.nan
     by_impulse = GOOD if trust.residual == 0 else graded(share, RESIDUAL_LIMITS)
     return worst_of([by_impulse, graded(trust.left, LEFT_LIMITS)])
@@ -89,26 +94,26 @@ def holds_elsewhere(trust: Examination, judged: Judged) -> bool:
 
 
 def refuted(trust: Examination, judged: Judged) -> str:
-    """A clause on what another number of sweeps does to the result, where it is another."""
+    """Return a clause on what another number of sweeps does to the result, where it is another."""
     found = [refined_finding(row, judged).doubt for row in trust.resettled]
     return next((f", and {clause}" for clause in found if clause), "")
 
 
 def elsewhere(trust: Examination) -> str:
-    """A sentence on what other numbers of sweeps lead to."""
+    """Return a sentence on what other numbers of sweeps lead to."""
     rows = [f"{show(row.objective)} with {row.what}" for row in trust.resettled]
     return f"The result does not rest on where the sweeps end: the objective is {listed(rows)}."
 
 
 def in_steps(trust: Examination) -> str:
-    """A clause on how many steps have impulses that have not settled, as far as they were counted."""
+    """Return a clause on how many steps have impulses that have not settled, as far as they were counted."""
     if not (trust.unsettled > 0 and math.isfinite(trust.steps)):
         return ""
     return f" in {int(trust.unsettled)} of {several(int(trust.steps), 'step')}"
 
 
 def velocity_left(trust: Examination) -> str:
-    """A clause on the velocity that more sweeps would find, where it matters."""
+    """Return a clause on the velocity that more sweeps would find, where it matters."""
     if graded(trust.left, LEFT_LIMITS) not in (FAIR, BAD) or not trust.left_of:
         return ""
     when = f"after the step at t = {show(trust.left_time)} s"
@@ -116,7 +121,7 @@ def velocity_left(trust: Examination) -> str:
 
 
 def more_sweeps(trust: Examination) -> str:
-    """A clause on what more sweeps would do, as far as that was measured."""
+    """Return a clause on what more sweeps would do, as far as that was measured."""
     if math.isnan(trust.residual_finer):
         return ""
     twice = f"twice the sweeps leave {show(trust.residual_finer, 2)} N s"
@@ -129,7 +134,7 @@ def more_sweeps(trust: Examination) -> str:
 
 
 def depth_finding(trust: Examination) -> Finding:
-    """How deep bodies sank into each other."""
+    """Judge how deep bodies sank into each other."""
     level = GOOD if trust.deepest <= 0 else graded(trust.deepest / trust.size, DEPTH_LIMITS)
     place = f" ({trust.depth_contact} at t = {show(trust.depth_time)} s)" if trust.depth_contact else ""
     meaning = {
@@ -146,7 +151,7 @@ def depth_finding(trust: Examination) -> Finding:
 
 
 def passage_finding(trust: Examination) -> Finding:
-    """Whether a body went through another between two instants."""
+    """Judge whether a body went through another between two instants."""
     what, level = "Passing through between two instants", graded(trust.passed, PASSED_LIMITS)
     where = f"{trust.passed_contact} at t = {show(trust.passed_time)} s, {show(trust.passed_depth, 2)} m deep"
     meaning = {
@@ -181,7 +186,7 @@ def resolved(trust: Examination) -> bool:
 
 
 def sliding(trust: Examination) -> str:
-    """A sentence on how far surfaces slid; empty where none did beyond rounding."""
+    """Return a sentence on how far surfaces slid; empty where none did beyond rounding."""
     slides = [
         f"{slide.contact} {show(slide.distance, 2)} m (up to {show(slide.speed, 2)} m/s)"
         for slide in trust.slides
@@ -201,12 +206,12 @@ SPREAD = 1.0
 
 
 def miss_findings(trust: Examination) -> list[Finding]:
-    """A line for each that lies within a small step or within the spread of seeds."""
+    """Return a line for each that lies within a small step or within the spread of seeds."""
     return [miss_finding(miss) for miss in trust.misses if miss.steps <= STEP or miss.spreads <= SPREAD]
 
 
 def miss_finding(miss: Miss) -> Finding:
-    """One near miss, or one glancing touch."""
+    """Describe one near miss, or one glancing touch."""
     number = f"{show(miss.gap, 2)} m ({miss.contact} at t = {show(miss.time)} s)"
     by = f"a change of {miss.variable} by {show(miss.change, 2)}"
     if miss.touches:
@@ -217,3 +222,96 @@ def miss_finding(miss: Miss) -> Finding:
         what = "Near miss"
     where = "within the spread of seeds" if miss.spreads <= SPREAD else "a small step for a solver"
     return Finding(NEARBY, FAIR, what, number, f"{meaning}, which is {where}; beyond that the objective jumps.")
+
+
+ENERGY = "energy"
+
+AT_REST = 1e-6
+"""Of the potential energy: kinetic energy below that is of what hardly moves, and no measure of anything."""
+GAIN_LIMITS = (0.0, 0.05)
+"""Energy that contacts add, as a share of the largest kinetic energy."""
+MOMENTUM_LIMITS = (1e-9, 1e-6)
+"""Of the largest momentum: rounding, and what must not be."""
+DRIFT_LIMITS = (1e-6, 1e-2)
+"""Energy that nothing accounts for, in one step, as a share of the largest kinetic energy."""
+DRIFTED_LIMITS = (1e-3, 5e-2)
+"""The same, added up over the motion."""
+
+JUMP_LIMITS = (2e-2, 0.1)
+"""Change of place that is noticeable, and that is too large, as a share of a body's size or of a radian."""
+
+
+def largest_energy(trust: Examination) -> float:
+    """[J] that energies are compared with: the largest kinetic one, or a share of the other where nothing moves."""
+    potential = float(np.abs(trust.energy.potential).max(initial=0.0))
+    return max(float(trust.energy.kinetic.max(initial=0.0)), AT_REST * potential)
+
+
+def gains_finding(trust: Examination) -> Finding:
+    """Energy that contacts add."""
+    peak = largest_energy(trust)
+    level = GOOD if trust.gained == 0 else graded(trust.gained / peak if peak > 0 else math.nan, GAIN_LIMITS)
+    what, number = "Energy that contacts add", f"{show(trust.gained, 2)} J"
+    if level == GOOD or not trust.gains:
+        return Finding(ENERGY, level, what, number, "Contacts only took energy out of the motion.")
+    worst = trust.gains[0]
+    where = f"{listed(worst.contacts)} at t = {show(worst.time)} s, step {worst.step}, adds {show(worst.energy, 2)} J"
+    meaning = f"{where}, which no real contact does; restitution together with friction can."
+    doubt = f"contacts add {show(trust.gained, 2)} J, most of it {listed(worst.contacts)} at t = {show(worst.time)} s"
+    return Finding(ENERGY, level, what, number, meaning, doubt * (level == BAD))
+
+
+def stop_findings(trust: Examination) -> list[Finding]:
+    """Describe the step in which a stop from the side took most energy from something that lay on a surface."""
+    if not trust.stops:
+        return []
+    worst = trust.stops[0]
+    where = f"{listed(worst.contacts)} at t = {show(worst.time)} s, step {worst.step}"
+    meaning = (
+        f"{where}, takes {show(worst.energy, 2)} J from what "
+        "lay or rolled on a surface, by a force from another side: it ran into something. Where there is only a "
+        "seam or a small edge, it tripped: look at the motion there."
+    )
+    number = f"{show(worst.energy, 2)} J"
+    return [Finding(ENERGY, FAIR, "Energy that a stop from the side takes", number, meaning)]
+
+
+def jump_findings(trust: Examination) -> list[Finding]:
+    """Return a change of place that no velocity explains, if there is one that matters."""
+    level = graded(trust.jump, JUMP_LIMITS)
+    if level not in (FAIR, BAD) or not trust.jump_of:
+        return []
+    where = f'"{trust.jump_of}" at t = {show(trust.jump_time)} s'
+    meaning = (
+        f"{where} moves in one step by {show(trust.jump_size, 3)}, farther than its velocities take it: something puts "
+        "it there at once, as a coupling or a limit that is not kept, or bodies that begin inside each other."
+    )
+    doubt = f"{where} jumps by {show(trust.jump_size, 3)}, which no velocity explains"
+    what = "Change of place that no velocity explains"
+    return [Finding(ENERGY, level, what, show(trust.jump_size, 3), meaning, doubt * (level == BAD))]
+
+
+def balance_finding(trust: Examination) -> Finding:
+    """Judge the energy and momentum that neither forces nor contacts account for."""
+    peak = largest_energy(trust)
+    worst = trust.drift if math.isnan(trust.unexplained) else trust.unexplained
+    shares = [energy / peak if peak > 0 else energy for energy in (worst, trust.drifted)]
+    by_energy = worst_of(map(graded, shares, (DRIFT_LIMITS, DRIFTED_LIMITS)))
+    if by_energy == GOOD and trust.drift > DRIFT_LIMITS[0] * peak:
+        by_energy = FAIR
+    level = worst_of([graded(trust.momentum, MOMENTUM_LIMITS), by_energy])
+    if math.isnan(trust.momentum):
+        level = UNKNOWN
+    meaning = {
+        GOOD: "Momentum adds up to rounding, and energy is only changed by forces and contacts.",
+        FAIR: "Some energy comes or goes in free motion, as of a body that tumbles or of servos that turn over: a "
+        "smaller time step lessens it.",
+        BAD: "Momentum or energy does not add up: that is a fault of the engine, or numbers beyond its precision.",
+        UNKNOWN: "Could not be added up.",
+    }[level]
+    largest = worst if math.isnan(trust.drifted) else max(worst, trust.drifted)
+    number = f"{show(trust.momentum, 2)} of the momentum, {show(trust.drift, 2)} J"
+    total = f"{show(largest, 2)} J of energy come from nowhere"
+    when = f", most in the step from t = {show(trust.drift_at)} s" * math.isfinite(trust.drift_at)
+    doubt = total + when if by_energy == BAD else f"{percent(trust.momentum)} of the momentum comes from nowhere"
+    return Finding(ENERGY, level, "Left unexplained in a step", number, meaning, doubt * (level == BAD))

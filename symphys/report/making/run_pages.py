@@ -1,4 +1,7 @@
-"""Pages side by side in worker processes. A page depends on its folder alone, so it does not matter who makes it."""
+"""Pages of runs: each made whole or not at all, here or side by side in worker processes.
+
+A page depends on its folder alone, so it does not matter which process makes it.
+"""
 
 from __future__ import annotations
 
@@ -14,15 +17,65 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from time import monotonic
 
+from symphys import files
 from symphys.interrupts import Interrupts, ignoring_interrupts
-from symphys.report.making.page import PageFault, make_run_page
-from symphys.report.pages.run import PAGE
+from symphys.report.making.stamps import FULL, LIGHT
+from symphys.report.pages.run import PAGE, write_light_report, write_run_report
+from symphys.results.text_files import ReportError
+
+AUTO = "auto"
+PAGE_KINDS = (AUTO, FULL, LIGHT)
+MOST_FULL = 50
+"""With "auto", so many pages made at once are full at most; of more all are light."""
+
+
+@dataclass(frozen=True)
+class PageFault:
+    """A page that could not be made, and why."""
+
+    page: Path
+    reason: str
+
+    def __str__(self) -> str:
+        """Return the page and the reason, in a line."""
+        return f"{self.page} could not be made: {self.reason}"
+
+
+def is_light(kind: str, count: int) -> bool:
+    """Whether ``count`` pages that are made at once are light; ReportError for a kind that there is not."""
+    if kind not in PAGE_KINDS:
+        raise ReportError(f"there are no pages of the kind {kind!r}; there are {', '.join(PAGE_KINDS)}")
+    return kind == LIGHT or (kind == AUTO and count > MOST_FULL)
+
+
+def fitting_kinds(kind: str, count: int) -> tuple[str, ...]:
+    """Return the kinds of a page that need not be made again, of ``count`` at once."""
+    if kind == AUTO:
+        return (FULL, LIGHT) if is_light(kind, count) else (FULL,)
+    return (LIGHT,) if is_light(kind, count) else (FULL,)
+
+
+def make_run_page(folder: Path, light: bool) -> PageFault | None:
+    """Make the page of a run folder; why it could not be made, if it was not."""
+    return attempt(folder / PAGE, lambda: write_light_report(folder) if light else write_run_report(folder))
+
+
+def attempt(page: Path, make: Callable[[], object]) -> PageFault | None:
+    """Call what makes a page; any failure but an interruption becomes a fault."""
+    try:
+        make()
+    except (ReportError, files.FileError) as error:
+        return PageFault(page, str(error))
+    except Exception as error:
+        return PageFault(page, f"{type(error).__name__}: {error}" if str(error) else type(error).__name__)
+    return None
+
 
 DIED = "the process that made it died: killed from outside, out of memory, or a crash in compiled code"
 SLOW = "it was not made within {:g} s"
-PATIENCE = 20.0
+STOP_TIMEOUT = 20.0
 """[s] that a worker has for the end of its page once it is asked to stop."""
-WORTH = {False: 4, True: 80}
+MIN_PAGES_PER_WORKER = {False: 4, True: 80}
 """A worker takes a second to start: it is started for so many pages at least, full ones and (True) light ones."""
 
 Done = Callable[[Path, PageFault | None], None]
@@ -36,7 +89,7 @@ def make_run_pages(folders: Sequence[Path], light: bool, jobs: int, done: Done, 
 
     KeyboardInterrupt ends it: pages that are begun in workers are finished, and every page is whole or as it was.
     """
-    count = min(jobs, len(folders) // WORTH[light])
+    count = min(jobs, len(folders) // MIN_PAGES_PER_WORKER[light])
     left = deque(folders)
     if count > 1 or limit < math.inf:
         PagePool(left, light, done, limit).run(max(count, 1))
@@ -82,7 +135,7 @@ class PagePool:
             while workers:
                 ready = wait([worker.pipe for worker in workers], self.end_slow(workers))
                 for worker in [each for each in workers if each.pipe in ready]:
-                    self.hear(worker, workers)
+                    self.receive(worker, workers)
         finally:
             end(workers)
 
@@ -96,7 +149,7 @@ class PagePool:
         until = min((worker.until for worker in workers if not worker.ended), default=math.inf)
         return None if until == math.inf else max(until - now, 0.0)
 
-    def hear(self, worker: PageWorker, workers: list[PageWorker]) -> None:
+    def receive(self, worker: PageWorker, workers: list[PageWorker]) -> None:
         """Take what a worker has made, and give it the next page; replace one that died over a page."""
         try:
             fault: PageFault | None = worker.pipe.recv()
@@ -122,7 +175,7 @@ class PagePool:
 
 
 def start(light: bool) -> PageWorker:
-    """A new worker process."""
+    """Return a new worker process."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     process = context.Process(target=work, args=(there, light), daemon=True)
@@ -137,7 +190,7 @@ def end(workers: Sequence[PageWorker]) -> None:
         for worker in workers:
             worker.stop()
         for worker in workers:
-            worker.process.join(PATIENCE)
+            worker.process.join(STOP_TIMEOUT)
             if worker.process.is_alive():
                 worker.process.terminate()
                 worker.process.join()
@@ -145,7 +198,7 @@ def end(workers: Sequence[PageWorker]) -> None:
 
 
 def work(pipe: Connection, light: bool) -> None:
-    """What a worker does: make pages until there are no more, or until its parent has gone."""
+    """Make pages in a worker process until there are no more, or until its parent has gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EOFError, OSError):
         pipe.send(None)
