@@ -90,9 +90,16 @@ def main(arguments: list[str]) -> int:
         out = RESULTS / f"{name}.json"
     if out is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        out.write_text(written(record), encoding="utf-8")
         print(f"\nstored: {out}")
     return 1 if any(row.get("fault") for row in record["rows"]) else 0
+
+
+def written(record: Mapping[str, Any]) -> str:
+    """Return a record as JSON with a line for each row."""
+    lines = ",\n".join(f"  {json.dumps(row, allow_nan=False, ensure_ascii=False)}" for row in record["rows"])
+    text = json.dumps({**record, "rows": []}, indent=1, ensure_ascii=False)
+    return text.replace('"rows": []', f'"rows": [\n{lines}\n ]') + "\n"
 
 
 def header(name: str, columns: Mapping[str, str], options: Mapping[str, Any]) -> dict[str, Any]:

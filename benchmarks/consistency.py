@@ -93,46 +93,50 @@ class Here:
 
 @dataclass(frozen=True)
 class There:
-    """MuJoCo on a scene of solids."""
+    """MuJoCo on a scene.
+
+    Attributes:
+        name: of the rows.
+        scene: of solids, or a robot.
+        model: makes the model at a time step.
+        states: (batch, nstate) initial states.
+        bodies: names of the scene's bodies in their order.
+    """
 
     name: str
-    scene: Scene
-    contact: Contact
+    scene: Any
+    model: Callable[[float], Any]
+    states: Array
+    bodies: tuple[str, ...]
 
     def runner(self, dt: float, every: float = SAMPLE) -> Callable[[int, int], Array]:
         """Make the model; see ``Engine``."""
-        runs, states = Runs(solids_model(self.scene, self.contact, dt)), solids_states(self.scene)
-        return lambda batch, count: runs.along(states[:batch], round(every / dt), count)
+        runs = Runs(self.model(dt))
+        return lambda batch, count: runs.along(self.states[:batch], round(every / dt), count)
 
     def places(self, states: Array) -> Array:
         """Return the centres; see ``Engine``."""
-        poses = states[..., 1 : 1 + 7 * len(self.scene.solids)]
-        return poses.reshape(*states.shape[:-1], -1, 7)[..., :3]
-
-
-@dataclass(frozen=True)
-class ThereJointed:
-    """MuJoCo on a robot."""
-
-    name: str
-    scene: JointedScene
-    integrator: str
-
-    def runner(self, dt: float, every: float = SAMPLE) -> Callable[[int, int], Array]:
-        """Make the model; see ``Engine``."""
-        runs, states = Runs(robot_model(self.scene, dt, self.integrator)), robot_states(self.scene)
-        return lambda batch, count: runs.along(states[:batch], round(every / dt), count)
-
-    def places(self, states: Array) -> Array:
-        """Return the centres in the order of the scene's bodies; see ``Engine``."""
-        model = robot_model(self.scene, 0.01, self.integrator)
+        model = self.model(0.01)
         data, found = mujoco.MjData(model), []
-        order = [model.body(body.name).id for body in self.scene.robot.bodies]
+        order = [model.body(name).id for name in self.bodies]
         for state in states.reshape(-1, states.shape[-1]):
             data.qpos[:] = state[1 : 1 + model.nq]
             mujoco.mj_kinematics(model, data)
             found.append(data.xipos[order])
         return np.array(found).reshape(*states.shape[:-1], len(order), 3)
+
+
+def solids_there(scene: Scene, contact: Contact) -> There:
+    """Return MuJoCo on solids with a contact."""
+    names = tuple(solid.name for solid in scene.solids)
+    return There(contact.name, scene, partial(solids_model, scene, contact), solids_states(scene), names)
+
+
+def robot_there(scene: JointedScene, integrator: str) -> There:
+    """Return MuJoCo on a robot with an integrator."""
+    names = tuple(body.name for body in scene.robot.bodies)
+    model = partial(robot_model, scene, integrator=integrator)
+    return There(f"MuJoCo, {integrator}", scene, model, robot_states(scene), names)
 
 
 def rows(quick: bool = False) -> Iterator[Row]:
@@ -191,20 +195,20 @@ def box(batch: int = 32) -> list[Engine]:
     scene = tumbling_box(batch)
     here: list[Engine] = [Here("symphys, e = 0", scene), Here("symphys, e = 0, 50 sweeps", scene, sweeps=50)]
     here.append(Here("symphys, e = 0.5", scene, 0.5))
-    return [*here, *(There(contact.name, scene, contact) for contact in (SOFT, STIFF, SOFT_RK4))]
+    return [*here, *(solids_there(scene, contact) for contact in (SOFT, STIFF, SOFT_RK4))]
 
 
 def heap(side: int = 2, batch: int = 8) -> list[Engine]:
     """Return the engines on the heap of capsules."""
     scene = heap_of_capsules(side, batch)
     here = [Here("symphys, e = 0", scene), Here("symphys, e = 0.5", scene, 0.5)]
-    return [*here, *(There(contact.name, scene, contact) for contact in (SOFT, STIFF, SOFT_RK4))]
+    return [*here, *(solids_there(scene, contact) for contact in (SOFT, STIFF, SOFT_RK4))]
 
 
 def engines(scene: JointedScene, *integrators: str) -> list[Engine]:
     """Return this engine as it is for speed, and MuJoCo with some of its integrators."""
-    there = [ThereJointed(f"MuJoCo, {integrator}", scene, integrator) for integrator in integrators]
-    return [Here("symphys", scene, sweeps=20, cuts=0), *there]
+    here = Here("symphys", scene, sweeps=20, cuts=0)
+    return [here, *(robot_there(scene, integrator) for integrator in integrators)]
 
 
 def jointed(batch: int = 8) -> dict[str, list[Engine]]:
@@ -241,8 +245,8 @@ def flung(name: str, robot: World, rate: float, batch: int = 8) -> JointedScene:
 
 def differences(scene: JointedScene, steps: tuple[float, ...] = FREE_STEPS, duration: float = 1.0) -> Array:
     """Return the rms distances (steps, batch) over bodies from where MuJoCo has them in the end [m]."""
-    there, runs = ThereJointed("MuJoCo", scene, "RK4"), Runs(robot_model(scene, FREE_FINE, "RK4"))
-    exact = there.places(runs.after(robot_states(scene), round(duration / FREE_FINE))[:, -1])
+    there = robot_there(scene, "RK4")
+    exact = there.places(there.runner(FREE_FINE, duration)(len(scene.start), 1)[0])
     world, found = scene.world(), []
     for dt in steps:
         walk = Walk(world, Scheme(dt=dt, sweeps=20, cuts=0), round(duration / dt))

@@ -41,7 +41,7 @@ from symphys.problem.loading import load
 from symphys.runs.choice import SITUATIONS, numbers, situation
 from symphys.runs.record import equivalents
 from symphys.shooting import Evaluator, ShootingProblem, Values
-from symphys.solvers import SOLVERS, Outcome, Status, TraceRow
+from symphys.solvers import SOLVERS, Counts, Outcome, Status, TraceRow
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.transcription import fastest
 from symphys.types import Array
@@ -244,9 +244,7 @@ class Cases:
 
 
 def counts_of(recorder: RecordingEvaluator) -> Any:
-    """The work up to the last row."""
-    from symphys.solvers import Counts
-
+    """Return the work up to the last row."""
     if not recorder.rows:
         return Counts()
     row = recorder.rows[-1][0]
@@ -256,7 +254,7 @@ def counts_of(recorder: RecordingEvaluator) -> Any:
 def improvements(
     recorder: RecordingEvaluator, trace: Sequence[TraceRow], price: dict[str, float], start: tuple[float, bool]
 ) -> list[tuple[float, float, float, bool]]:
-    """(work, seconds, lowest exact merit so far, whether anything met everything so far) where either improves."""
+    """Return (work, seconds, lowest exact merit, whether anything met everything) where one of them improves."""
     lowest, any_met = start if math.isfinite(start[0]) else (math.inf, False)
     found = [(0.0, 0.0, lowest, any_met)] if math.isfinite(lowest) else []
     for row, seconds, merit, met in recorder.judged(trace):
@@ -275,7 +273,7 @@ def warm(method: str, problem: ShootingProblem) -> None:
 
 
 def unlimited(options: Any, stages: int) -> Any:
-    """Without limits of iterations and evaluations, where there is one stage of smoothing: the budget is the limit."""
+    """Return options without limits of iterations and evaluations if there is one stage: the budget is the limit."""
     if stages > 1:
         return options
     bounded = [name for name in ("iterations", "evaluations") if hasattr(options, name)]

@@ -57,7 +57,7 @@ def test_motion_of_a_tumbling_box_falls_with_the_step() -> None:
 def test_mujoco_on_the_same_scene() -> None:
     if engines.mujoco is None:
         pytest.skip("mujoco is not installed")
-    engine = consistency.There("MuJoCo, default contact", tumbling_box(2), consistency.SOFT)
+    engine = consistency.solids_there(tumbling_box(2), consistency.SOFT)
     errors = consistency.errors_of(engine, 0.48, (0.016, 0.002), 2.5e-4)
     assert np.median(errors[1]) < np.median(errors[0])
 
