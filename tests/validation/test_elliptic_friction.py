@@ -18,6 +18,7 @@ from symphys.maths import rotation
 from symphys.model.shapes import Plane, Sphere
 from symphys.model.state_layout import initial_state
 from symphys.model.world import Body, Law, Scheme, make_world
+from symphys.transcription import transcribe
 from symphys.types import Array
 
 G = 9.81
@@ -239,7 +240,7 @@ def test_variables_and_settings_set_both_coefficients() -> None:
     problem = file(
         ground=TWO, variable=[variable], target=[target], output=[{"name": "m", "value": "ground.friction[1]"}]
     )
-    made = symphys.transcribe(problem, backend="casadi").shooting
+    made = transcribe(problem, backend="casadi").shooting
     z = made.start(0)
     slopes = made.evaluator.gradient(z[None], 0.0).gradient[0]
     h = 1e-6 * np.eye(2)
