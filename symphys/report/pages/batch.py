@@ -225,7 +225,7 @@ def provenance(runs: Sequence[Run]) -> Html:
             ("Evaluated by", once([str(run.backend) for run in runs])),
         ]
     )
-    return card("Where this comes from", content)
+    return card("Provenance", content)
 
 
 MOST_CHECKS = 16

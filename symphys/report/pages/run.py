@@ -161,7 +161,7 @@ def sources(run: Run) -> Html:
     texts = [("Resolved configuration", CONFIG), ("Problem file", PROBLEM), ("Log of the solver", LOG)]
     folds = [sections.source(title, read_text(run.folder / name)) for title, name in texts]
     faults = [tag("p", f"Not read: {'; '.join(run.faults)}.", class_="note")] if run.faults else []
-    return card("Where this comes from", sections.provenance(run), *faults, *folds, anchor="provenance")
+    return card("Provenance", sections.provenance(run), *faults, *folds, anchor="provenance")
 
 
 def read_text(path: Path) -> str:
