@@ -16,12 +16,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from symphys.batches import run_batch
+from symphys.batches import Observer, run_batch
 from symphys.problem import load_problem
 from symphys.results.table import read_rows
 from symphys.runs import Job, make_jobs
+from symphys.runs.execute import judge
 from symphys.runs.record import make_result, used
-from symphys.runs.solving import judge
 from symphys.solvers import solver
 from symphys.transcription import Transcription, transcribe
 
@@ -49,18 +49,12 @@ tolerance = 0.01
 """
 
 
-class Memory:
+class Memory(Observer):
     """An observer that notes the memory of this process [MB] at every hundredth end."""
 
     def __init__(self) -> None:
         """Nothing has ended."""
         self.ended_runs, self.seen = 0, [resident()]
-
-    def started(self, job: Job, resumed: bool) -> None:
-        """Nothing is noted."""
-
-    def advanced(self, job: Job, row: Any) -> None:
-        """Nothing is noted."""
 
     def ended(self, job: Job, result: Any, skipped: bool) -> None:
         """Note the memory now and then."""

@@ -26,21 +26,21 @@ WORDS = {text: COLOURS[level] for words in (MARKS, VERDICTS) for level, text in 
     NO_SLOPE: COLOURS[FAIR]
 }
 WIDTH = 110
-"""Characters of a line that goes to no terminal."""
+"""Characters of a line where the output is no terminal."""
 IN_TABLES = (GRADIENT, GRID)
-"""Subjects that the tables above the findings show already."""
+"""Subjects of the tables above the findings."""
 
 
 @dataclass(frozen=True)
 class Examined:
-    """How something was judged, and how far that can be trusted."""
+    """An examination and the judgement that it belongs to."""
 
     judged: Judged
     trust: Examination
 
     @classmethod
     def of(cls, verdict: Assessment, trust: Mapping[str, Any]) -> Examined:
-        """From a verdict and what ``symphys.verification.examination`` has found."""
+        """Combine a judgement with the numbers of ``symphys.verification.examination``."""
         goal = any(check.kind == "goal" for check in verdict.checks)
         costs = math.nan if goal else sum(verdict.costs.values())
         judged = Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks), costs)
@@ -54,7 +54,7 @@ class Examined:
 
 
 def print_examined(examined: Examined) -> None:
-    """Print it."""
+    """Print tables, findings and advice."""
     trust, judged = examined.trust, examined.judged
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
     if first := of_influence(trust):
@@ -70,7 +70,7 @@ def print_examined(examined: Examined) -> None:
 
 
 def print_table(console: Console, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table; verdicts, whose column has no title, are kept in one line."""
+    """Print a table; verdicts, whose column has no title, are not wrapped."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for title in header:
         table.add_column(title, no_wrap=not title, overflow="fold")
@@ -80,5 +80,5 @@ def print_table(console: Console, header: Sequence[str], rows: Sequence[Sequence
 
 
 def printable(text: str, console: Console) -> str:
-    """The text without what the terminal cannot show."""
+    """Replace characters that the terminal cannot show."""
     return text.encode(console.encoding, "replace").decode(console.encoding)
