@@ -164,8 +164,8 @@ def solved(folder: Path) -> Path:
 
 def list_runs(root: Path) -> None:
     """List the runs below a folder, and the best of them, as the command line does."""
-    from symphys.cli.finding.best import best
-    from symphys.cli.finding.ls import ls
+    from symphys.cli.best import best
+    from symphys.cli.ls import ls
 
     with contextlib.redirect_stdout(io.StringIO()):
         for command in (ls, best):
@@ -237,7 +237,7 @@ class Robots:
 
     def __init__(self, folder: Path) -> None:
         """Files are written into a folder."""
-        from symphys.importing.reading import isolated
+        from symphys.importing import source as isolated
         from symphys.importing.reading.child import main as read
 
         isolated.run = lambda place, _: read(place) or 0  # type: ignore[assignment]

@@ -115,7 +115,7 @@ def worker(inbox: multiprocessing.Queue[str], outbox: multiprocessing.Queue[str]
         os.dup2(nowhere.fileno(), 1)
         os.dup2(nowhere.fileno(), 2)
     if direct:
-        from symphys.importing.reading import isolated
+        from symphys.importing import source as isolated
         from symphys.importing.reading.child import main as read
 
         isolated.run = lambda folder, _: read(folder) or 0

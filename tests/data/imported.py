@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 import symphys
-from symphys.importing.findings import Finding
-from symphys.importing.options import ImportOptions
+from symphys.importing.records import Finding, ImportOptions
+from symphys.importing.robot import tables_of
 from symphys.importing.source import Source
-from symphys.importing.tables import tables_of
 from symphys.types import Array
 
 Tables = dict[str, Any]

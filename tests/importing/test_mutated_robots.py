@@ -12,7 +12,7 @@ from mutations import mutated
 from tools.repeats import few
 
 from symphys.errors import SymphysError
-from symphys.importing.findings import Finding
+from symphys.importing.records import Finding
 from symphys.importing.robot import read_robot
 
 pytest.importorskip("mujoco")

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from tools.repeats import few
 
-from symphys.importing.findings import Finding
-from symphys.importing.options import ImportOptions
-from symphys.importing.problem import ImportProblem
+from symphys.importing.records import Finding, ImportOptions, ImportProblem
 from symphys.importing.robot import Imported, read_robot
 from symphys.importing.source import Source, read_source
 

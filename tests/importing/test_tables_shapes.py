@@ -11,9 +11,9 @@ from data.imported import by_name, model_of, problem_of, read, texts
 from tools.repeats import few
 
 from symphys.importing import fitting
-from symphys.importing.options import ImportOptions
+from symphys.importing.records import ImportOptions
+from symphys.importing.robot import tables_of
 from symphys.importing.source import read_source
-from symphys.importing.tables import tables_of
 from symphys.model.shapes import Box, Sphere
 
 mujoco = pytest.importorskip("mujoco")

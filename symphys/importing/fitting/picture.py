@@ -18,13 +18,13 @@ from symphys.types import Array
 SIDES = ((0, 2), (1, 2), (0, 1))
 """The axes to the right and up in each view."""
 MOST_FACES = 8000
-"""That are drawn of a mesh."""
+"""Faces of a mesh that are drawn, at most."""
 RINGS = 24
-"""Corners of a circle of a shape."""
+"""Corners of a drawn circle."""
 
 
 def draw_fit(fitted: Fit, vertices: ArrayLike, faces: ArrayLike, path: Path | str, title: str = "") -> None:
-    """Write a picture, SVG or PNG by the name's end: the mesh grey, the shapes as blue wires, deviations below.
+    """Draw a fit as SVG or PNG, by the suffix: the mesh grey, the shapes as blue wires, deviations in the title.
 
     Raises:
         SymphysError: the file cannot be written, or the mesh has no surface.
@@ -55,7 +55,7 @@ def draw_fit(fitted: Fit, vertices: ArrayLike, faces: ArrayLike, path: Path | st
 
 
 def outline(shape: Shape) -> list[Array]:
-    """Closed lines (k, 3) on a shape, in the frame in which it is placed."""
+    """Return closed lines (k, 3) on a shape, in the frame in which it is placed."""
     import casadi as ca
 
     turned = np.array(rotation.matrix(ca.DM(shape.orientation)))
@@ -63,7 +63,7 @@ def outline(shape: Shape) -> list[Array]:
 
 
 def own_lines(shape: Shape) -> list[Array]:
-    """The same along its own axes: edges of a polytope, circles of what is round."""
+    """Return lines on a shape in its own axes: edges of a polytope, circles of round shapes."""
     turn = np.linspace(0, 2 * np.pi, RINGS + 1)
     circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
     sizes = shape.sizes
