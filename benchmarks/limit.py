@@ -26,8 +26,7 @@ from symphys.codegen import Program, compile_program
 from symphys.codegen.emit.plan import plan
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.graph.operations import MASKS
-from symphys.codegen.toolchain.compiler import find_compiler
-from symphys.codegen.toolchain.processor import processor
+from symphys.codegen.toolchain.compiler import find_compiler, processor
 from symphys.transcription import rollout_program
 from symphys.transcription.rollout import symbolic_rollout
 
