@@ -114,7 +114,7 @@ class SerialRunner:
         halt: Halt,
         limits: BatchLimits,
     ) -> None:
-        """Keep what is to be done."""
+        """Keep the runs and their limits."""
         self.jobs, self.queue, self.ledger, self.halt, self.limits = jobs, queue, ledger, halt, limits
         self.transcriptions = TranscriptionCache(transcribe)
 

@@ -107,7 +107,7 @@ class Pool:
         return [slot for slot in self.slots if slot.index is not None]
 
     def fill(self) -> None:
-        """Start workers until there are enough for what is left."""
+        """Start workers until there are enough for the runs that are left."""
         wanted = min(self.count, len(self.queue) + len(self.working))
         while len(self.slots) < wanted:
             context = multiprocessing.get_context("spawn")

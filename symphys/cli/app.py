@@ -1,4 +1,4 @@
-"""The group of commands, and what an error looks like: one message, an exit code, no traceback."""
+"""The group of commands, with errors as one message and an exit code, without a traceback."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ COMMANDS = (
 
 
 class Commands(click.Group):
-    """A group that suggests what an unknown command may have meant."""
+    """A group that suggests the nearest command for an unknown one."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command; UsageError with the nearest if there is none."""
+        """Find the command; UsageError with the nearest name if it does not exist."""
         name = args[0]
         if name not in self.commands and not name.startswith("-"):
             raise click.UsageError(f"no such command {name!r}; {hint(name, self.commands)}", ctx)

@@ -1,4 +1,4 @@
-"""``symphys report``, and how commands make pages: their options, their progress, and what is said of failures."""
+"""``symphys report``, and how commands make pages: options, progress and messages on failures."""
 
 from __future__ import annotations
 

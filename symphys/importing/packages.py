@@ -32,7 +32,7 @@ def model_file(name: str | Path) -> Path:
 
 
 def package_folder(package: str) -> Path | None:
-    """Return the folder of an installed package, or of that name beside packages; None if there is none."""
+    """Return the folder of an installed package, or of that name next to packages; None if there is none."""
     if not package.replace("_", "a").isidentifier():
         beside = Path(sysconfig.get_paths()["purelib"]) / package
         return beside if package not in ("", ".", "..") and beside.is_dir() else None

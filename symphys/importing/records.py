@@ -119,7 +119,7 @@ class JointMotor:
 
 
 @dataclass(frozen=True)
-class Source:
+class CompiledModel:
     """A compiled model.
 
     Attributes:
@@ -129,7 +129,7 @@ class Source:
         inertials: by the names of bodies, where the model's numbers are not those of the file.
         motors: by the names of joints, of a URDF.
         findings: what MuJoCo loses, and what was recovered.
-        files: all that were read: the model, what it includes, its meshes and height fields.
+        files: all files that were read: the model, included files, meshes and height fields.
     """
 
     file: Path

@@ -11,8 +11,8 @@ import numpy as np
 
 from symphys.files import modified
 from symphys.importing.packages import model_file
-from symphys.importing.records import Finding, ImportOptions, Kind, gathered
-from symphys.importing.source import AS_IT_IS, Source, read_source
+from symphys.importing.records import CompiledModel, Finding, ImportOptions, Kind, gathered
+from symphys.importing.source import AS_IT_IS, read_source
 from symphys.importing.tables.contacts import read_contacts
 from symphys.importing.tables.joints import read_joints, read_loops, read_motors
 from symphys.importing.tables.links import body_table, read_links
@@ -34,7 +34,7 @@ class Imported:
 
     Attributes:
         file: that was read.
-        title: of the robot: what the model calls itself, else the name of the file.
+        title: the model's own name, else the name of the file.
         tables: of a problem file, as ``[[include]]`` takes them: bodies, joints, ...
         findings: what became of the parts of the model, in the order of ``KINDS``.
     """
@@ -70,7 +70,7 @@ def read_robot(path: str | Path, options: ImportOptions = AS_IT_IS) -> Imported:
     return replace(known, file=path, tables=deepcopy(known.tables))
 
 
-def made(source: Source, options: ImportOptions) -> Imported:
+def made(source: CompiledModel, options: ImportOptions) -> Imported:
     """Return the robot of a compiled model."""
     tables, findings = tables_of(source, options)
     unique = dict.fromkeys((*source.findings, *findings))
@@ -84,11 +84,11 @@ def title(model: Any, file: Path) -> str:
     return file.stem if own in ("", "MuJoCo Model") else own
 
 
-def tables_of(source: Source, options: ImportOptions) -> tuple[dict[str, Any], tuple[Finding, ...]]:
+def tables_of(source: CompiledModel, options: ImportOptions) -> tuple[dict[str, Any], tuple[Finding, ...]]:
     """Return the tables of a problem file, and findings on the parts of the model.
 
     Raises:
-        ImportProblem: for a keyframe that there is none of.
+        ImportProblem: the keyframe does not exist.
     """
     import mujoco
 

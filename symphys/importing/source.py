@@ -19,18 +19,17 @@ from symphys.errors import Unavailable
 from symphys.importing.reading.checking import check_model
 from symphys.importing.reading.child import ANSWER, MODEL, REQUEST
 from symphys.importing.reading.folders import Folders
-from symphys.importing.records import Finding, ImportOptions, ImportProblem, Inertial, JointMotor, Source
+from symphys.importing.records import CompiledModel, Finding, ImportOptions, ImportProblem, Inertial, JointMotor
 
 AS_IT_IS = ImportOptions()
-__all__ = ["Inertial", "JointMotor", "Source", "read_source"]
-LONGEST = 120.0
+TIMEOUT = 120.0
 """[s] that MuJoCo may take to read and compile a model."""
 START = "import sys, json; sys.path[:] = json.loads(sys.argv[2]); from pathlib import Path; "
 CALL = "from symphys.importing.reading.child import main; main(Path(sys.argv[1]))"
 MISSING = "models of robots are read by MuJoCo, which is not installed; pip install 'symphys[robots]'"
 
 
-def read_source(path: str | Path, options: ImportOptions = AS_IT_IS) -> Source:
+def read_source(path: str | Path, options: ImportOptions = AS_IT_IS) -> CompiledModel:
     """Read and compile a model.
 
     Args:
@@ -63,7 +62,7 @@ def read_source(path: str | Path, options: ImportOptions = AS_IT_IS) -> Source:
     }
     motors = {name: JointMotor(*each) for name, each in answer.get("motors", {}).items()}
     read = (folders.file, *text.included, *(Path(each) for each in answer["files"]))
-    return Source(file, text.kind, model, inertials, motors, tuple(findings), read)
+    return CompiledModel(file, text.kind, model, inertials, motors, tuple(findings), read)
 
 
 def need_mujoco() -> Any:
@@ -112,10 +111,10 @@ def run(folder: Path, file: str) -> int:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            timeout=LONGEST,
+            timeout=TIMEOUT,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        text = f"MuJoCo takes longer than {LONGEST:g} s to read it; it was stopped"
+        text = f"MuJoCo takes longer than {TIMEOUT:g} s to read it; it was stopped"
         raise ImportProblem(str(file), text) from None
     return done.returncode

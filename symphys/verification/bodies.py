@@ -62,10 +62,10 @@ def parameters(rollout: Rollout) -> Any:
 def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
     """Return the work of motors, springs and dry friction in each step (N,) [J], and the sum of its absolute values.
 
-    What a command gives acts from the start of its step to the end, also beside what a motor makes of its coordinate.
-    Leapfrog has others' forces half a substep ahead in the velocities at the ends of a step; of a step that is cut only
-    the last force is known, and they are taken to get there in even steps. Of a servo that goes from one bound to the
-    other within a step that is wrong by up to twice its work.
+    A commanded torque acts from the start of its step to the end, in addition to the law of the motor. The leapfrog
+    scheme has the other forces half a substep ahead of the velocities at the ends of a step; of a split step only the
+    last force is known, and forces are assumed to change in even steps. For a servo that goes from one bound to the
+    other within a step the result is wrong by up to twice its work.
     """
     layout, x = Layout(rollout.world), record.arrays.x
     total, gross, lag = np.zeros(rollout.steps), np.zeros(rollout.steps), x[:, layout["lag"]]

@@ -21,7 +21,7 @@ TICK = 1.0
 
 @contextmanager
 def heartbeat(beat: Callable[[], None], every: float) -> Iterator[None]:
-    """Call ``beat`` every so many seconds from a thread of its own, while the body runs."""
+    """Call ``beat`` every ``every`` seconds from a thread, while the body runs."""
     over = Event()
 
     def run() -> None:

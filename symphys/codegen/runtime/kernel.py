@@ -33,7 +33,7 @@ class BuildReport:
 
     Attributes:
         compiler: its version, in its own words.
-        flags: what it was called with.
+        flags: of the compiler.
         lanes: rollouts in one block.
         precision: "double" or "single".
         functions: C functions, forward and adjoint.
@@ -41,7 +41,7 @@ class BuildReport:
         bytes_per_lane: memory of one rollout with its adjoint; a block of lanes takes as many times that.
         cached: whether it came from the cache.
         seconds: from the program to the loaded kernel.
-        note: what the user should know, or empty.
+        note: a message for the user, or empty.
         arena: words of 8 bytes of a block, for what its driver notes.
     """
 
@@ -75,7 +75,7 @@ class Fixed:
         z, parameters: (n,) and (p,), read.
         outputs: (rows, width) all outputs in their order, written.
         gradient: (rows, n), written; empty where there is no seed.
-        seed: (rows, s), read; empty likewise.
+        seed: (rows, s), read; empty without a seed.
     """
 
     loaded: Loaded

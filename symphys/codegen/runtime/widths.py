@@ -55,15 +55,15 @@ Choice = tuple[LoadedWidth, int]
 
 
 def suited(rows: int, full: int) -> int:
-    """Return the lanes that suit a call of so many rows best; ``full``: of a vector register."""
+    """Return the lanes that suit a call of ``rows`` best; ``full``: of a vector register."""
     return next((lanes for lanes in NARROW if rows <= lanes < full), full)
 
 
 class Widths:
     """The libraries of one program that are loaded.
 
-    A call runs on the best one that is loaded or kept in the cache. A better one is compiled when calls without it have
-    taken as long as compiling takes. So whoever never needs it does not wait for it.
+    A call runs on the best library that is loaded or kept in the cache. A better one is compiled once calls without it
+    have taken as long as compiling takes, so that nobody waits for a library that pays too little.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class Widths:
             self._compiling.finish()
 
     def ready(self, rows: int) -> LoadedWidth:
-        """Return what computes a call of so many rows at present; nothing is compiled."""
+        """Return the library that computes a call of ``rows`` at present; nothing is compiled."""
         return self._chosen(rows)[0]
 
     def run(self, batch: RolloutBatch, threads: int) -> None:
@@ -138,7 +138,7 @@ class Widths:
         self._timed(*self._chosen(part.rows), [part], 1)
 
     def _chosen(self, rows: int) -> Choice:
-        """Return what computes calls of so many rows, and the lanes that would suit them better; 0: none."""
+        """Return the library for calls of ``rows``, and the lanes that would suit them better; 0: none."""
         choices = self._choices  # a library that comes meanwhile begins new ones
         if (choice := choices.get(rows)) is not None:
             return choice

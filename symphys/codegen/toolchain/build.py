@@ -97,7 +97,7 @@ def compiled(
     rows: int | None = None,
     wait: bool = True,
 ) -> tuple[ProcessorKernel, KeptPlan]:
-    """Build the kernel of a program, or take it from the cache; return also what is kept of it.
+    """Build the kernel of a program, or take it from the cache; return also its plan, to be kept.
 
     ``wait``: for the compiler; else a kernel of ``LONG_COMPILATION`` operations begins with an interpreter, and changes
     over once it is compiled. With $SYMPHYS_WAIT all wait.
@@ -165,7 +165,7 @@ def kernel_of(
     cached: bool = True,
     note: str = "",
 ) -> ProcessorKernel:
-    """Make a kernel that begins with a library of so many lanes; ``cached``: whether that was kept."""
+    """Make a kernel that begins with the library ``first``, given with its lanes; ``cached``: whether it was kept."""
     kept, width, compiler = libraries.kept, libraries.width, find_compiler()
     report = BuildReport(
         compiler=compiler.version,
@@ -206,7 +206,7 @@ class KeptLibraries:
         return None if path is None else self.load(path, lanes)
 
     def build(self, lanes: int) -> Loaded:
-        """Build the library of so many lanes; see ``widths.Libraries``."""
+        """Build the library of ``lanes``; see ``widths.Libraries``."""
         from symphys.codegen.emit.alone import alone
         from symphys.codegen.emit.plan import plan
         from symphys.codegen.emit.source import sources
@@ -242,7 +242,7 @@ class KeptLibraries:
         return self.kept.alone if lanes == 1 and self.kept.alone else self.kept.plan
 
     def _texts(self, lanes: int) -> str:
-        """Return the identity of the C files, which differ by lanes, dialect and what is packed side by side."""
+        """Return the identity of the C files, which differ by lanes, dialect and packing."""
         if lanes == self.width.lanes:
             return self.kept.texts
         from symphys.codegen.emit.source import forms_of

@@ -106,7 +106,7 @@ class Compiler:
 
     Attributes:
         command: how it is called.
-        version: first line of what it says of itself; where it lies is in the command.
+        version: the first line of its version message; its path is in the command.
         gnu: whether it is gcc.
     """
 

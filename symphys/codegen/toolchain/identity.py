@@ -1,4 +1,4 @@
-"""Checksums of what a kept plan depends on: the data that a program is built from, and the package that builds it."""
+"""Checksums of the data that a program is built from, and of the package that builds it, for kept plans."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _add(update: Any, data: Any) -> None:
 
 
 def _add_code(update: Any, data: Any) -> None:
-    """Add a function or a class of OWN: its name and, for a nested function, what it has captured."""
+    """Add a function or a class of OWN: its name and, for a nested function, its captured values."""
     if (data.__module__ or "").partition(".")[0] not in OWN:
         raise TypeError(f"{data.__qualname__} of {data.__module__} has no identity")
     inner: list[Any] = []

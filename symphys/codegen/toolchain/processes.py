@@ -87,7 +87,7 @@ class Running:
 def run(command: Sequence[str], limit: float, folder: Path | None = None) -> str:
     """Return the output of a command; KernelUnavailable says how it failed.
 
-    ``folder``: where the command keeps what is temporary, so that nothing of it stays when the command is killed.
+    ``folder``: for temporary files of the command, so that none is left when the command is killed.
     """
     return _start(command, limit, folder).said()
 

@@ -1,4 +1,4 @@
-"""A kernel that was built before, without building its program again.
+"""Start of a kernel that was built before, without building its program again.
 
 Beside each kernel lies its plan, under a checksum of all that the program is made from: the problem's data, the sources
 of this package and the versions of what it builds with. Where that is not known (a Python function in the problem) the

@@ -109,8 +109,8 @@ class Mesh:
     def outside(self, points: Array) -> NDArray[np.bool_]:
         """Return whether points lie in front of the surface (n,), as seen from some directions.
 
-        A pixel has the depth of its nearest sample. So what is inside is not called outside, and what is outside by
-        less than a two-hundredth of the mesh's size may be called inside.
+        A pixel has the depth of its nearest sample. So points inside never count as outside, and points outside by less
+        than a two-hundredth of the mesh's size may count as inside.
         """
         return np.asarray(self.ahead(points) > 0)
 

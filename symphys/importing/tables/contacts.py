@@ -1,6 +1,6 @@
 """Contacts of a model: which surfaces may touch and with what friction, as few [[pair]] tables.
 
-MuJoCo's filters and coefficients say it for each pair of geoms. Contacts that a world cannot have are left out: shapes
+MuJoCo has filters and coefficients for each pair of geoms. Contacts that a world cannot have are left out: shapes
 without a rule, overlap at the start, too many points. Bodies state their friction and static surfaces none, so that the
 body's holds. Two bodies would multiply theirs; a [[pair]] table gives what they have in the model instead.
 """
@@ -83,7 +83,7 @@ def owners_of(reading: ModelReading, shapes: Shapes) -> dict[int, str]:
 
 
 def classes_of(reading: ModelReading, owners: dict[int, str]) -> dict[str, Hashable]:
-    """Return for every surface what its contacts follow from: filters and coefficients of its geoms."""
+    """Return the class of every surface, on which its contacts depend: filters and coefficients of its geoms."""
     model, found = reading.model, dict[str, set[tuple[object, ...]]]()
     for geom, name in owners.items():
         kind = model.geom_contype[geom], model.geom_conaffinity[geom], model.geom_condim[geom], model.geom_type[geom]
@@ -160,7 +160,7 @@ def pair_law(reading: ModelReading, pair: int) -> Law:
 
 
 def law_of(friction: float, torsion: float, rolling: float, directions: int) -> Law:
-    """Keep the coefficients that act in so many directions of MuJoCo's contacts."""
+    """Keep the coefficients that act in a contact of MuJoCo with so many ``directions``."""
     return (
         float(friction) if directions >= 3 else 0.0,
         float(torsion) if directions >= 4 else 0.0,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from symphys.importing.source import Inertial
+from symphys.importing.records import Inertial
 from symphys.importing.tables.reading import FREE, ModelReading, WeldedLink, is_upright, numbers, quaternion
 from symphys.types import Array
 

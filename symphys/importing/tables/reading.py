@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from symphys.importing.records import Finding, ImportOptions, Kind
-from symphys.importing.source import JointMotor
+from symphys.importing.records import Finding, ImportOptions, JointMotor, Kind
 from symphys.types import Array
 
 LONGEST = 64

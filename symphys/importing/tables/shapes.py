@@ -183,7 +183,7 @@ class Meshes:
 def hull_points(vertices: Array, most: int) -> tuple[Array, float]:
     """Return at most ``most`` vertices of the convex hull, and how far the others lie outside of these [mm].
 
-    The farthest point from all that are kept comes next, so that what is left out is near to what is kept.
+    The point farthest from all kept ones is added next, so that the others are near to kept ones.
 
     Args:
         vertices: (n, 3) [m].
