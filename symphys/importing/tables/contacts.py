@@ -65,8 +65,9 @@ def read_contacts(
         meet = {names: law for names, law in meet.items() if names not in set(apart)}
         if apart:
             reading.note("left out", f"contact of {len(apart)} pairs of bodies of the robot", "as the caller chose")
-    meet = without_overlap(reading, owners, without_rule(reading, surfaces, still, meet))
-    meet = few_enough(reading, owners, surfaces, still, meet)
+    kinds = {name: kinds_of(table) for name, table in {**still, **surfaces}.items()}
+    meet = without_overlap(reading, owners, without_rule(reading, kinds, meet))
+    meet = few_enough(reading, owners, surfaces, kinds, meet)
     pairs = write_contacts(reading, classes_of(reading, owners), surfaces, still, meet)
     soft(reading, owners)
     return {"pair": pairs, "touching": set(meet)}
@@ -185,9 +186,8 @@ def without_overlap(reading: ModelReading, owners: dict[int, str], meet: Meeting
     return {names: law for names, law in meet.items() if names not in deepest}
 
 
-def without_rule(reading: ModelReading, surfaces: Tables, still: Tables, meet: Meetings) -> Meetings:
-    """Drop pairs of surfaces whose shapes cannot touch."""
-    kinds = {name: kinds_of(name, surfaces, still) for name in (*surfaces, *still)}
+def without_rule(reading: ModelReading, kinds: Mapping[str, Counter[str]], meet: Meetings) -> Meetings:
+    """Drop pairs of surfaces whose shapes cannot touch; ``kinds``: how many shapes of each kind a surface has."""
     lost: Counter[str] = Counter()
     kept: Meetings = {}
     for names, law in meet.items():
@@ -202,9 +202,8 @@ def without_rule(reading: ModelReading, surfaces: Tables, still: Tables, meet: M
     return kept
 
 
-def kinds_of(name: str, surfaces: Tables, still: Tables) -> Counter[str]:
+def kinds_of(table: Mapping[str, Any]) -> Counter[str]:
     """Return how many shapes of each kind a surface has."""
-    table = surfaces.get(name) or still[name]
     if "shape" not in table:
         return Counter(["plane"])
     parts = table["shape"].get("parts", [table["shape"]])
@@ -217,10 +216,9 @@ def contact_points(one: str, other: str) -> int:
 
 
 def few_enough(
-    reading: ModelReading, owners: dict[int, str], surfaces: Tables, still: Tables, meet: Meetings
+    reading: ModelReading, owners: dict[int, str], surfaces: Tables, kinds: Mapping[str, Counter[str]], meet: Meetings
 ) -> Meetings:
     """Limit the points of contact: drop contact within robots first, then between bodies at all."""
-    kinds = {name: kinds_of(name, surfaces, still) for name in (*surfaces, *still)}
     counts = {
         names: sum(m * n * contact_points(a, b) for a, m in kinds[names[0]].items() for b, n in kinds[names[1]].items())
         for names in meet
