@@ -24,9 +24,9 @@ import numpy as np
 from robot_matching import Match
 
 import symphys
-from symphys.dynamics.observation import body_quantities, joint_quantities
+from symphys.dynamics.observation import SensedState, named_sensors, sensor_readings
 from symphys.importing.packages import model_file
-from symphys.model.state_layout import GIVEN, Layout, initial_state
+from symphys.model.state_layout import Layout, initial_state
 from symphys.types import Array
 
 STEPS = 1000
@@ -107,9 +107,8 @@ class Gait:
             for slot in variable.slots:
                 numbers[slot.name] = np.asarray(solution.value[variable.name], float).ravel()
         x, time = ca.SX.sym("x", Layout(self.world).size), ca.SX.sym("time")
-        layout = Layout(self.world)
-        names: dict[str, Any] = {"time": time, **joint_quantities(self.world, x), **body_quantities(self.world, x)}
-        names |= {f"{b.name}.{key}": x[layout[f"{b.name}.{key}"]] for b in self.world.bodies for key in GIVEN}
+        read = sensor_readings(SensedState(self.world, x), named_sensors(self.world))
+        names: dict[str, Any] = {"time": time, **read}
         sensed = {
             each.name: ca.vertcat(*(part.evaluate({n: names[n] for n in part.names}) for part in each.formulas))
             for each in self.problem.sensors

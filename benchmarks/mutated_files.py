@@ -197,7 +197,7 @@ class Runs:
             content = repacked(content, dice) if dice.random() < 0.7 else mutated(content, dice, (flip, cut))
         self.broken.write_bytes(content)
         read_all(self.root)
-        symphys.results(self.root)
+        symphys.results.runs(self.root)
         list_runs(self.root)
         write_light_report(self.folder)
 

@@ -17,6 +17,7 @@ from sphinx.environment import BuildEnvironment
 from sphinx.util.inspect import TypeAliasForwardRef
 
 import symphys
+import symphys.model
 import symphys.solvers
 
 ROOT = Path(__file__).parents[1]
@@ -54,7 +55,7 @@ napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 # Types of other packages, and of the package's own rooms, which the page does not describe.
 nitpick_ignore_regex = [
-    ("py:class", "Array|ArrayLike|Figure|Path|Record|Replay|Source"),
+    ("py:class", "Array|ArrayLike|Figure|Path|Record|RecordedRollout|Replay|Source"),
     ("py:.*", r"symphys\.[a-z_]+\..*"),
     ("py:.*", r"(collections|pathlib|types|typing|functools|enum|os)\..*"),
     ("py:.*", r"(casadi|ca|cma|gymnasium|jax|matplotlib|np|npt|numpy|pandas|pydantic|torch|xarray)\..*"),
@@ -68,7 +69,7 @@ html_show_sphinx = False
 html_copy_source = False
 
 
-PUBLIC = {*symphys.__all__, *symphys.solvers.__all__}
+PUBLIC = {*symphys.__all__, *symphys.model.__all__, *symphys.solvers.__all__}
 
 
 def resolve_by_public_name(app: Sphinx, env: BuildEnvironment, node: pending_xref, content: Element) -> Node | None:
@@ -77,7 +78,7 @@ def resolve_by_public_name(app: Sphinx, env: BuildEnvironment, node: pending_xre
         return None
     domain: Any = env.get_domain("py")
     name = str(node.get("reftarget", "")).rpartition(".")[2]
-    for place in ("symphys", "symphys.solvers"):
+    for place in ("symphys", "symphys.model", "symphys.shooting", "symphys.solvers"):
         if f"{place}.{name}" in domain.objects:
             arguments = (env, node.get("refdoc", ""), app.builder, "obj", f"{place}.{name}", node, content)
             found: Node | None = domain.resolve_xref(*arguments)

@@ -1,8 +1,8 @@
-"""Environments of Gymnasium from any problem that something can act on; needs the extra ``symphys[env]``.
+"""Gymnasium environments of any problem with controllers, motors or inputs; needs the extra ``symphys[env]``.
 
-Actions are what controllers would give, observations what sensors read; the reward of a step is minus its cost, so
-that the return of an episode is minus the objective. Where a motion is over by the problem's [termination], the costs
-of the time that is left are in the last reward. Samples of [[scenario]] tables are drawn for each episode.
+Actions take the place of the controllers' outputs, and observations are the readings of sensors. The reward of a step
+is minus its cost, so that the return of an episode is minus the objective. If the problem's [termination] ends a motion
+early, the costs of the remaining time are in the last reward. Each episode draws a sample of the [[scenario]] tables.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.api.loading import Source
-from symphys.api.stepping import CompiledStep, compile_step
+from symphys.api.compiled import CompiledStep, compile_step
 from symphys.errors import SymphysError
+from symphys.problem.loading import Source
 from symphys.types import Array
 
 try:
@@ -29,20 +29,22 @@ Info = dict[str, Any]
 
 
 class Motions:
-    """Motions side by side, each at a time of its own.
+    """A batch of motions, each at its own time.
 
     Attributes:
-        step: what moves them.
-        state: (B, s).
+        step: the step that advances them.
+        randomized: whether motions start in samples of the problem's [[scenario]] tables.
+        state: (B, s) the states.
+        observation: (B, o) their observations.
     """
 
     def __init__(self, step: CompiledStep, count: int, randomized: bool) -> None:
-        """All at the start of the guess."""
+        """Put ``count`` motions at the start of the guess."""
         self.step, self.randomized = step, randomized
         self.state, self.observation, self._inputs = step.start(count)
 
     def begin(self, which: NDArray[np.bool_], rng: np.random.Generator) -> None:
-        """Let some begin anew, in samples of the scenarios; ``which`` (B,)."""
+        """Restart some motions, selected by ``which`` (B,)."""
         count = int(which.sum())
         if self.randomized:  # the first sample is always the problem's own
             parts = [part[1:] for part in self.step.start(count + 1, int(rng.integers(2**31)))]
@@ -51,9 +53,13 @@ class Motions:
         self.state[which], self.observation[which], self._inputs[which] = parts
 
     def advance(self, actions: Array) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Take a step: rewards (B,), which motions are over, and for which of the others the time is.
+        """Take a step with actions (B, m).
 
-        SymphysError where a state is not finite; it names the motion, the step and the quantity.
+        Returns:
+            Rewards (B,), which motions were terminated (B,), and which of the others reached their last step (B,).
+
+        Raises:
+            SymphysError: a state is not finite; names the motion, the step and the quantity.
         """
         ticks = np.minimum(self.step.tick(self.state), self.step.steps - 1)
         inputs = self._inputs[np.arange(len(ticks)), ticks]
@@ -74,10 +80,10 @@ class Motions:
 
 
 class VectorEnv(gymnasium.vector.VectorEnv):
-    """Many motions of a problem side by side; an episode that has ended begins anew with the next step.
+    """A batch of motions of a problem; an episode that has ended restarts with the next step.
 
     Attributes:
-        motions: the states.
+        motions: the states of the motions.
 
     Example:
         >>> import symphys.env
@@ -102,10 +108,10 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
         Args:
             problem: what ``symphys.load`` takes.
-            num_envs: how many.
-            controllers: names of those that are left open; see ``symphys.compile_step``.
+            num_envs: the number B of motions.
+            controllers: names of the controllers that actions replace, as in ``symphys.compile_step``.
             randomized: whether episodes are samples of the problem's [[scenario]] tables.
-            options: of ``symphys.compile_step``.
+            options: further arguments of ``symphys.compile_step``.
         """
         step = compile_step(problem, controllers, **options)
         self.num_envs, self.motions = num_envs, Motions(step, num_envs, randomized)
@@ -115,14 +121,14 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._ended = np.zeros(num_envs, bool)
 
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Any, Info]:
-        """Begin all episodes anew: observations (B, o)."""
+        """Restart all episodes; return the observations (B, o)."""
         super().reset(seed=seed, options=options)
         self._ended[:] = False
         self.motions.begin(np.ones(self.num_envs, bool), self.np_random)
         return observed(self.motions.observation), {}
 
     def step(self, actions: ArrayLike) -> tuple[Any, Array, Any, Any, Info]:
-        """Observations (B, o), rewards (B,), terminated (B,), truncated (B,), and nothing else."""
+        """Take a step; return observations (B, o), rewards (B,), terminated (B,), truncated (B,) and no info."""
         again = self._ended
         rewards, over, late = self.motions.advance(np.asarray(actions, float))
         if again.any():
@@ -149,25 +155,25 @@ class Env(gymnasium.Env):
     def __init__(
         self, problem: Source, controllers: Sequence[str] | None = None, randomized: bool = True, **options: Any
     ) -> None:
-        """Compile the step; see ``VectorEnv`` for the arguments."""
+        """Compile the step; the arguments are those of ``VectorEnv``."""
         step = compile_step(problem, controllers, **options)
         self.motions = Motions(step, 1, randomized)
         self.observation_space, self.action_space = spaces(step)
 
     def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Any, Info]:
-        """Begin anew: the observation (o,)."""
+        """Restart the episode; return the observation (o,)."""
         super().reset(seed=seed, options=options)
         self.motions.begin(np.ones(1, bool), self.np_random)
         return observed(self.motions.observation[0]), {}
 
     def step(self, action: ArrayLike) -> tuple[Any, float, bool, bool, Info]:
-        """Observation (o,), reward, terminated, truncated, and nothing else."""
+        """Take a step; return the observation (o,), the reward, terminated, truncated and no info."""
         (reward,), (over,), (late,) = self.motions.advance(np.asarray(action, float)[None])
         return observed(self.motions.observation[0]), float(reward), bool(over), bool(late), {}
 
 
 def spaces(step: CompiledStep) -> tuple[Any, Any]:
-    """Of observations and of actions, in single precision as agents have them."""
+    """Return the spaces of observations (o,) and actions (m,), in single precision as agents use it."""
     unbounded = np.full(step.observation_size, np.inf)
     return (
         Box(observed(-unbounded), observed(unbounded), dtype=np.float32),
@@ -176,5 +182,5 @@ def spaces(step: CompiledStep) -> tuple[Any, Any]:
 
 
 def observed(values: Array) -> NDArray[np.float32]:
-    """Numbers in single precision."""
+    """Convert to single precision."""
     return values.astype(np.float32)

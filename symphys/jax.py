@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symphys.api.compiled import CompiledRollout, compile
-from symphys.api.loading import Source
-from symphys.api.stepping import CompiledStep, compile_step
+from symphys.api.compiled import CompiledRollout, CompiledStep, compile, compile_step
 from symphys.errors import SymphysError
+from symphys.problem.loading import Source
 from symphys.transcription.open_step import StepResult, StepStart
 from symphys.transcription.recorded_rollout import RecordedRollout
 
@@ -31,13 +30,16 @@ Array = Any
 
 
 def rollout(problem: Source, *quantities: str, smoothing: float = 0.0, backend: str = "auto") -> JaxRollout:
-    """A problem's rollout as a function of Z (B, n): the value of each row, and quantities over time if asked for.
+    """Compile a problem's rollout as a differentiable function of Z (B, n).
 
     Args:
         problem: what ``symphys.load`` takes.
         quantities: formulas as in problem files, such as ``ball.position``.
-        smoothing: of the contacts [m/s].
-        backend: see ``symphys.compile``.
+        smoothing: width of the smoothed contact laws [m/s]; 0 is the exact law.
+        backend: what evaluates, as in ``symphys.compile``.
+
+    Returns:
+        A function of Z: values (B,); with quantities a tuple of values and of each quantity (B, N, k).
 
     Raises:
         SymphysError: a quantity is no formula, or names what the problem does not have.
@@ -54,12 +56,15 @@ def rollout(problem: Source, *quantities: str, smoothing: float = 0.0, backend: 
 
 
 def step(problem: Source, controllers: Sequence[str] | None = None, **options: Any) -> JaxStep:
-    """One step with the commands open, for batches of states and actions.
+    """Compile one time step with the commands open, for batches of states and actions.
 
     Args:
         problem: what ``symphys.load`` takes.
-        controllers: names of those that are left open; see ``symphys.compile_step`` for None, and for errors.
-        options: of ``symphys.compile_step``.
+        controllers: names of the controllers that actions replace, as in ``symphys.compile_step``.
+        options: further arguments of ``symphys.compile_step``.
+
+    Raises:
+        SymphysError: as ``symphys.compile_step``.
 
     Example:
         >>> import jax, symphys.jax
@@ -74,52 +79,71 @@ def step(problem: Source, controllers: Sequence[str] | None = None, **options: A
 
 
 class JaxRollout:
-    """A problem's rollout as a function of Z (B, n): the value of each row, and quantities over time if asked for."""
+    """A problem's rollout as a differentiable function of Z (B, n): values, and quantities over time.
+
+    Attributes:
+        compiled: the rollout on numpy arrays.
+        recording: the rollout with its quantities; None without quantities.
+    """
 
     def __init__(self, problem: Source, *quantities: str, smoothing: float = 0.0, backend: str = "auto") -> None:
-        """See ``rollout``."""
+        """Compile the rollout; the arguments are those of ``rollout``."""
         require_double()
         self.compiled: CompiledRollout = compile(problem, smoothing, backend)
         self.recording = self.compiled.recording(*quantities) if quantities else None
 
     def z(self, values: Mapping[str, ArrayLike] | None = None, /, **variables: ArrayLike) -> Array:
-        """(n,): the guess, with some variables replaced by name."""
+        """Return the guess as a decision vector (n,), with some variables replaced by name."""
         return jnp.asarray(self.compiled.z(values, **variables))
 
     def __call__(self, Z: Array) -> Any:
-        """(B,) the values of Z (B, n); with quantities (value, quantity, ...), each (B, N, k) at the ends of steps."""
+        """Return the values (B,) of Z (B, n); with quantities also each of these (B, N, k), at the ends of steps."""
         rows = jnp.asarray(Z, np.float64)
         return rollout_value(self.compiled, rows) if self.recording is None else recorded_value(self.recording, rows)
 
 
 class JaxStep:
-    """One step with the commands open, for batches of states and actions; see ``symphys.compile_step``."""
+    """One time step with the commands open, differentiable, for batches of states and actions.
+
+    Attributes:
+        compiled: the step on numpy arrays.
+        state_size: the number s of entries of a state.
+        action_size: the number m of entries of an action.
+        observation_size: the number o of entries of an observation.
+        steps: the number of steps of a motion.
+    """
 
     def __init__(self, problem: Source, controllers: Sequence[str] | None = None, **options: Any) -> None:
-        """See ``step``."""
+        """Compile the step; the arguments are those of ``step``."""
         require_double()
         self.compiled: CompiledStep = compile_step(problem, controllers, **options)
         self.state_size, self.action_size = self.compiled.state_size, self.compiled.action_size
         self.observation_size, self.steps = self.compiled.observation_size, self.compiled.steps
 
     def start(self, count: int = 1, seed: int | None = None) -> StepStart:
-        """Where motions begin; see ``CompiledStep.start``."""
+        """Return the states (B, s), observations (B, o) and inputs (B, N, i) with which motions start.
+
+        Args:
+            count: the number B of motions.
+            seed: seed of the samples of scenarios; None: the problem's own, ``count`` times.
+        """
         return StepStart(*(jnp.asarray(part) for part in self.compiled.start(count, seed)))
 
     def __call__(self, state: Array, action: Array, inputs: Array | None = None) -> StepResult:
-        """State and observation after a step, and its cost; gradients flow to the state, the action and the inputs.
+        """Return state and observation after a step, and its cost; gradients flow to all three arguments.
 
         Args:
             state: (B, s).
             action: (B, m).
-            inputs: (B, i) what acts besides, ``start.inputs[:, k]``; None: what the guess has at that time.
+            inputs: (B, i) forces and commands that act as well, ``start.inputs[:, k]``; None: those of the guess at
+                the time of the state.
         """
         given = None if inputs is None else jnp.asarray(inputs, np.float64)
         return StepResult(*step_value(self.compiled, jnp.asarray(state), jnp.asarray(action, np.float64), given))
 
 
 def require_double() -> None:
-    """SymphysError where JAX computes in single precision."""
+    """Raise SymphysError if JAX computes in single precision."""
     if not jax.config.jax_enable_x64:
         text = 'JAX is set to single precision; say jax.config.update("jax_enable_x64", True) first'
         raise SymphysError(f"symphys.jax computes in double precision: {text}")
@@ -127,18 +151,18 @@ def require_double() -> None:
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def rollout_value(compiled: CompiledRollout, Z: Array) -> Array:
-    """See ``JaxRollout``."""
+    """Evaluate the values (...,) of Z (..., n) on the host."""
     return on_host(lambda rows: (compiled.value(rows),), [Z], [()])[0]
 
 
 def rollout_forward(compiled: CompiledRollout, Z: Array) -> tuple[Array, Array]:
-    """The value, and the gradient for the way back."""
+    """Evaluate the values, and the gradients for the backward pass."""
     value, slope = on_host(compiled.value_and_gradient, [Z], [(), (compiled.n,)])
     return value, slope
 
 
 def rollout_backward(_compiled: CompiledRollout, slope: Array, adjoint: Array) -> tuple[Array]:
-    """The adjoint of Z."""
+    """Return the adjoint of Z."""
     return (adjoint[..., None] * slope,)
 
 
@@ -147,7 +171,7 @@ rollout_value.defvjp(rollout_forward, rollout_backward)
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def recorded_value(recording: RecordedRollout, Z: Array) -> tuple[Array, ...]:
-    """See ``JaxRollout``."""
+    """Evaluate the values and the quantities (..., N, k) of Z (..., n) on the host."""
 
     def called(rows: Any) -> tuple[Any, ...]:
         value, found = recording.forward(rows)
@@ -157,12 +181,12 @@ def recorded_value(recording: RecordedRollout, Z: Array) -> tuple[Array, ...]:
 
 
 def recorded_forward(recording: RecordedRollout, Z: Array) -> tuple[tuple[Array, ...], Array]:
-    """The same, and Z for the way back."""
+    """Evaluate values and quantities; keep Z for the backward pass."""
     return recorded_value(recording, Z), Z
 
 
 def recorded_backward(recording: RecordedRollout, Z: Array, adjoints: tuple[Array, ...]) -> tuple[Array]:
-    """The adjoint of Z."""
+    """Return the adjoint of Z."""
 
     def pulled(rows: Any, value: Any, *found: Any) -> tuple[Any]:
         return (recording.pull(rows, value, dict(zip(recording.quantities, found, strict=True))),)
@@ -175,7 +199,7 @@ recorded_value.defvjp(recorded_forward, recorded_backward)
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def step_value(step: CompiledStep, state: Array, action: Array, inputs: Array | None) -> tuple[Array, ...]:
-    """See ``JaxStep``."""
+    """Take the step on the host."""
     called = [state, action] if inputs is None else [state, action, inputs]
     return on_host(lambda *rows: tuple(step(*rows)), called, [(step.state_size,), (step.observation_size,), ()])
 
@@ -183,12 +207,12 @@ def step_value(step: CompiledStep, state: Array, action: Array, inputs: Array | 
 def step_forward(
     step: CompiledStep, state: Array, action: Array, inputs: Array | None
 ) -> tuple[tuple[Array, ...], tuple[Array, Array, Array | None]]:
-    """The step, and what it was called with for the way back."""
+    """Take the step; keep its arguments for the backward pass."""
     return step_value(step, state, action, inputs), (state, action, inputs)
 
 
 def step_backward(step: CompiledStep, called: tuple[Array, ...], adjoints: tuple[Array, ...]) -> tuple[Array, ...]:
-    """The adjoints of state, action and inputs."""
+    """Return the adjoints of state, action and inputs."""
     state, action, inputs = called
     rows = [state, action, *adjoints] + ([] if inputs is None else [inputs])
     sizes = [(step.state_size,), (step.action_size,), (step.input_size,)]
@@ -200,12 +224,12 @@ step_value.defvjp(step_forward, step_backward)
 
 
 def on_host(function: Any, arguments: Sequence[Array], sizes: Sequence[tuple[int, ...]]) -> tuple[Array, ...]:
-    """A function of batches, called from the host; axes before the last are all the batch.
+    """Call a function of batches on the host, with all leading axes flattened into one batch axis.
 
     Args:
-        function: of arrays with one axis for the batch, or two axes; gives a tuple of such arrays.
-        arguments: (..., k) or, of numbers, (...).
-        sizes: of the results behind the batch: (k,), or () for numbers.
+        function: a function of arrays (B, k) or (B, N, k) that returns a tuple of arrays with the same first axis.
+        arguments: arrays (..., k); the first sets the leading axes.
+        sizes: shapes of the results behind the leading axes: (k,), or () for numbers.
     """
     batch = arguments[0].shape[:-1]
 

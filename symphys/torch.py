@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from symphys.api.compiled import CompiledRollout, compile
-from symphys.api.loading import Source
-from symphys.api.stepping import CompiledStep, compile_step
+from symphys.api.compiled import CompiledRollout, CompiledStep, compile, compile_step
+from symphys.problem.loading import Source
 from symphys.transcription.open_step import StepResult, StepStart
 from symphys.transcription.recorded_rollout import RecordedRollout
 from symphys.types import Array
@@ -27,16 +26,20 @@ except ImportError as error:
 Tensor = Any
 """torch.Tensor"""
 Policy = Callable[[Tensor], Tensor]
+"""A function from observations (B, o) to actions (B, m)."""
 
 
 def rollout(problem: Source, *quantities: str, smoothing: float = 0.0, backend: str = "auto") -> TorchRollout:
-    """A problem's rollout as a function of Z (B, n): the value of each row, and quantities over time if asked for.
+    """Compile a problem's rollout as a differentiable function of Z (B, n).
 
     Args:
         problem: what ``symphys.load`` takes.
         quantities: formulas as in problem files, such as ``ball.position``.
-        smoothing: of the contacts [m/s].
-        backend: see ``symphys.compile``.
+        smoothing: width of the smoothed contact laws [m/s]; 0 is the exact law.
+        backend: what evaluates, as in ``symphys.compile``.
+
+    Returns:
+        A function of Z: values (B,); with quantities a tuple of values and of each quantity (B, N, k).
 
     Raises:
         SymphysError: a quantity is no formula, or names what the problem does not have.
@@ -56,12 +59,15 @@ def rollout(problem: Source, *quantities: str, smoothing: float = 0.0, backend: 
 
 
 def step(problem: Source, controllers: Sequence[str] | None = None, **options: Any) -> TorchStep:
-    """One step with the commands open, for batches of states and actions.
+    """Compile one time step with the commands open, for batches of states and actions.
 
     Args:
         problem: what ``symphys.load`` takes.
-        controllers: names of those that are left open; see ``symphys.compile_step`` for None, and for errors.
-        options: of ``symphys.compile_step``.
+        controllers: names of the controllers that actions replace, as in ``symphys.compile_step``.
+        options: further arguments of ``symphys.compile_step``.
+
+    Raises:
+        SymphysError: as ``symphys.compile_step``.
 
     Example:
         >>> import torch, symphys.torch
@@ -77,56 +83,77 @@ def step(problem: Source, controllers: Sequence[str] | None = None, **options: A
 
 
 class TorchRollout:
-    """A problem's rollout as a function of Z (B, n): the value of each row, and quantities over time if asked for."""
+    """A problem's rollout as a differentiable function of Z (B, n): values, and quantities over time.
+
+    Attributes:
+        compiled: the rollout on numpy arrays.
+        recording: the rollout with its quantities; None without quantities.
+    """
 
     def __init__(self, problem: Source, *quantities: str, smoothing: float = 0.0, backend: str = "auto") -> None:
-        """See ``rollout``."""
+        """Compile the rollout; the arguments are those of ``rollout``."""
         self.compiled: CompiledRollout = compile(problem, smoothing, backend)
         self.recording = self.compiled.recording(*quantities) if quantities else None
 
     def z(self, values: Mapping[str, ArrayLike] | None = None, /, **variables: ArrayLike) -> Tensor:
-        """(n,): the guess, with some variables replaced by name."""
+        """Return the guess as a decision vector (n,), with some variables replaced by name."""
         return torch.from_numpy(self.compiled.z(values, **variables))
 
     def __call__(self, Z: Tensor) -> Any:
-        """(B,) the values of Z (B, n); with quantities (value, quantity, ...), each (B, N, k) at the ends of steps."""
+        """Return the values (B,) of Z (B, n); with quantities also each of these (B, N, k), at the ends of steps."""
         if self.recording is None:
             return RolloutFunction.apply(Z, self.compiled)
         return RecordingFunction.apply(Z, self.recording)
 
 
 class TorchStep:
-    """One step with the commands open, for batches of states and actions; see ``symphys.compile_step``."""
+    """One time step with the commands open, differentiable, for batches of states and actions.
+
+    Attributes:
+        compiled: the step on numpy arrays.
+        state_size: the number s of entries of a state.
+        action_size: the number m of entries of an action.
+        observation_size: the number o of entries of an observation.
+        steps: the number of steps of a motion.
+    """
 
     def __init__(self, problem: Source, controllers: Sequence[str] | None = None, **options: Any) -> None:
-        """See ``step``."""
+        """Compile the step; the arguments are those of ``step``."""
         self.compiled: CompiledStep = compile_step(problem, controllers, **options)
         self.state_size, self.action_size = self.compiled.state_size, self.compiled.action_size
         self.observation_size, self.steps = self.compiled.observation_size, self.compiled.steps
 
     def start(self, count: int = 1, seed: int | None = None, dtype: Any = None) -> StepStart:
-        """Where motions begin; see ``CompiledStep.start``. ``dtype``: of the observation; None: torch's default."""
+        """Return the states (B, s), observations (B, o) and inputs (B, N, i) with which motions start.
+
+        Args:
+            count: the number B of motions.
+            seed: seed of the samples of scenarios; None: the problem's own, ``count`` times.
+            dtype: type of the observations; None: torch's default.
+        """
         state, observation, inputs = (torch.from_numpy(part) for part in self.compiled.start(count, seed))
         return StepStart(state, observation.to(dtype or torch.get_default_dtype()), inputs)
 
     def __call__(self, state: Tensor, action: Tensor, inputs: Tensor | None = None) -> StepResult:
-        """State and observation after a step, and its cost; gradients flow to the state and to the action.
+        """Return state and observation after a step, and its cost; gradients flow to all three arguments.
 
         Args:
             state: (B, s).
             action: (B, m).
-            inputs: (B, i) what acts besides, ``start.inputs[:, k]``; None: what the guess has at that time.
+            inputs: (B, i) forces and commands that act as well, ``start.inputs[:, k]``; None: those of the guess at
+                the time of the state.
         """
         return StepResult(*StepFunction.apply(state, action, inputs, self.compiled))
 
     def episode(self, policy: Policy, count: int = 1, seed: int | None = None, steps: int | None = None) -> Tensor:
-        """(B,) the costs of whole motions, whose actions a policy gives; gradients flow through all of it.
+        """Run a policy through whole motions and return their costs (B,); gradients flow through every step.
 
         Args:
-            policy: from observations (B, o) to actions (B, m), such as a ``torch.nn.Module``.
-            count: B.
-            seed: of the samples of scenarios; None: the problem's own, ``count`` times.
-            steps: how many; None: those of the problem. Gradients through long motions may grow beyond use.
+            policy: a function from observations (B, o) to actions (B, m), such as a ``torch.nn.Module``.
+            count: the number B of motions.
+            seed: seed of the samples of scenarios; None: the problem's own, ``count`` times.
+            steps: number of steps; None: those of the problem. Gradients through long motions may become too large
+                to be useful.
         """
         state, observation, inputs = self.start(count, seed)
         total = torch.zeros(count, dtype=observation.dtype)
@@ -137,11 +164,11 @@ class TorchStep:
 
 
 class RolloutFunction(torch.autograd.Function):
-    """Values, and their gradients, which are computed with them."""
+    """Values of rollouts; their gradients are computed together with them."""
 
     @staticmethod
     def forward(ctx: Any, Z: Tensor, compiled: CompiledRollout) -> Tensor:
-        """See ``TorchRollout``."""
+        """Evaluate Z, with gradients if any are needed."""
         rows = numbers(Z)
         if not Z.requires_grad:
             return like(Z, compiled.value(rows))
@@ -152,17 +179,17 @@ class RolloutFunction(torch.autograd.Function):
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, adjoint: Tensor) -> tuple[Tensor, None]:
-        """The adjoint of Z."""
+        """Return the adjoint of Z."""
         (slope,) = ctx.saved_tensors
         return adjoint[..., None] * slope, None
 
 
 class RecordingFunction(torch.autograd.Function):
-    """Values and quantities, and their adjoint, for which they are computed again."""
+    """Values and quantities of rollouts; their adjoint evaluates the rollouts again."""
 
     @staticmethod
     def forward(ctx: Any, Z: Tensor, recording: RecordedRollout) -> tuple[Tensor, ...]:
-        """See ``TorchRollout``."""
+        """Evaluate Z, and keep it for the adjoint."""
         ctx.called, ctx.kind = (recording, numbers(Z)), Z.new_empty(0)
         value, found = recording.forward(ctx.called[1])
         return tuple(like(Z, part) for part in (value, *found.values()))
@@ -170,20 +197,20 @@ class RecordingFunction(torch.autograd.Function):
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, *adjoints: Tensor) -> tuple[Tensor, None]:
-        """The adjoint of Z."""
+        """Return the adjoint of Z."""
         recording, rows = ctx.called
         value, *found = map(numbers, adjoints)
         return like(ctx.kind, recording.pull(rows, value, dict(zip(recording.quantities, found, strict=True)))), None
 
 
 class StepFunction(torch.autograd.Function):
-    """A step, and its adjoint, for which it is computed again."""
+    """A step; its adjoint evaluates the step again."""
 
     @staticmethod
     def forward(
         ctx: Any, state: Tensor, action: Tensor, inputs: Tensor | None, step: CompiledStep
     ) -> tuple[Tensor, ...]:
-        """See ``TorchStep``."""
+        """Take the step, and keep its arguments for the adjoint."""
         given = None if inputs is None else numbers(inputs)
         ctx.called = step, numbers(state), numbers(action), given
         ctx.kinds = [None if each is None else each.new_empty(0) for each in (state, action, inputs)]
@@ -193,7 +220,7 @@ class StepFunction(torch.autograd.Function):
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, *adjoints: Tensor) -> tuple[Tensor | None, ...]:
-        """The adjoints of state, action and inputs."""
+        """Return the adjoints of state, action and inputs."""
         step, state, action, given = ctx.called
         slopes = step.pull(state, action, *(numbers(adjoint) for adjoint in adjoints), inputs=given)
         back = (None if kind is None else like(kind, slope) for kind, slope in zip(ctx.kinds, slopes, strict=True))
@@ -201,10 +228,10 @@ class StepFunction(torch.autograd.Function):
 
 
 def numbers(tensor: Tensor) -> Array:
-    """A tensor's numbers here, in double precision."""
+    """Copy a tensor to the host, in double precision."""
     return np.asarray(tensor.detach().cpu().numpy(), np.float64)
 
 
 def like(tensor: Tensor, values: ArrayLike) -> Tensor:
-    """Numbers as a tensor of the precision and on the device of another."""
+    """Return numbers as a tensor with the precision and the device of another."""
     return torch.as_tensor(np.asarray(values), dtype=tensor.dtype, device=tensor.device)

@@ -1,4 +1,4 @@
-"""A simulated motion as plain arrays: what is recorded, drawn and examined. The fields are those of trajectory.npz."""
+"""Simulated motions as arrays, with the fields of trajectory.npz."""
 
 from __future__ import annotations
 
@@ -22,13 +22,11 @@ OF_BODIES = {
     "force": "N",
     "torque": "N m",
 }
-"""The quantities of a body by their fields, and their units."""
+"""Fields of the quantities of a body, with their units."""
 COORDINATES = ("joint_value", "joint_rate", "joint_torque", "joint_command")
-"""Fields with as many columns as the joint has coordinates, or one number where there is one."""
-
-
+"""Fields with a column for each coordinate of a joint; of a joint with one coordinate they have no columns."""
 NAMED = 6
-"""Contacts in a message."""
+"""Largest number of contacts in a message."""
 
 
 class NotFinite(SymphysError):
@@ -37,36 +35,35 @@ class NotFinite(SymphysError):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """N steps of B bodies with C pairs and J joints; world frame, SI units, velocities true at their time.
+    """A motion of N steps of B bodies with C contacts and J joints, in the world frame and SI units.
 
-    The types of the fields hold the shapes.
+    Quantities are also found by the names that formulas use: ``motion["ball.position"]``, ``motion["knee.angle"]``;
+    ``units`` lists these names.
 
     Attributes:
-        time: (N + 1,) [s].
-        body_names: (B,).
-        position: [m].
+        time: (N + 1,) instants [s].
+        body_names: (B,) names of the bodies.
+        position: positions of the centres of mass [m].
         orientation: unit quaternions w x y z.
-        velocity: [m/s].
-        angular_velocity: [rad/s].
-        force: applied at the centre of mass [N].
-        torque: applied [N m].
-        contact_names: (C,).
-        contact_force: on the pair's first body, impulse over the step / dt [N]. Leapfrog applies half of a
-            substep's impulse in the next one: a contact that begins shows up to a quarter less in its first step.
-        contact_gap: [m]; the last row repeats the one before it.
-        residual: largest change of an impulse in the last sweep [N s].
-        crowded: 1 where a body had two or more impacts at once, or impacts of a chain come late.
-        ambiguous: 1 where several bodies met at one instant and rebounded.
-        paradox: 1 where friction pulled a sliding contact together.
-        joint_names: (J,).
-        joint_value, joint_rate: coordinates [rad] or [m] and their rates; K is that of the joint that has
-            most, NaN where another has fewer.
-        joint_torque: of motors [N m] or [N]; 0 without one.
-        joint_command: commands of motors, in the unit of their kind; 0 without one.
-        joint_separation: distance of the frames along the directions that a joint locks [m].
-        joint_units: (J,) of the coordinates, "rad" or "m"; empty in older files.
-
-    Quantities also go by the names of formulas: ``motion["ball.position"]``, ``motion["knee.angle"]``; see ``units``.
+        velocity: velocities at the instants [m/s].
+        angular_velocity: angular velocities at the instants [rad/s].
+        force: applied forces at the centres of mass [N], constant over a step.
+        torque: applied torques [N m], constant over a step.
+        contact_names: (C,) names of the contacts.
+        contact_force: force on the first body of each contact [N], its impulse over the step / dt. Leapfrog applies
+            half of a substep's impulse in the next one: the first step of a contact shows up to a quarter less.
+        contact_gap: distances of the surfaces [m]; the last row repeats the one before it.
+        residual: largest change of an impulse in the last sweep of the contact solver [N s].
+        crowded: 1 for steps in which a body had two or more impacts at once, or impacts of a chain came late.
+        ambiguous: 1 for steps in which several bodies met at one instant and rebounded.
+        paradox: 1 for steps in which friction pulled a sliding contact together.
+        joint_names: (J,) names of the joints.
+        joint_value, joint_rate: coordinates [rad] or [m] and their rates; K is the largest number of coordinates of a
+            joint, and entries that a joint does not have are NaN.
+        joint_torque: torques [N m] or forces [N] of motors; 0 without a motor.
+        joint_command: commands of motors, in the unit of their kind; 0 without a motor.
+        joint_separation: distances of the joints' frames along locked directions [m].
+        joint_units: (J,) units of the coordinates, "rad" or "m"; empty in older files.
 
     Example:
         >>> import symphys
@@ -99,7 +96,11 @@ class Trajectory:
     joint_units: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Array:
-        """(N + 1, ...), or (N, ...) of what acts in a step: a quantity by its name; KeyError says which there are."""
+        """Return a quantity by its name: (N + 1, ...), or (N, ...) if it acts during steps.
+
+        Raises:
+            KeyError: there is no such quantity; names those that are similar.
+        """
         if name not in self._columns:
             raise KeyError(f"there is no {quote(name)}; {self._meant(name)}")
         field_name, index, _ = self._columns[name]
@@ -115,11 +116,11 @@ class Trajectory:
 
     @property
     def units(self) -> dict[str, str]:
-        """The unit of every quantity by its name: ``{"ball.position": "m", ...}``; empty where there is none."""
+        """The unit of each quantity by its name: ``{"ball.position": "m", ...}``; empty if it has none."""
         return {name: unit for name, (_, _, unit) in self._columns.items()}
 
     def _meant(self, name: str) -> str:
-        """What somebody may have meant who asked for a name that is none."""
+        """Suggest names that are similar to one that does not exist."""
         owner, _, quantity = name.rpartition(".")
         touching = [each for each in self.contact_names if owner in re.split("[-:]", each)]
         if touching and ("contact" in quantity or "gap" in quantity):
@@ -150,11 +151,15 @@ class Trajectory:
         return found
 
     def arrays(self) -> dict[str, NDArray[np.generic]]:
-        """Every field as an array, ready for ``numpy.savez``."""
+        """Return each field as an array, ready for ``numpy.savez``."""
         return {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
 
     def require_finite(self) -> Trajectory:
-        """Itself; NotFinite names the first bad step and body otherwise."""
+        """Return this motion.
+
+        Raises:
+            NotFinite: a number is not finite; names the first such step and its bodies.
+        """
         moving = np.concatenate([self.position, self.orientation, self.velocity, self.angular_velocity], axis=2)
         bad = ~np.isfinite(moving).all(axis=2)
         if bad.any():
@@ -166,7 +171,7 @@ class Trajectory:
 
 @cache
 def shapes() -> dict[str, tuple[str, ...]]:
-    """The sizes of every array over states or steps by their letters: ``{"position": ("N + 1", "B", "3"), ...}``."""
+    """Return the sizes of each array as letters: ``{"position": ("N + 1", "B", "3"), ...}``."""
     hints = get_type_hints(Trajectory, include_extras=True)
     return {
         name: tuple(hint.__metadata__[0].split(", ")) for name, hint in hints.items() if hasattr(hint, "__metadata__")

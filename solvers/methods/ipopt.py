@@ -148,9 +148,7 @@ def stage(
 def build(evaluator: CountingEvaluator, options: IpoptOptions, iterations: int, watch: Watch, text: Path) -> Any:
     """The nlpsol over x = z / scale, with the smoothing as its parameter."""
     if evaluator.problem.nlp.expression is None:
-        raise SymphysError(
-            "IPOPT needs expressions, which nets this large do not have; take gradient or cma"
-        )
+        raise SymphysError("IPOPT needs expressions, which nets this large do not have; take gradient or cma")
     nlp, derivatives = functions(evaluator.problem.nlp, evaluator.scale, options.hessian == "exact")
     own = {
         **SILENT,

@@ -1,1 +1,1 @@
-"""What Python calls: load, solve, simulate, compile, read. Everything here is handed on by ``symphys`` itself."""
+"""The Python interface: load, solve, simulate, compile, read. ``symphys`` itself exports its public names."""

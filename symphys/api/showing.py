@@ -1,4 +1,4 @@
-"""A problem's motion before anything is solved, as a figure and as a page."""
+"""Draw a problem's motion before anything is solved, as a figure and as a page."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ def show(
     page: str | Path | None = None,
     **variables: ArrayLike,
 ) -> Figure:
-    """Draw the motion of a problem from the side and from above: of its guess, or of other values of its variables.
+    """Draw the motion of a problem from the side and from above, with its guess or with other values.
 
     Args:
         problem: what ``load`` takes, or a robot by itself: a shipped one, ``"robots/arm.toml"``, or a file that
-            problems may include. It falls to the ground, and motors that aim at an angle or a position hold the start.
-        values: of variables by name.
-        page: HTML file to write as well; it plays the motion, and draws states, joints and contacts.
-        variables: the same as ``values``, for names that are words.
+            problems may include. A robot falls to the ground; motors that track an angle or a position hold the start.
+        values: values of variables by name: (components,), or (knots, components).
+        page: an HTML file to write as well; it plays the motion, and draws states, joints and contacts.
+        variables: the same as ``values``, for names that are Python words.
 
     Returns:
         A matplotlib figure.
 
     Raises:
-        NotFinite: names the time step and the body where numbers stop being finite.
-        SymphysError: no such problem or variable, or numbers that do not fit.
+        NotFinite: a number of the motion is not finite; names the time step and the body.
+        SymphysError: there is no such problem or variable, or the shape of its values does not fit.
 
     Example:
         >>> import symphys
@@ -65,7 +65,7 @@ def show(
 
 
 def shown(source: Source) -> Problem:
-    """A problem, or a robot alone."""
+    """Load a problem, or make one of a robot by itself."""
     if isinstance(source, str | Path):
         path = Path(source)
         if path.is_file() and is_robot(path):

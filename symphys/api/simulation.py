@@ -1,4 +1,4 @@
-"""One motion: of given values, or by the feedback of a solution."""
+"""Simulate one motion: for given values, or under the feedback of a solution."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from symphys.transcription.staged.tangent import Tangent
 def simulate(
     problem: Source, values: Mapping[str, ArrayLike] | None = None, /, smoothing: float = 0.0, **variables: ArrayLike
 ) -> Trajectory:
-    """The motion of a problem, from its guess, or with other values of its variables.
+    """Simulate a problem with its guess, or with other values of its variables.
 
     Args:
         problem: what ``load`` takes.
-        values: of variables by name, such as ``solution.value``.
-        smoothing: of the contacts [m/s]; 0 is the exact contact law.
-        variables: the same as ``values``, for names that are words.
+        values: values of variables by name, such as ``solution.value``: (components,), or (knots, components).
+        smoothing: width of the smoothed contact laws [m/s]; 0 is the exact law.
+        variables: the same as ``values``, for names that are Python words.
 
     Returns:
-        Arrays over time, world frame, SI units; ``motion["ball.position"]`` (N + 1, 3).
+        Arrays over time, world frame, SI units: ``motion["ball.position"]`` (N + 1, 3).
 
     Raises:
-        NotFinite: names the time step and the body where numbers stop being finite.
-        SymphysError: no such variable, or numbers that do not fit.
+        NotFinite: a number of the motion is not finite; names the time step and the body.
+        SymphysError: there is no such variable, or the shape of its values does not fit.
 
     Example:
         >>> import symphys
@@ -49,7 +49,14 @@ def simulate(
 def follow(
     problem: Problem, gains: Gains, start: ArrayLike | Mapping[str, ArrayLike] | None, feedback: bool
 ) -> Trajectory:
-    """The motion from a start, by the gains of a solution; see ``Solution.rollout``."""
+    """Simulate from a start under the feedback gains of a solution, as ``Solution.rollout`` does.
+
+    Args:
+        problem: the problem that was solved.
+        gains: the gains of its solution.
+        start: quantities of the first state by name, or the whole state (nx,); None: the problem's.
+        feedback: whether the gains act.
+    """
     made = transcribed(problem, True, "casadi")
     assert made.shooting.staged is not None, "there are gains"
     staged, z = made.shooting.staged(), gains["z"]

@@ -1,4 +1,4 @@
-"""What a solve found, by the names of the problem."""
+"""Solutions: the results of solves, by the names that the problem uses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from symphys.api import figures, notebook, tables
+from symphys.api import views
 from symphys.errors import SymphysError
 from symphys.problem import Problem, load_problem
 from symphys.results.archives import read_archive
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution:
-    """One solve: what was found, and how well it does in the exact rollout.
+    """The result of one solve, judged by the exact rollout.
 
     In a notebook it shows its verdict, its checks and its motion.
 
     Attributes:
         folder: the run folder that it is read from.
-        run: everything that result.json holds: ``counts``, ``seconds``, ``stages``, ``trust``, ``versions``, ...
-        given: the problem that was solved, where it is at hand.
+        run: everything that result.json holds: ``counts``, ``seconds`` [s], ``stages``, ``trust``, ``versions``, ...
+        given: the problem that was solved; None if it is read from the folder when it is needed.
     """
 
     folder: Path
@@ -55,17 +55,17 @@ class Solution:
 
     @property
     def verdict(self) -> str:
-        """A word: "solved", "doubted", "best", "not solved", ...; see the documents on verification."""
+        """The verdict in a word: "solved", "doubted", "best", "not solved", ...; the documents define them."""
         return self.run.verdict
 
     @property
     def advice(self) -> str:
-        """How the solver ended, and what to try where it did not come there."""
+        """The reason why the solver ended, and what to try if it did not reach a solution."""
         return self.run.advice
 
     @property
     def objective(self) -> float:
-        """Of the exact rollout."""
+        """The objective of the exact rollout."""
         return self.run.objective
 
     @property
@@ -85,34 +85,34 @@ class Solution:
 
     @cached_property
     def value(self) -> dict[str, Array]:
-        """The variables by name: (components,), or (knots, components) where there are several knots; SI units."""
+        """The variables by name, SI units: (components,), or (knots, components) of variables with several knots."""
         found = {name: each.value for name, each in self.run.z.items()}
         return {name: value[:, 0] if value.shape[1] == 1 else value.T for name, value in found.items()}
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The motion, exactly: arrays over time, such as ``trajectory["ball.position"]`` (N + 1, 3)."""
+        """The motion of the exact rollout, world frame, SI units: ``trajectory["ball.position"]`` (N + 1, 3)."""
         return read_trajectory(self.folder / TRAJECTORY)
 
     @cached_property
     def gains(self) -> dict[str, Array]:
-        """Feedback about the motion, of solvers that find it (``ilqr``): the arrays of gains.npz; of others none."""
+        """The feedback gains about the motion, arrays of gains.npz; empty unless the solver finds them (``ilqr``)."""
         path = self.folder / GAINS
         return read_archive(path) if path.exists() else {}
 
     def rollout(self, start: ArrayLike | Mapping[str, ArrayLike] | None = None, feedback: bool = True) -> Trajectory:
-        """The motion from another start, with controls that answer what the state is off by the gains.
+        """Simulate from another start; the gains correct the controls by the deviation of the state.
 
         Args:
-            start: what differs from the problem's first state, by name as ``Controller`` takes it: ``shoulder.angle``,
-                ``rail.rate``, ``ball.position``; or the whole state (nx,). None: nothing does.
-            feedback: whether the gains act; else the controls are as they were found.
+            start: quantities of the first state that differ from the problem's, by name as ``Controller`` takes them:
+                ``shoulder.angle``, ``rail.rate``, ``ball.position``; or the whole state (nx,). None: the problem's.
+            feedback: whether the gains act; otherwise the controls are those of the solution.
 
         Raises:
             SymphysError: the solver found no gains, or there is no such name.
-            NotFinite: as ``simulate``.
+            NotFinite: a number of the motion is not finite; names the time step and the body.
         """
-        from symphys.api.simulation import follow  # late: most read, and roll nothing out
+        from symphys.api.simulation import follow  # late: it needs the dynamics, which reading a solution does not
 
         if not self.gains:
             text = f"{self.folder}: there is no {GAINS}; ilqr finds gains, where its solve was not interrupted"
@@ -121,36 +121,36 @@ class Solution:
 
     @property
     def trace(self) -> Trace:
-        """The iterations, column by column: ``trace["objective"]``, ``trace["seconds"]``, ..."""
+        """The iterations, an array for each column: ``trace["objective"]``, ``trace["seconds"]`` [s], ..."""
         return self.run.trace
 
     @cached_property
     def problem(self) -> Problem:
-        """What was solved; where it is read from the folder, ProblemError if it has controllers that Python gives."""
+        """The problem that was solved; ProblemError if the folder's has controllers with functions given in Python."""
         if self.given is not None:
             return self.given
         read_in = load_problem(self.folder / PROBLEM, read_config(self.folder / CONFIG).settings)
         return replace(read_in, name=self.run.problem)
 
     def plot(self, *names: str) -> Figure:
-        """A figure of the motion from the side and from above, or of quantities against time.
+        """Draw the motion from the side and from above, or plot quantities against time.
 
         Args:
             names: none for the motion; else quantities of the trajectory, ``"ball.position"``, ``"knee.angle"``,
                 ``"ball-ground.force"``, or columns of the trace, ``"trace.objective"``: a panel each.
         """
         if not names:
-            return figures.draw(self.folder, self.trajectory)
-        return figures.plot(self.trajectory, self.trace, names)
+            return views.draw_run(self.folder, self.trajectory)
+        return views.plot(self.trajectory, self.trace, names)
 
     def report(self) -> Path:
-        """Write the full page of the run into its folder, with its figures as SVG and CSV; the path of the page."""
+        """Write the full page of the run into its folder, with figures as SVG and CSV; return the page's path."""
         from symphys.report import write_run_report
 
         return write_run_report(self.folder)
 
     def replay(self) -> Replay:
-        """Roll out what was found again, from the problem and the settings in its folder, and compare to the bit.
+        """Simulate the solution again from the files of its folder, and compare bit for bit.
 
         Returns:
             ``same``, the ``differences`` of quantities, and which versions and processor are not those of the run.
@@ -158,14 +158,14 @@ class Solution:
         Raises:
             SymphysError: a file is missing or damaged, or the solver found nothing.
         """
-        from symphys.runs.replay import replay  # late: most read, and roll nothing out
+        from symphys.runs.replay import replay  # late: it needs the dynamics, which reading a solution does not
 
         return replay(self.folder)
 
     def save_figures(self, folder: str | Path) -> list[Path]:
         """Write every figure of the report into a folder: NAME.svg, and NAME.csv with the numbers that it shows.
 
-        A column of a table belongs to the nearest column of time, work or knots to its left.
+        The abscissa of a column of a CSV file is the nearest column of time, work or knots to its left.
 
         Returns:
             Their paths. There are motion, states, contacts and convergence, and, where there is something to show,
@@ -182,26 +182,29 @@ class Solution:
         return write_run_figures(self.folder, Path(folder))
 
     def to_pandas(self, what: str = "trajectory") -> Any:
-        """A pandas.DataFrame: "trajectory", a row for each time, or "trace", a row for each iteration."""
+        """Return a pandas.DataFrame: "trajectory", a row for each time, or "trace", a row for each iteration."""
         if what not in ("trajectory", "trace"):
             raise SymphysError(f"there is no table {quote(what)}; {hint(what, ('trajectory', 'trace'))}")
-        return tables.trace_frame(self.trace) if what == "trace" else tables.motion_frame(self.trajectory)
+        return views.trace_frame(self.trace) if what == "trace" else views.motion_frame(self.trajectory)
 
     def to_xarray(self) -> Any:
-        """An xarray.Dataset of the trajectory, with units."""
-        return tables.to_xarray(self.trajectory)
+        """Return an xarray.Dataset of the trajectory, with units; what acts during a step ends with nan."""
+        return views.motion_dataset(self.trajectory)
 
     def __repr__(self) -> str:
-        """The verdict in a line."""
-        return notebook.line(self.run)
+        """Return the verdict in a line."""
+        return views.line(self.run)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        return notebook.html(self.run)
+        """Return the HTML that a notebook shows."""
+        return views.html(self.run)
 
 
 def read(folder: str | Path) -> Solution:
-    """The solution in a run folder, which ``symphys solve`` or ``solve`` with a ``folder`` has written.
+    """Read the solution in a run folder, which ``symphys solve`` or ``solve`` with a ``folder`` has written.
+
+    Args:
+        folder: the run folder, such as ``reports/ball_throw/gradient-seed0``.
 
     Raises:
         SymphysError: it is no run folder, or has no result that can be read.

@@ -1,4 +1,4 @@
-"""One solve, from a problem to its solution."""
+"""Solve one problem with one solver."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ from symphys.solvers import TraceRow
 from symphys.transcription import Transcription, guessed
 
 Progress = Callable[[TraceRow], None]
+"""A function that is called with each iteration."""
 Guess = Solution | str | Path
-"""What names a run whose solution is a guess."""
+"""A run whose solution is the guess: the solution, or the path of its folder."""
 
 
 def solve(
@@ -45,27 +46,29 @@ def solve(
 
     Args:
         problem: what ``load`` takes.
-        solver: its name; None: the first that the problem names, else the one that fits it best, see
-            ``symphys.runs.choice``; then ``solution.run.provenance["chosen"]`` says why.
-        seed: 0 starts from the guess; others from one perturbed by the ``spread`` of each variable.
-        guess: another run from which to start, a solution or the path of its folder: its variables by name, on any grid
-            of knots, step or duration, and with ``multiple_shooting`` its motion and multipliers. The log in the run
-            folder says what did not fit.
-        folder: where run folders are kept, as by ``symphys solve --out``: what is done already is not done again, what
-            was interrupted goes on. None: nothing is kept.
+        solver: the name of a solver. None: the first that the problem names, else the one that suits its structure
+            (``symphys.runs.choice``); ``solution.run.provenance["chosen"]`` then gives the reason.
+        seed: 0 starts from the guess; other seeds perturb it by the ``spread`` of each variable.
+        guess: another run to start from, a solution or the path of its folder: its variables by name, resampled from
+            any knots, step or duration, and with ``multiple_shooting`` its motion and multipliers. The log in the run
+            folder lists what could not be taken over.
+        folder: the folder in which run folders are kept, as with ``symphys solve --out``: a run that is done is read,
+            an interrupted one is resumed. None: the run is removed together with the solution.
         examine: whether to examine how far the solution can be trusted, which may take longer than the solve.
         backend: what evaluates: "auto", "simd", "simd32", "c", "cuda", "cuda32" or "casadi".
-        threads: that share a batch; None: one for each processor.
-        progress: sees each iteration: its ``iteration``, ``objective``, ``max_violation``, ``seconds``.
-        options: of the solver, as in its table [solver.NAME]: ``iterations=200``; its ``backend`` by ``problem.set``.
+        threads: number of threads that share a batch; None: one for each processor.
+        progress: a function that is called with each iteration: its ``iteration``, ``objective``, ``max_violation``
+            and ``seconds``.
+        options: options of the solver, as in its table [solver.NAME]: ``iterations=200``. An option named ``backend``
+            is set by ``problem.set``.
 
     Returns:
-        The solution, whether or not it is one; see ``solved`` and ``verdict``.
+        The best point that was found, whether or not it solves the problem; ``solved`` and ``verdict`` tell.
 
     Raises:
         ProblemError: the problem or an option cannot be used; says what would be valid.
         SymphysError: there is no such solver or backend, the run failed, or nothing of the guess fits.
-        KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call goes on from there.
+        KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call resumes.
 
     Example:
         >>> import symphys
@@ -91,7 +94,7 @@ def solve(
 
 
 def guess_of(source: Guess | None) -> RunGuess | None:
-    """What a run found, if one is named; SymphysError if there is nothing."""
+    """Read the solution of the run that is the guess, if one is named; SymphysError if it has none."""
     if source is None:
         return None
     return read_guess_run(source.folder if isinstance(source, Solution) else source)
@@ -99,7 +102,7 @@ def guess_of(source: Guess | None) -> RunGuess | None:
 
 @contextmanager
 def kept(folder: str | Path | None) -> Iterator[Path]:
-    """The folder, or a temporary one, which goes only where nothing comes of it."""
+    """Yield the folder, or a temporary one, which is removed if the block raises."""
     if folder is not None:
         yield Path(folder)
         return
@@ -112,7 +115,7 @@ def kept(folder: str | Path | None) -> Iterator[Path]:
 
 
 def run(job: Job, problem: Problem, backend: str, threads: int | None, progress: Progress | None) -> Result:
-    """Do what is asked for into its folder; options of a solver do not change what is compiled for the problem."""
+    """Execute a job in its folder, with the transcription of a problem that differs in solver options only."""
     with linear_algebra.limited(), Interrupts().listening() as stop:
 
         def monitor(row: TraceRow) -> None:

@@ -1,4 +1,4 @@
-"""Batches: problems times points of sweeps times solvers times seeds, as ``symphys solve`` does them."""
+"""Solve batches: problems times points of sweeps times solvers times seeds, as ``symphys solve`` does."""
 
 from __future__ import annotations
 
@@ -32,18 +32,19 @@ from symphys.suggest import hint
 from symphys.transcription import transcribe
 
 BatchProgress = Callable[[str, TraceRow], None]
-"""Sees which run it is, ``"ball_throw gradient seed 0"``, and its iteration."""
+"""A function that is called with the name of a run, ``"ball_throw gradient seed 0"``, and its iteration."""
 
 
 class How(TypedDict, total=False):
-    """How a batch is done.
+    """Limits of a batch, and what its runs start from.
 
     Attributes:
         retries: how often a run that fails is tried again; 0 if not given.
-        timeout: [s] of a run, building and compiling included; with a folder, the same call goes on with what it stops.
-            A run that has to end at a time has a process of its own, which is killed 1 s after it was asked to stop.
-        budget: [s] of all; likewise.
-        rerun: what is done again although it is over: "failed", "changed" (by another version of symphys) or "all".
+        timeout: largest time of a run [s], transcription and compilation included. With a folder, the same call resumes
+            runs that were stopped. A run with a limit has its own process, which is killed 1 s after the signal to
+            stop.
+        budget: largest time of all runs together [s], likewise.
+        rerun: which finished runs are done again: "failed", "changed" (by another version of symphys) or "all".
         guess: another run from which all start, as in ``solve``.
     """
 
@@ -70,29 +71,31 @@ def solve_all(
     scheduler: str | None = None,
     **how: Unpack[How],
 ) -> list[Solution]:
-    """Solve problems with solvers from seeds. No run's failure stops the others.
+    """Solve problems with several solvers and seeds. A run that fails does not stop the others.
 
     Args:
-        problems: each what ``load`` takes. Those of one name get numbers behind it: ``ball_throw``, ``ball_throw-2``.
-        solvers: their names; None: for each problem those that it names, else those that fit it.
-        seeds: how many, from 0 on, or which; 0 starts from the guess.
-        jobs: how many runs at once, in processes, as with limits; a script then needs ``if __name__ == "__main__":``.
-        folder: of run folders, as by ``symphys solve --out``; what is done is not done again. None: nothing is kept.
+        problems: each what ``load`` takes. Problems of equal name are numbered: ``ball_throw``, ``ball_throw-2``.
+        solvers: names of solvers; None: for each problem those that it names, else those that suit it.
+        seeds: the number of seeds, counted from 0, or the seeds; 0 starts from the guess.
+        jobs: number of runs at once, each in its own process if there are several or a limit of time; a script then
+            needs ``if __name__ == "__main__":`` around its own work.
+        folder: the folder in which run folders are kept, as with ``symphys solve --out``: runs that are done are read.
+            None: the runs are removed together with the last of the solutions.
         examine: whether to examine how far solutions can be trusted.
-        multi_start: whether to solve the seeds of a problem side by side, their evaluations in batches.
+        multi_start: whether to solve all seeds of a problem in one process, with their evaluations in batches.
         backend: as in ``solve``.
-        progress: sees each iteration; none of those that are done elsewhere.
+        progress: a function that is called with each iteration of runs on this machine.
         on: ``"dask"`` or ``"slurm"``: ``jobs`` drivers do the runs elsewhere; needs a ``folder`` that all machines see.
         scheduler: as ``symphys solve --scheduler``; None: dask workers here, Slurm with its defaults.
-        sweep: a table like [sweep] in a problem file, in its place; None: the file's; ``{}``: nothing is swept.
-        how: ``retries``, ``timeout``, ``budget``, ``rerun`` and ``guess``, see ``How``.
+        sweep: a table that replaces [sweep] of the problem file; None: the file's; ``{}``: no sweep.
+        how: ``retries``, ``timeout`` [s], ``budget`` [s], ``rerun`` and ``guess``, as ``How`` describes.
 
     Returns:
-        Problems times points times solvers times seeds, in this order; ``run.status`` may be "failed".
+        The solutions, ordered by problem, point, solver and seed; ``run.status`` of a run may be "failed".
 
     Raises:
-        SymphysError: a problem, a point or an argument cannot be used; before anything is solved.
-        KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call goes on from there.
+        SymphysError: a problem, a point or an argument cannot be used; nothing has been solved then.
+        KeyboardInterrupt: after Ctrl-C; with a ``folder``, the same call resumes.
 
     Example:
         >>> import symphys
@@ -117,13 +120,13 @@ def solve_all(
 
 
 def transcriber(backend: str, shared: bool) -> Transcribe:
-    """What transcribes problems, by a known backend; ``shared``: the processors are for several runs at once."""
+    """Return the function that transcribes problems: on one thread each if several runs share the processors."""
     require_backend(backend)
     return partial(transcribe, backend=backend, threads=1 if shared else None)
 
 
 def solutions_kept(todo: Sequence[Job], batch: BatchResult, temporary: Path | None) -> list[Solution]:
-    """The solutions in the order of the jobs; a temporary folder goes with the last of them."""
+    """Read the solutions in the order of the jobs; the last of them removes a temporary folder."""
     solutions = list(solutions_of(todo, batch))
     if temporary is not None:
         drop_with(solutions, temporary)
@@ -131,7 +134,7 @@ def solutions_kept(todo: Sequence[Job], batch: BatchResult, temporary: Path | No
 
 
 def points_of(problem: Problem, table: Mapping[str, Any] | None) -> Iterable[Problem]:
-    """The problems of a sweep, that of a table or the problem's own; the problem itself where nothing is swept."""
+    """Return the problems of a sweep, given by a table or by the problem; the problem itself without a sweep."""
     own = problem.sweep
     if table is not None:
         own = read_sweep(plain(table), "solve_all") if table else None
@@ -139,7 +142,7 @@ def points_of(problem: Problem, table: Mapping[str, Any] | None) -> Iterable[Pro
 
 
 def limits_of(how: How) -> BatchLimits:
-    """The bounds of a batch; SymphysError for what cannot be."""
+    """Check and collect the limits of a batch."""
     rerun, retries = how.get("rerun"), how.get("retries", 0)
     times = [how.get("timeout"), how.get("budget")]
     if rerun is not None and rerun not in RERUN:
@@ -150,7 +153,7 @@ def limits_of(how: How) -> BatchLimits:
 
 
 def check_engine(on: str | None, scheduler: str | None, folder: str | Path | None, multi_start: bool) -> None:
-    """SymphysError for arguments that do not go together."""
+    """Raise SymphysError for arguments that contradict each other."""
     if scheduler and not on:
         raise SymphysError(f"scheduler={scheduler!r} needs on: {' or '.join(map(repr, ENGINES))}")
     if on and on not in ENGINES:
@@ -162,7 +165,7 @@ def check_engine(on: str | None, scheduler: str | None, folder: str | Path | Non
 
 
 def numbered(problems: Iterable[Problem]) -> Iterator[Problem]:
-    """Problems with names of their own."""
+    """Append numbers to names that occur more than once."""
     seen: Counter[str] = Counter()
     for problem in problems:
         seen[problem.name] += 1
@@ -171,7 +174,7 @@ def numbered(problems: Iterable[Problem]) -> Iterator[Problem]:
 
 
 def solutions_of(jobs: Sequence[Job], batch: BatchResult) -> Iterator[Solution]:
-    """The solutions in the order of the jobs; KeyboardInterrupt where the batch was interrupted."""
+    """Read the solutions in the order of the jobs; raise KeyboardInterrupt if the batch was interrupted."""
     if batch.interrupted:
         over = sum(result is not None and not result.interrupted for result in batch.results)
         raise KeyboardInterrupt(f"{over} of {len(jobs)} runs are done; with a folder, the same call goes on from there")
@@ -197,11 +200,11 @@ def drop_with(solutions: Sequence[Solution], out: Path) -> None:
 
 @dataclass(frozen=True)
 class ProgressObserver(Observer):
-    """An observer that passes on the iterations of a batch."""
+    """Pass the iterations of a batch to a function."""
 
     progress: BatchProgress | None
 
     def advanced(self, job: Job, row: TraceRow) -> None:
-        """Pass it on."""
+        """Report an iteration."""
         if self.progress:
             self.progress(job.name, row)

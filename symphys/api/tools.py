@@ -1,4 +1,4 @@
-"""Small commands: copies of shipped files, the schema of problem files, the kept kernels."""
+"""Small commands: copies of shipped files, the schema of problem files, the cache of kernels."""
 
 from __future__ import annotations
 
@@ -13,14 +13,18 @@ from symphys.solvers import SOLVERS, solver
 
 
 def new(file: str | Path, source: str = "ball_throw") -> Path:
-    """Write a copy of a shipped problem, robot or task, to be changed.
+    """Copy a shipped problem, robot or task to a file of your own.
 
     Args:
-        file: to write; one that is there already is not overwritten.
-        source: its name; ``symphys.problems.catalogue()`` has the problems, ``symphys.problems.parts()`` the others.
+        file: the file to write, which must not exist.
+        source: the name of what to copy: a problem of ``symphys.problems.catalogue()``, or a robot or task of
+            ``symphys.problems.parts()``.
+
+    Returns:
+        The path of the file.
 
     Raises:
-        SymphysError: nothing of that name is shipped, or the file is there already.
+        SymphysError: nothing of that name is shipped, or the file exists.
 
     Example:
         >>> import symphys
@@ -35,7 +39,7 @@ def new(file: str | Path, source: str = "ball_throw") -> Path:
 
 
 def schema() -> dict[str, Any]:
-    """The JSON Schema of problem files, with which editors complete and check them.
+    """Return the JSON Schema of problem files, with which editors complete and check them.
 
     Example:
         >>> import symphys
@@ -46,7 +50,7 @@ def schema() -> dict[str, Any]:
 
 
 def cache() -> Cache:
-    """The compiled kernels on disk: ``info()`` says where they are and how large, ``clear()`` removes them.
+    """Return the cache of compiled kernels on disk: ``info()`` has its folder and size, ``clear()`` empties it.
 
     Example:
         >>> import symphys

@@ -1,4 +1,4 @@
-"""Problems made ready to compute, kept for the next call."""
+"""Transcriptions of problems, cached: the next call for the same problem compiles nothing."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
     from symphys.transcription.staged.linearization import Linearization
 
 KEPT = 8
-"""How many are kept: the kernels of one problem may take hundreds of megabytes."""
+"""Size of each cache: the kernels of one problem may take hundreds of megabytes."""
 
 
 @lru_cache(maxsize=KEPT)
 def transcribed(problem: Problem, exact: bool, backend: str, threads: int | None = None) -> Transcription:
-    """See ``transcribe``; the same object for the same problem."""
+    """Transcribe a problem, as ``symphys.transcription.transcribe`` does."""
     return transcribe(problem, exact, backend, threads)
 
 
 @lru_cache(maxsize=KEPT)
 def linearized(problem: Problem, exact: bool, backend: str, threads: int | None = None) -> Linearization:
-    """See ``Linearization``; the same object for the same problem."""
+    """Compile the Jacobians of the steps of a problem."""
     from symphys.transcription.staged.linearization import Linearization
 
     return Linearization(transcribed(problem, exact, backend, threads).rollout, backend, threads, exact)
@@ -40,7 +40,7 @@ def stepped(
     backend: str,
     threads: int | None,
 ) -> CompiledStep:
-    """See ``compile_step``; the same object for the same problem."""
+    """Compile a step with open commands, as ``compile_step`` does."""
     from symphys.transcription.open_step import compile_open_step
 
     return compile_open_step(problem, controllers, sensors, smoothing, backend, threads)
@@ -50,7 +50,7 @@ def stepped(
 def recorded(
     problem: Problem, quantities: tuple[str, ...], smoothing: float, backend: str, threads: int | None = None
 ) -> RecordedRollout:
-    """See ``record_rollout``; the same object for the same problem."""
+    """Compile a rollout with quantities over time as outputs."""
     from symphys.transcription.recorded_rollout import record_rollout
 
     return record_rollout(problem, quantities, smoothing, backend, threads)

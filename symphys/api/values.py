@@ -1,4 +1,4 @@
-"""The numbers of variables by name, as people write them, and as one vector z."""
+"""Values of variables by name, and as one decision vector z."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from symphys.types import Array
 
 
 def shape_of(block: VariableBlock) -> tuple[int, ...]:
-    """(components,), or (knots, components) where there are several knots."""
+    """Return the shape of a variable's values: (components,), or (knots, components) with several knots."""
     components, knots = block.shape
     return (components,) if knots == 1 else (knots, components)
 
 
 def by_name(shooting: ShootingProblem, z: Array) -> dict[str, Array]:
-    """The parts of z (n,): (components,), or (knots, components) where there are several knots."""
+    """Split z (n,) into variables by name: (components,), or (knots, components) of those with several knots."""
     return {block.name: z[block.start : block.stop].reshape(shape_of(block)) for block in shooting.blocks}
 
 
 def vector(shooting: ShootingProblem, values: Mapping[str, ArrayLike]) -> Array:
-    """(n,): the guess with some variables replaced.
+    """Return the guess as a decision vector z (n,), with some variables replaced.
 
     Args:
-        shooting: of the problem.
-        values: by the names of variables; a number, or one for each component, holds for all knots.
+        shooting: the shooting problem, which has the variables.
+        values: values by the names of variables; a number, or one for each component, holds for all knots.
 
     Raises:
-        SymphysError: no variable has that name, or the numbers do not fit it; says what would.
+        SymphysError: no variable has that name, or the shape of its values does not fit; says which would.
     """
     z, blocks = shooting.start(0), {block.name: block for block in shooting.blocks}
     for name, value in values.items():
@@ -44,7 +44,7 @@ def vector(shooting: ShootingProblem, values: Mapping[str, ArrayLike]) -> Array:
 
 
 def fitted(block: VariableBlock, value: Any) -> Array:
-    """(components * knots,) of a value."""
+    """Broadcast a value to all components and knots of a variable: (components * knots,)."""
     given, wanted = np.asarray(value, float), shape_of(block)
     if given.ndim == 1 and given.size == int(np.prod(wanted)):
         return given

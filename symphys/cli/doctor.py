@@ -11,7 +11,7 @@ from symphys import threads
 def doctor() -> int:
     """Say what symphys finds on this machine, try each thing, and say what to do about what does not work."""
     threads.limit()
-    from symphys.doctor import examine, healthy
+    from symphys.machine import examine, healthy
 
     findings = []
     for finding in examine():

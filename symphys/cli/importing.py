@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from symphys.api.robots.robot import Robot
+    from symphys.api.robot import Robot
 
 STYLES = {"taken": "green", "approximated": "yellow", "left out": "red", "recovered": "cyan"}
 """Colours of findings on a terminal."""
@@ -56,7 +56,7 @@ def import_robot(
 
     MuJoCo does the reading, which `pip install 'symphys[robots]'` brings. The file that is written is for [[include]].
     """
-    from symphys.api.robots.robot import load_robot
+    from symphys.api.robot import load_robot
 
     robot = load_robot(
         model,

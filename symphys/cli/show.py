@@ -74,7 +74,7 @@ def show(
 
 def tell_losses(path: Path, include: Mapping[str, Any]) -> None:
     """Say how much of a model was approximated or left out."""
-    from symphys.api.robots.robot import load_robot
+    from symphys.api.robot import load_robot
 
     found = [finding.kind for finding in load_robot(path, **include).findings]
     kinds = [f"{found.count(kind)} {kind}" for kind in ("approximated", "left out", "recovered") if kind in found]

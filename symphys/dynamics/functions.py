@@ -172,7 +172,8 @@ def step_function(
         A function of x (see ``Layout``), u, p and smoothing [m/s] >= 0, where 0 is the exact step.
 
     Example:
-        >>> from symphys import Body, Layout, Plane, Scheme, initial_state, make_world, step_function
+        >>> from symphys import step_function
+        >>> from symphys.model import Body, Layout, Plane, Scheme, initial_state, make_world
         >>> world = make_world([Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1))], [Plane.ground()])
         >>> step = step_function(world, Scheme(dt=0.01), ["ball.force"])
         >>> x = step(initial_state(world), [0.5, 0, 0], [], 0)

@@ -24,7 +24,9 @@ def roll_out(step: ca.Function, steps: int, x0: Expr, u: Expr, p: Expr, smoothin
         The states (nx, N + 1) that include x0, then each further output of ``step``, N columns of them.
 
     Example:
-        >>> from symphys import Body, Layout, Plane, initial_state, make_world, roll_out, step_function
+        >>> from symphys import step_function
+        >>> from symphys.dynamics.horizon import roll_out
+        >>> from symphys.model import Body, Layout, Plane, initial_state, make_world
         >>> world = make_world([Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1))], [Plane.ground()])
         >>> (x,) = roll_out(step_function(world), 100, initial_state(world), [], [], 0)
         >>> x[Layout(world)["ball.position"], :].shape  # expressions, in any casadi problem

@@ -281,9 +281,8 @@ def _late(constraint: ContactConstraint, impulse: ContactImpulse, momenta: Momen
     """Impulse and momenta with the late normal impulse; friction of surfaces that slide grows in proportion."""
     assert constraint.soft is not None
     late = ca.if_else(impulse.normal > 0, constraint.soft.late, 0)
-    most = constraint.law.friction * impulse.normal
-    given = ca.sqrt(ca.dot(impulse.tangent, impulse.tangent) + TINY_SQUARE)
-    share = ca.if_else(given > SLIDES * most, late / ca.fmax(impulse.normal, TINY_SQUARE), 0)
+    slides = constraint.friction.beyond(impulse.tangent, impulse.normal, SLIDES)
+    share = ca.if_else(slides, late / ca.fmax(impulse.normal, TINY_SQUARE), 0)
     more, found = replace(ZERO, normal=late, tangent=share * impulse.tangent), []
     push = more.linear(constraint.impulse_normal)
     for term, m in zip(constraint.terms, momenta, strict=True):

@@ -1,12 +1,11 @@
-"""Files for other programs: C sources, casadi functions, MuJoCo models. ``symphys.export(problem, c=...)`` writes."""
+"""Files for other programs: C sources, casadi functions, MuJoCo models. ``export_problem`` writes."""
 
 from symphys.export.casadi_files import casadi_files
 from symphys.export.folder import ExportError, write_folders
 from symphys.export.mjcf import MjcfModel, mjcf, mjcf_files, mjcf_model, problem_model
 from symphys.export.mjcf_departures import Departure
 from symphys.export.sources import c_files
-from symphys.export.writing import export
-from symphys.verbs import make_callable
+from symphys.export.writing import export_problem
 
 __all__ = [
     "Departure",
@@ -14,12 +13,10 @@ __all__ = [
     "MjcfModel",
     "c_files",
     "casadi_files",
-    "export",
+    "export_problem",
     "mjcf",
     "mjcf_files",
     "mjcf_model",
     "problem_model",
     "write_folders",
 ]
-
-make_callable(__name__, export)

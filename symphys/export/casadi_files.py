@@ -1,4 +1,4 @@
-"""A problem as serialised functions: plain casadi loads them, without symphys."""
+"""Write a problem as serialised functions that casadi loads without symphys."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RESULTS = {
     "jacobian": ("residuals", "objective", "errors", "jacobian", "outputs"),
     "nlp": ("objective", "constraints"),
 }
-"""The functions of (z, smoothing), as in ``ShootingProblem``."""
+"""The results of each function of (z, smoothing), as in ``ShootingProblem``."""
 INTRODUCTION = """{title}
 
 Written by symphys {version} from the problem {problem}, with casadi {casadi}. Each file holds a function:
@@ -37,7 +37,7 @@ squares of the residuals. smoothing [m/s] >= 0 rounds off contact; 0 is the exac
 
 
 def casadi_files(transcription: Transcription, version: str) -> dict[str, bytes]:
-    """name -> content of every file."""
+    """Return the files, name -> content."""
     functions = {"step": dense_step(transcription.rollout), "linearize": slopes_function(tangent_of(transcription))}
     if transcription.rollout.feedback is not None:
         functions["control"] = transcription.rollout.feedback

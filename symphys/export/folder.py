@@ -1,4 +1,4 @@
-"""Folders of exported files: what somebody else wrote or changed there is never overwritten."""
+"""Write folders of exported files; a file that somebody else wrote or changed is never overwritten."""
 
 from __future__ import annotations
 
@@ -10,20 +10,23 @@ from symphys import files
 from symphys.errors import SymphysError
 
 LIST = "symphys-export.json"
-"""In each folder: the files that were written, with the SHA-256 sums of what they may hold."""
+"""Name of the file in each folder that lists the exported files with their SHA-256 sums."""
 
 Files = Mapping[str, bytes]
 
 
 class ExportError(SymphysError):
-    """Something that cannot be exported, or a file in the way."""
+    """A problem that cannot be exported, or a file in the way."""
 
 
 def write_folders(folders: Mapping[Path, Files]) -> list[Path]:
-    """Write all files of all folders, each at once and whole; nothing if one of them is in the way.
+    """Write the files of all folders, each atomically; write none if a file is in the way.
+
+    Returns:
+        The paths of the files.
 
     Raises:
-        ExportError: names the file that was not written from here, or was changed since.
+        ExportError: names the file that was not exported, or was changed since.
         FileError: a folder cannot be written.
     """
     for folder, contents in folders.items():

@@ -1,29 +1,30 @@
-"""A world and its start as MJCF, the model files of MuJoCo.
+"""Write a world and its start as MJCF, the model files of MuJoCo.
 
-Written as they are: bodies where the coordinates of joints are 0, their frames at the centres of mass, inertias, trees
-of joints with the coordinates that they have here, frames without mass as several joints of one body, springs, dampers,
-armature, torque motors and affine ones, gravity, time step, surfaces, sites, and which surfaces may touch: geoms meet
-in explicit pairs only. The start is the keyframe ``start``. Where coordinates 0 would open a loop, bodies are written
-at the start, and joints have their coordinates there as ``ref``.
+These parts are exact: bodies where the coordinates of joints are 0, with frames at the centres of mass; inertias; trees
+of joints with the coordinates of this package; frames without mass, as several joints of one body; springs, dampers,
+armature, torque motors, affine motors, gravity, time step, surfaces and sites. Geoms touch in explicit pairs only. The
+start is the keyframe ``start``. Where coordinates 0 would open a loop, bodies are written at the start, and joints have
+their coordinates there as ``ref``.
 
-For some things MuJoCo has laws of its own:
+For other parts MuJoCo has different laws:
 
-- Contacts, limits, dry friction, couplings and joints that close a loop are springs and dampers there, which act over
-  several steps, with their default softness; here they are rigid. Friction of contacts is on the same disc (elliptic
+- Contacts, limits, dry friction, couplings and joints that close a loop are rigid here. In MuJoCo they are springs and
+  dampers of default softness, which act over several steps. Friction of contacts is bounded by the same disc (elliptic
   cone); torsion and rolling share one ellipsoid with it.
-- A servo here aims at the velocity clip(gain (command - angle), +-velocity), and reaches it within a step unless that
-  takes more than its torque. Nearest is a position actuator with kp = gain kv and the same bound of force. It aims at
-  gain (command - angle), not held in +-velocity, and gives all of its torque only where the velocity is off by torque /
-  kv: it sags under load. kv is 100 torque / velocity, or what the time step takes without swinging (``moving.step``).
-- A velocity motor likewise becomes a velocity actuator with that kv.
-- The time step is cut into parts where motors, springs or contacts that give way need it.
-- A contact that gives way has the same frequency and damping ratio, by MuJoCo's own estimate of the mass behind it.
-- Terrain is smooth here and triangles there, and ends at the edge of its grid.
+- A servo here reaches the velocity clip(gain (command - angle), +-velocity) within a step unless that needs more than
+  its torque. The nearest actuator is a position actuator with kp = gain kv and the same bound of force. It drives at
+  gain (command - angle), without a bound on velocity, and needs a velocity error of torque / kv for its full torque, so
+  that it sags under load. kv is 100 torque / velocity, or the largest at which the time step is stable
+  (``mjcf_actuation``).
+- A velocity motor becomes a velocity actuator with the same kv.
+- The time step is cut into parts where motors, springs or compliant contacts need it.
+- A compliant contact has the same frequency and damping ratio, with MuJoCo's estimate of the mass behind it.
+- Terrain is smooth here. In MuJoCo it consists of triangles, and ends at the edge of its grid.
 
-Such actuators are stiff, hence the integrator ``implicitfast``. What has no counterpart is refused, or left out where
-that is asked for: restitution, some joints that give way or close a loop, terrain without a grid. ``Departure`` is one
-of all these, and the file begins with them. Variables, objectives and controllers are no part of a model, and commands
-are its ctrl, 0 at the start.
+Such actuators are stiff, hence the integrator ``implicitfast``. Parts without a counterpart are refused, or left out on
+request: restitution, some compliant joints, some joints that close a loop, terrain without a grid. A ``Departure``
+describes each difference, and the file begins with all of them. Variables, objectives and controllers are not part of a
+model; commands are its ctrl, 0 at the start.
 """
 
 from __future__ import annotations
@@ -38,15 +39,14 @@ import casadi as ca
 import numpy as np
 
 from symphys.dynamics.motion import inertia_matrix
+from symphys.export.mjcf_actuation import actuators, inertias, parts
 from symphys.export.mjcf_bodies import NestedBody, StartState, nested_bodies, relative
 from symphys.export.mjcf_departures import Departure, departures, require_expressible, shorter_step
 from symphys.export.mjcf_equality import equalities
 from symphys.export.mjcf_joints import freedoms
-from symphys.export.mjcf_motors import actuators
 from symphys.export.mjcf_sensors import sensor_elements, site_elements
 from symphys.export.mjcf_surfaces import APART, FRICTION_RATIO, geoms, meshes, pairs, text
 from symphys.export.mjcf_terrain import height_field, middle
-from symphys.export.moving.step import inertias, parts
 from symphys.model.body import Body
 from symphys.model.shapes import Terrain
 from symphys.model.site import Site
@@ -60,8 +60,8 @@ class MjcfModel:
     """A model file.
 
     Attributes:
-        text: of the file.
-        departures: in what it differs from the world.
+        text: the XML.
+        departures: how the model differs from the world.
     """
 
     text: str
@@ -71,7 +71,7 @@ class MjcfModel:
 def problem_model(
     problem: Problem, approximate: bool = False, stiffer: Mapping[tuple[str, str], float] = MappingProxyType({})
 ) -> MjcfModel:
-    """The model of a problem's world; see ``mjcf_model``."""
+    """Write the world of a problem as a model; the other arguments are those of ``mjcf_model``."""
     dt, name = problem.simulation.dt, problem.name
     laws = [Departure("left out", (law.name,), "a force law; MuJoCo has no formulas") for law in problem.forces]
     text = "numbers that hold in a phase alone; a model of MuJoCo has one of each"
@@ -82,12 +82,12 @@ def problem_model(
 
 
 def mjcf_files(problem: Problem, approximate: bool = False) -> dict[str, bytes]:
-    """name -> content of the one file; ExportError names what MJCF cannot say."""
+    """Return the file of a problem's model, name -> content; ExportError names what MJCF cannot express."""
     return {f"{problem.name}.xml": problem_model(problem, approximate).text.encode()}
 
 
 def mjcf(world: World, initial: Mapping[str, Any], dt: float, name: str = "world", approximate: bool = False) -> str:
-    """The text of a model; see ``mjcf_model``."""
+    """Return the text of a model; the arguments are those of ``mjcf_model``."""
     return mjcf_model(world, initial, dt, name, approximate=approximate).text
 
 
@@ -102,20 +102,20 @@ def mjcf_model(
     approximate: bool = False,
     stiffer: Mapping[tuple[str, str], float] = MappingProxyType({}),
 ) -> MjcfModel:
-    """A model, and in what it departs from the world.
+    """Write a world as a model, together with its differences from the world.
 
     Args:
-        world: plain numbers, no symbols.
-        initial: the bodies' state at the start by name, SI units, world frame; see ``state.initial_state``.
+        world: a world of numbers, without symbols.
+        initial: the state at the start by name, SI units, world frame, as ``symphys.model.initial_state`` takes it.
         dt: time step [s].
-        name: of the model.
-        sensors: of the problem.
-        laws: what of the problem's force laws is left out.
-        approximate: leave out what MJCF cannot say, instead of refusing it.
-        stiffer: factors on stiffness and damping of contacts that give way, by the names of their surfaces.
+        name: name of the model.
+        sensors: sensors of the problem.
+        laws: departures for the force laws and phases of the problem.
+        approximate: leave out what MJCF cannot express, instead of refusing it.
+        stiffer: factors on stiffness and damping of compliant contacts, by the names of their surfaces.
 
     Raises:
-        ExportError: names all that MJCF cannot say.
+        ExportError: names everything that MJCF cannot express.
     """
     start = StartState(world, initial)
     felt = sensor_elements(world, sensors)
@@ -153,34 +153,38 @@ def mjcf_model(
 
 
 def one_line(words: str) -> str:
-    """What may stand in a comment of XML."""
+    """Escape a text for a comment of XML."""
     return words.replace("--", "- -").rstrip("-")
 
 
 def ground(start: StartState, terrain: Terrain) -> Element:
-    """The geom of a height field."""
+    """Write the geom of a height field."""
     place = {"pos": text(middle(start, terrain))}
     return Element("geom", {"name": terrain.name, "type": "hfield", "hfield": terrain.name, **place, **APART})
 
 
 class Keyframe:
-    """Bodies as nested elements, and the numbers of the start in the order in which MuJoCo meets their joints."""
+    """Nested elements of bodies, and the coordinates of the start in MuJoCo's order of joints.
+
+    Attributes:
+        qpos, qvel: the coordinates and velocities of the keyframe, filled while elements are written.
+    """
 
     def __init__(self, start: StartState, found: list[NestedBody], sites: Sequence[Site]) -> None:
-        """Nothing written so far."""
+        """Begin with an empty keyframe."""
         self.start, self.nested, self.sites = start, found, sites
         self.qpos: list[float] = []
         self.qvel: list[float] = []
 
     def parts(self, parent: int | None) -> Iterator[Element]:
-        """What is fixed in a body, or in the world, and its children with their subtrees."""
+        """Write the sites and the child bodies of a body; those of the world for None."""
         yield from site_elements(self.sites, parent)
         for nested in self.nested:
             if nested.parent == parent:
                 yield self.body(nested)
 
     def body(self, nested: NestedBody) -> Element:
-        """A body: where it is in its parent's frame, how it may move, what it is."""
+        """Write a body: its pose in its parent's frame, its joints, inertia, geoms, sites and children."""
         body = self.start.world.bodies[nested.body]
         place, turn = relative(self.start.reference, nested)
         element = Element("body", name=body.name, pos=text(place), quat=text(turn))
@@ -195,7 +199,7 @@ class Keyframe:
 
 
 def moments(body: Body) -> dict[str, str]:
-    """Moments of inertia along the body's axes, or the tensor where these are not its principal ones."""
+    """Write the moments of inertia about the body's axes, or the tensor if these are not principal axes."""
     tensor = np.array(ca.DM(inertia_matrix(body.inertia)))
     if not (tensor - np.diag(np.diag(tensor))).any():
         return {"diaginertia": text(np.diag(tensor))}

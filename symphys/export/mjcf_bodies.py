@@ -1,4 +1,4 @@
-"""The bodies of a world as MJCF nests them, each with the chain of joints that holds it to its parent."""
+"""Nest the bodies of a world as MJCF does, each with the chain of joints to its parent."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from symphys.problem.joint_tables import placed_joint, whole_state
 from symphys.types import Array
 
 APART = 1e-5
-"""[m], [rad]: what of a joint's frames must not be apart."""
+"""Largest gap between the frames of a joint [m], [rad]."""
 RESIDUE = 1e-15
-"""[m], or of unit vectors: what is below is rounding."""
+"""Largest rounding error, of lengths [m] or of components of unit vectors."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class StartState:
     """A world in a state: at the start, or as the file of its model has it.
 
     Attributes:
-        world: plain numbers only.
-        initial: what of the bodies' state is not zero, by name; see ``state.initial_state``.
+        world: a world of numbers, without symbols.
+        initial: the state by name, as ``symphys.model.initial_state`` takes it.
     """
 
     world: World
@@ -42,69 +42,69 @@ class StartState:
 
     @cached_property
     def x(self) -> ca.DM:
-        """The state."""
+        """The state vector (nx,)."""
         return ca.DM(initial_state(self.world, self.initial))
 
     def of(self, body: int, field: str) -> Array:
-        """(k,): a field of a body, world frame."""
+        """Return a quantity (k,) of a body, such as "position", world frame."""
         return np.array(self.x[self.layout[f"{self.world.bodies[body].name}.{field}"]]).ravel()
 
     @cached_property
     def layout(self) -> Layout:
-        """Of the state."""
+        """The layout of the state vector."""
         return Layout(self.world)
 
     def axes(self, body: int | None) -> Array:
-        """(3, 3): from the body's frame to the world's."""
+        """Return the rotation matrix (3, 3) from a body's frame to the world's; the identity for None."""
         return np.eye(3) if body is None else np.array(rotation.matrix(ca.DM(self.of(body, "orientation"))))
 
     @cached_property
     def readings(self) -> dict[str, Reading]:
-        """Of every joint."""
+        """The coordinates and rates of each joint, by its name."""
         return readings(self.world, ca.SX(self.x))
 
     def values(self, joint: Joint) -> Array:
-        """(k,): the coordinates of a joint [rad] or [m]."""
+        """Return the coordinates (k,) of a joint [rad] or [m]."""
         return tidy(plain(self.readings[joint.name].value))
 
     def gap(self, joint: Joint) -> float:
-        """How far the frames of a joint are apart, or turned, as far as it holds them [m], [rad]."""
+        """Return how far the frames of a joint violate it: the larger of distance [m] and angle [rad]."""
         reading = self.readings[joint.name]
         return float(max(plain(reading.separation)[0], plain(reading.tilt)[0]))
 
     @cached_property
     def reference(self) -> StartState:
-        """Where the model's bodies lie in its file: with all coordinates 0, or at the start where that opens a loop."""
+        """The poses that the file has: all coordinates 0, or the start if that would open a loop."""
         world, state = self.world, whole_state(self.world, self.initial)
         zero = StartState(world, moved_to_zero([placed_joint(world, joint, state) for joint in world.joints], state))
         closed = all(zero.gap(joint) <= APART for joint in world.joints if not joint.soft)
         return zero if closed else self
 
-    def directions(self, joint: Joint) -> list[Array]:
-        """(3,) of each coordinate: about which, or along which, the first side moves, world frame."""
+    def motions(self, joint: Joint) -> list[tuple[Array, Array]]:
+        """Return displacement and rotation (3,) of the first side per unit of each coordinate, world frame."""
         poses = tuple((ca.SX(self.of(i, "position")), ca.SX(self.of(i, "orientation"))) for i in joint.bodies)
         placed = joint_frames_at(joint, poses).placed(ca.SX(0))
-        return [plain(coordinate.axis(placed)) for coordinate in joint.kind.coordinates]
+        return [(plain(slide), plain(turn)) for slide, turn in joint.kind.motions(placed)]
 
 
 def tidy(numbers: Array) -> Array:
-    """Without what rounding leaves of 0."""
+    """Replace rounding errors by 0."""
     return np.where(np.abs(numbers) < RESIDUE, 0.0, numbers)
 
 
 def plain(expression: Any) -> Array:
-    """(k,): the numbers of an expression without symbols."""
+    """Evaluate an expression without symbols to numbers (k,)."""
     return np.array(ca.evalf(expression)).ravel()
 
 
 @dataclass(frozen=True)
 class NestedBody:
-    """A body of MJCF: frames without mass are joints of the body that they lead to.
+    """A body of MJCF; frames without mass become joints of the body that they lead to.
 
     Attributes:
-        body: its index.
+        body: index of the body.
         parent: index of the body that it is nested in; None: the world.
-        links: from the parent to the body; one, or more with frames without mass between them.
+        links: the links from the parent to the body; several if there are frames without mass between them.
     """
 
     body: int
@@ -113,7 +113,7 @@ class NestedBody:
 
 
 def nested_bodies(world: World) -> list[NestedBody]:
-    """Every body with mass, in the order of the world's bodies."""
+    """Return each body with mass, in the order of the world's bodies."""
     links = links_of(world)
     merged, by_body, found = merged_frames(world, links), {link.body: link for link in links}, []
     for link in sorted(links, key=lambda link: link.body):
@@ -126,7 +126,7 @@ def nested_bodies(world: World) -> list[NestedBody]:
 
 
 def merged_frames(world: World, links: list[Link]) -> frozenset[int]:
-    """Bodies without mass that lie between two joints of one chain."""
+    """Return the bodies without mass that lie between two joints of one chain."""
     children = Counter(link.parent for link in links)
     return frozenset(
         link.body
@@ -136,15 +136,16 @@ def merged_frames(world: World, links: list[Link]) -> frozenset[int]:
 
 
 def loose_frames(world: World) -> list[int]:
-    """Bodies without mass that are joints of no other body."""
+    """Return the bodies without mass that cannot become joints of another body."""
     merged = merged_frames(world, links_of(world))
     return [k for k, body in enumerate(world.bodies) if body.massless and k not in merged]
 
 
 def nesting_joints(world: World) -> frozenset[int]:
-    """The indices of joints that nest one body in another; what MuJoCo has as equality constraints are the others.
+    """Return the indices of joints that nest one body in another; the others become equality constraints.
 
-    A joint closes a loop if others connect its sides already: those along which something acts, then those before it.
+    A joint closes a loop if earlier ones connect its sides already. Joints along which something acts come first,
+    then all others, in the order of the world.
     """
     groups: dict[int | None, int | None] = {}
 
@@ -164,10 +165,10 @@ def nesting_joints(world: World) -> frozenset[int]:
 
 
 def links_of(world: World) -> list[Link]:
-    """Every body with the joint that holds it to its parent; one that floats has none.
+    """Return each body with the joint to its parent; a floating root has none.
 
-    A tree that the world does not hold begins with the body that is the first side of no joint, if there is one: so
-    children are first sides, and axes keep their signs.
+    The root of a floating tree is a body that is the first side of no joint, if there is one: children are then first
+    sides, and axes keep their signs.
     """
     nesting = {k: world.joints[k] for k in sorted(nesting_joints(world))}
     firsts = {joint.first for joint in nesting.values()}
@@ -181,7 +182,7 @@ def links_of(world: World) -> list[Link]:
 
 
 def grown(joints: Mapping[int, Joint], root: Link) -> list[Link]:
-    """A tree from its root on; parents come before children."""
+    """Collect a tree from its root; parents come before children."""
     links = [root]
     for link in links:
         for k, joint in joints.items():
@@ -192,7 +193,7 @@ def grown(joints: Mapping[int, Joint], root: Link) -> list[Link]:
 
 
 def relative(start: StartState, nested: NestedBody) -> tuple[Array, Array]:
-    """(3,) [m] and (4,): position and orientation of a body in the frame of its parent."""
+    """Return position (3,) [m] and orientation (4,) of a body in the frame of its parent."""
     p, q = start.of(nested.body, "position"), start.of(nested.body, "orientation")
     if nested.parent is None:
         return p, q

@@ -1,4 +1,4 @@
-"""In what a model for MuJoCo departs from the world that it was written from: what is approximated or left out."""
+"""Differences between a model for MuJoCo and the world that it is written from."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Literal
 from symphys.export.folder import ExportError
 from symphys.export.mjcf_bodies import APART, StartState, loose_frames, nesting_joints
 from symphys.export.mjcf_equality import expressible_loop
+from symphys.export.mjcf_joints import joint_equalities
+from symphys.export.mjcf_surfaces import normal_of
 from symphys.export.mjcf_terrain import deviation, window
 from symphys.model.heightfield import Heightfield
 from symphys.model.joints import Servo, VelocityMotor
@@ -16,19 +18,19 @@ from symphys.model.scalar import is_zero
 from symphys.model.shapes import Terrain
 
 LISTED = 5
-"""Names in a message."""
+"""Largest number of names in a message."""
 Kind = Literal["approximated", "left out", "refused", "measured"]
 
 
 @dataclass(frozen=True)
 class Departure:
-    """Something that MJCF has no exact counterpart for.
+    """A part of a world that MJCF has no exact counterpart for.
 
     Attributes:
-        kind: ``approximated`` by what is nearest; ``left out``, which is refused unless it is asked for; ``refused``;
-            ``measured``: found by a trial.
+        kind: ``approximated`` by the nearest element; ``left out``, which is refused unless approximations are allowed;
+            ``refused``; ``measured`` by a trial.
         what: names of joints, contacts, surfaces or sensors.
-        how: what was written instead, or what can be done.
+        how: what is written instead, or a remedy.
     """
 
     kind: Kind
@@ -36,18 +38,18 @@ class Departure:
     how: str
 
     def __str__(self) -> str:
-        """In a line."""
+        """Return kind, names and explanation in a line."""
         return f"{self.kind}: {listed(self.what)}: {self.how}"
 
 
 def listed(names: Sequence[str]) -> str:
-    """The first few of them."""
+    """Join the first few names."""
     more = len(names) - LISTED
     return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def require_expressible(departures: Iterable[Departure], name: str, approximate: bool) -> None:
-    """ExportError with all that has no counterpart, and what can be done."""
+    """Raise ExportError if anything has no counterpart, with all of these and their remedies."""
     refused = [each for each in departures if each.kind == "refused" or (each.kind == "left out" and not approximate)]
     lines = [f"{name}: MJCF cannot say this: {listed(each.what)}: {each.how}" for each in refused]
     if any(each.kind == "left out" for each in refused):
@@ -57,7 +59,7 @@ def require_expressible(departures: Iterable[Departure], name: str, approximate:
 
 
 def departures(start: StartState) -> list[Departure]:
-    """All of a world at its start, those with most consequence first; sensors are not among them."""
+    """Collect the departures of a world at its start, the gravest first; those of sensors are not among them."""
     rounded = [body.name for body in start.world.bodies if any("edge" in shape.sizes for shape in body.shapes)]
     edges = Departure("approximated", tuple(rounded), "a box with round edges, which are sharp in MuJoCo")
     found = [
@@ -72,14 +74,14 @@ def departures(start: StartState) -> list[Departure]:
 
 
 def shorter_step(dt: float, count: int) -> Iterator[Departure]:
-    """The departure of a time step that is cut into parts."""
+    """Yield the departure of a time step that is cut into parts."""
     if count > 1:
         text = f"{dt / count:g} s in place of {dt:g} s, at which MuJoCo does not hold these motors, springs or contacts"
         yield Departure("approximated", ("time step",), text)
 
 
 def joint_departures(start: StartState) -> Iterator[Departure]:
-    """Of joints and motors."""
+    """Yield the departures of joints and motors."""
     world, trees = start.world, nesting_joints(start.world)
     apart = [world.joints[k].name for k in sorted(trees) if start.gap(world.joints[k]) > APART]
     text = "a joint that does not fit its bodies at the start; move them until its frames meet"
@@ -99,18 +101,24 @@ def joint_departures(start: StartState) -> Iterator[Departure]:
 
 
 def contact_departures(start: StartState) -> Iterator[Departure]:
-    """Of the laws of contacts."""
+    """Yield the departures of contact laws."""
     contacts = {pair.name.partition(":")[0]: pair.law for pair in start.world.pairs}
     bouncing = [name for name, law in contacts.items() if not law.soft and not is_zero(law.restitution)]
     text = "restitution, which MuJoCo does not have; give the surfaces restitution 0"
     yield Departure("left out", tuple(bouncing), text)
+    rubbing: dict[str, dict[str, None]] = {}
+    for pair in start.world.pairs:
+        friction = pair.law.mujoco_friction(normal_of(start.world, (pair.first, pair.second)))
+        rubbing.setdefault(friction.departure, {})[pair.name.partition(":")[0]] = None
+    for text, names in rubbing.items():
+        yield Departure("left out", tuple(names) if text else (), text)
     soft = [name for name, law in contacts.items() if law.soft]
     text = "a contact that gives way, with its frequency by MuJoCo's estimate of the mass behind it"
     yield Departure("approximated", tuple(soft), text)
 
 
 def terrain_departures(start: StartState) -> Iterator[Departure]:
-    """Of terrain: MuJoCo's height fields are triangles, and end."""
+    """Yield the departures of terrain: MuJoCo's height fields consist of triangles, and end."""
     for static in start.world.statics:
         if isinstance(static, Terrain):
             grid = window(start, static)
@@ -126,7 +134,7 @@ def terrain_departures(start: StartState) -> Iterator[Departure]:
 
 
 def soft_departures(start: StartState) -> Iterator[Departure]:
-    """What is rigid here and a spring with a damper there, acting over several steps; with default softness."""
+    """Yield the parts that are rigid here, and springs with dampers of default softness in MuJoCo."""
     world, trees = start.world, nesting_joints(start.world)
     if any(not pair.law.soft for pair in world.pairs):
         yield Departure("approximated", ("contacts",), "rigid here; springs and dampers there, of default softness")
@@ -140,5 +148,5 @@ def soft_departures(start: StartState) -> Iterator[Departure]:
     soft = tuple(joint.name for joint in closing if joint.soft)
     text = "a joint that gives way, as an equality constraint of the same frequency and damping ratio"
     yield Departure("approximated", soft, text)
-    coupled = tuple(coupling.name for coupling in world.couplings)
+    coupled = tuple(element.get("name", "") for element in joint_equalities(start.reference))
     yield Departure("approximated", coupled, "a coupling that is exact here and gives way there")

@@ -1,4 +1,4 @@
-"""Joints that close loops, joints that give way, and couplings, as MJCF equality constraints."""
+"""Write joints that close loops, compliant joints, and couplings as MJCF equality constraints."""
 
 from __future__ import annotations
 
@@ -7,40 +7,38 @@ from math import pi
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from symphys.export.mjcf_bodies import StartState, nesting_joints
+from symphys.export.mjcf_joints import joint_equalities
 from symphys.export.mjcf_surfaces import text
 from symphys.maths import rotation
 from symphys.model.joints import Joint
-from symphys.model.joints.coupling import JointCoupling
 from symphys.model.world import World
 
 ARM = 0.05
-"""[m] from the point of a hinge to each of the two points on its axis that are held together."""
+"""Distance of the two points on the axis of a hinge that are held together from its point [m]."""
 IMPEDANCE = 1e-4
-"""The least that MuJoCo takes: the constraint is a spring and damper beside all other forces, not instead of them."""
+"""The least that MuJoCo takes: the constraint acts as a spring and damper in addition to all other forces."""
 
 
 def expressible_loop(world: World, joint: Joint) -> bool:
-    """Whether an equality constraint holds what a joint outside of the trees holds."""
+    """Whether an equality constraint can replace a joint that is not part of the trees."""
     kinds = ("ball", "fixed") if joint.soft else ("ball", "fixed", "hinge")
     return joint.kind.name in kinds and not any(world.bodies[k].massless for k in joint.bodies)
 
 
 def equalities(reference: StartState) -> Iterator[Element]:
-    """Of every joint that no tree holds and that has a counterpart, and of every coupling."""
+    """Write each joint that is not part of the trees and has a counterpart, and each coupling."""
     world = reference.world
     trees = nesting_joints(world)
     for k, joint in enumerate(world.joints):
         if k not in trees and expressible_loop(world, joint):
             yield from loop(world, joint)
-    for coupling in world.couplings:
-        yield coupled(reference, coupling)
+    yield from joint_equalities(reference)
 
 
 def loop(world: World, joint: Joint) -> Iterator[Element]:
-    """A joint whose frames meet as the file has the bodies, which is where MuJoCo reads the pose that it holds.
+    """Write a joint whose frames meet where the file has the bodies: MuJoCo holds the pose that it reads there.
 
     The anchor of points that stay together is on ``body1``, that of a weld on ``body2``, which may be the world.
     """
@@ -60,22 +58,9 @@ def loop(world: World, joint: Joint) -> Iterator[Element]:
 
 
 def softness(joint: Joint) -> dict[str, str]:
-    """Of a joint that gives way: stiffness and damping by mass, which is MuJoCo's direct form."""
+    """Return the attributes of a compliant joint: stiffness and damping by mass, MuJoCo's direct form."""
     if not joint.soft:
         return {}
     rate = 2 * pi * joint.frequency
     stiffness, damping = rate * rate, 2 * max(joint.damping, 1e-9) * rate
     return {"solref": text((-stiffness, -damping)), "solimp": text((IMPEDANCE, IMPEDANCE, 1.0, 0.5, 1.0))}
-
-
-def coupled(reference: StartState, coupling: JointCoupling) -> Element:
-    """A coupling; MuJoCo counts coordinates from where they are in the file, and the polynomial with them."""
-    joints = [reference.world.joints[k] for k in (coupling.first, coupling.second) if k is not None]
-    shifts = [float(reference.values(joint)[0]) for joint in joints]
-    polynomial = Polynomial([float(c) for c in coupling.polynomial])
-    polynomial = polynomial(Polynomial([shifts[1], 1.0])) if len(shifts) > 1 else Polynomial([polynomial(0.0)])
-    numbers = np.zeros(5)
-    numbers[: len(polynomial.coef)] = polynomial.coef
-    numbers[0] -= shifts[0]
-    attributes = {f"joint{k + 1}": joint.name for k, joint in enumerate(joints)}
-    return Element("joint", {"name": coupling.name, **attributes, "polycoef": text(numbers)})

@@ -1,25 +1,33 @@
-"""Joints of trees as MJCF joints of the child, and the start as numbers of a keyframe."""
+"""Joints of trees as MJCF joints of the child, the start as numbers of a keyframe, and what ties coordinates."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
-from symphys.export.mjcf_bodies import NestedBody, StartState, plain, tidy
+from symphys.export.mjcf_bodies import NestedBody, StartState, nesting_joints, plain, tidy
 from symphys.export.mjcf_surfaces import text
 from symphys.model.joints import Joint, Link
+from symphys.model.joints.coupling import JointCoupling
 from symphys.model.scalar import is_zero
 from symphys.types import Array
 
 UNBOUNDED = 1e10
-"""[rad], [m] where one of two limits is missing."""
+"""Limit of a coordinate where one of two is missing [rad], [m]."""
 
 
 @dataclass(frozen=True)
 class Freedom:
-    """A joint of MJCF: its element, and what a keyframe says of it."""
+    """A joint of MJCF.
+
+    Attributes:
+        element: the joint.
+        qpos, qvel: its coordinates and velocities in the keyframe.
+    """
 
     element: Element
     qpos: Array
@@ -27,18 +35,18 @@ class Freedom:
 
 
 def freedoms(start: StartState, reference: StartState, nested: NestedBody) -> list[Freedom]:
-    """What a body may do against its parent, in MuJoCo's order: what is next to the parent comes first.
+    """Write the joints between a body and its parent, in MuJoCo's order, from the parent on.
 
     Args:
-        start: what the keyframe says.
-        reference: where the model's bodies lie in its file.
-        nested: of the body.
+        start: the state of the keyframe.
+        reference: the poses that the file has.
+        nested: the body.
     """
     return [freedom for link in nested.links for freedom in link_freedoms(start, reference, link, nested.body)]
 
 
 def link_freedoms(start: StartState, reference: StartState, link: Link, body: int) -> list[Freedom]:
-    """What one joint on the way to a body leaves free, in the frame of that body as the file has it."""
+    """Write the free directions of one joint on the chain to a body, in that body's frame as the file has it."""
     if link.joint is None:
         pose = np.concatenate([start.of(body, "position"), start.of(body, "orientation")])
         spin = start.axes(body).T @ start.of(body, "angular_velocity")
@@ -53,20 +61,29 @@ def link_freedoms(start: StartState, reference: StartState, link: Link, body: in
         return [Freedom(element, np.array([1.0, 0, 0, 0]), turned.T @ spin)]
     found = []
     turned = link.sign * reference.axes(body).T
-    directions, values, now = reference.directions(joint), reference.values(joint), start.values(joint)
+    values, now = reference.values(joint), start.values(joint)
     rates = plain(start.readings[joint.name].rate)
-    for k, direction in enumerate(directions):
-        turns = joint.kind.coordinates[k].turns
-        attributes = {"name": names(joint)[k], "type": "hinge" if turns else "slide", "pos": place}
-        attributes["axis"] = text(tidy(turned @ direction))
-        if values[k]:
-            attributes["ref"] = text(values[[k]])
-        found.append(Freedom(Element("joint", attributes | acting(joint)), now[[k]], rates[[k]]))
+    for k, (slide, turn) in enumerate(reference.motions(joint)):
+        coordinate = joint.kind.coordinates[k]
+        moves = [(names(joint)[k], "hinge" if coordinate.turns else "slide", 1.0, acting(joint))]
+        if coordinate.is_screw:
+            moves.append((slide_of(joint, k), "slide", float(coordinate.lead), {}))
+        for name, kind, share, parts in moves:
+            attributes = {"name": name, "type": kind, "pos": place}
+            attributes["axis"] = text(tidy(turned @ (turn if coordinate.turns else slide)))
+            if values[k]:
+                attributes["ref"] = text(share * values[[k]])
+            found.append(Freedom(Element("joint", attributes | parts), share * now[[k]], share * rates[[k]]))
     return found[:: link.sign]
 
 
+def slide_of(joint: Joint, k: int) -> str:
+    """Return the name of the slide that follows the hinge of a screw in MJCF."""
+    return f"{names(joint)[k]}.slide"
+
+
 def anchor(reference: StartState, link: Link, body: int) -> Array:
-    """(3,) [m]: the point of a link's joint on its child, in the frame of a body."""
+    """Return the point (3,) [m] of a link's joint on its child, in the frame of a body."""
     joint = reference.world.joints[link.joint or 0]
     point = np.array(joint.frames[0 if link.sign > 0 else 1].point, float)
     if link.body == body:
@@ -76,7 +93,7 @@ def anchor(reference: StartState, link: Link, body: int) -> Array:
 
 
 def acting(joint: Joint) -> dict[str, str]:
-    """Limits, spring, armature and dry friction along each coordinate, or each rotation of a ball joint."""
+    """Return limits, spring, armature and dry friction of each coordinate, or of the rotations of a ball joint."""
     found, limits, spring = {}, joint.limits, joint.spring
     if limits.lower is not None or limits.upper is not None:
         ends = (limits.lower, -UNBOUNDED), (limits.upper, UNBOUNDED)
@@ -91,6 +108,32 @@ def acting(joint: Joint) -> dict[str, str]:
 
 
 def names(joint: Joint) -> list[str]:
-    """Of the coordinates."""
+    """Return the names of the coordinates, which MuJoCo's joints have."""
     coordinates = joint.kind.coordinates
     return [joint.name] if len(coordinates) == 1 else [f"{joint.name}.{c.name}" for c in coordinates]
+
+
+def joint_equalities(reference: StartState) -> Iterator[Element]:
+    """Make the equality constraints between coordinates, of screws in trees and of couplings."""
+    world = reference.world
+    for joint in (world.joints[index] for index in sorted(nesting_joints(world))):
+        for k, coordinate in enumerate(joint.kind.coordinates):
+            if coordinate.is_screw:
+                tied = {"joint1": slide_of(joint, k), "joint2": names(joint)[k]}
+                numbers = text([0.0, float(coordinate.lead), 0.0, 0.0, 0.0])
+                yield Element("joint", {"name": f"{names(joint)[k]}.thread", **tied, "polycoef": numbers})
+    for coupling in world.couplings:
+        yield coupled(reference, coupling)
+
+
+def coupled(reference: StartState, coupling: JointCoupling) -> Element:
+    """A coupling; MuJoCo counts coordinates from where they are in the file, and the polynomial with them."""
+    joints = [reference.world.joints[k] for k in (coupling.first, coupling.second) if k is not None]
+    shifts = [float(reference.values(joint)[0]) for joint in joints]
+    polynomial = Polynomial([float(c) for c in coupling.polynomial])
+    polynomial = polynomial(Polynomial([shifts[1], 1.0])) if len(shifts) > 1 else Polynomial([polynomial(0.0)])
+    numbers = np.zeros(5)
+    numbers[: len(polynomial.coef)] = polynomial.coef
+    numbers[0] -= shifts[0]
+    attributes = {f"joint{k + 1}": joint.name for k, joint in enumerate(joints)}
+    return Element("joint", {"name": coupling.name, **attributes, "polycoef": text(numbers)})

@@ -6,25 +6,19 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from symphys.dynamics.observation import named_sensors
 from symphys.export.mjcf_surfaces import text
-from symphys.model.joints import AffineMotor
+from symphys.model.body import Body
+from symphys.model.joints import AffineMotor, Joint, kinematic_trees
 from symphys.model.site import Site
 from symphys.model.world import World
 from symphys.problem.feedback import Sensor
 
-JOINTS = {"angle": "jointpos", "position": "jointpos", "rate": "jointvel", "torque": "jointactuatorfrc"}
-BODIES = {
-    "position": ("framepos", "body"),
-    "orientation": ("framequat", "xbody"),
-    "velocity": ("framelinvel", "body"),
-    "angular_velocity": ("frameangvel", "xbody"),
-}
-"""MuJoCo's ``body`` is at the centre of mass, with principal axes; ``xbody`` has the body's own axes."""
-SITES = {"position": "framepos", "orientation": "framequat", "velocity": "framelinvel"}
 NUMBERS = r"(\[[^\[\]]*\])"
 AT_A_POINT = {
     "framepos": re.compile(rf"(\w+)\.position \+ rotate\(\1\.orientation, {NUMBERS}\)"),
@@ -33,8 +27,8 @@ AT_A_POINT = {
     ),
 }
 """Formulas of a point (3,) in a body's frame."""
-FELT = re.compile(rf"(?:rotate\({NUMBERS}, )?(\w+)\.(gyro|accelerometer)\)?")
-"""Formulas of what is felt in a body's axes, or in others, to which a quaternion (4,) goes."""
+TURNED = re.compile(rf"rotate\({NUMBERS}, ([\w.]+)\)")
+"""Formulas of a vector in axes to which the quaternion goes from those of the vector."""
 NEAR = 1e-9
 """[m], or of quaternions: sites that are apart by less are one."""
 
@@ -79,26 +73,48 @@ def reading(world: World, name: str, formula: str, sites: list[Site]) -> Element
     }
     if formula in geared:
         return Element("actuatorfrc", name=name, actuator=geared[formula])
-    owner, _, key = formula.rpartition(".")
-    single = {joint.name for joint in world.joints if len(joint.kind.coordinates) == 1}
-    if owner in single and key in JOINTS:
-        return Element(JOINTS[key], name=name, joint=owner)
-    if owner in {site.name for site in world.sites} and key in SITES:
-        return Element(SITES[key], name=name, objtype="site", objname=owner)
     bodies = {body.name: k for k, body in enumerate(world.bodies) if not body.massless}
-    if owner in bodies and key in BODIES:
-        kind, frame = BODIES[key]
-        return Element(kind, name=name, objtype=frame, objname=owner)
     for kind, pattern in AT_A_POINT.items():
         if (found := pattern.fullmatch(formula)) and found[1] in bodies:
             site = site_at(world, sites, bodies[found[1]], position=json.loads(found[2]))
             return Element(kind, name=name, objtype="site", objname=site.name)
-    if (found := FELT.fullmatch(formula)) and found[2] in bodies and formula.endswith(")") == bool(found[1]):
-        w, x, y, z = json.loads(found[1] or "[1, 0, 0, 0]")
-        place = None if found[3] == "gyro" else (0.0, 0.0, 0.0)
-        site = site_at(world, sites, bodies[found[2]], place, (w, -x, -y, -z))
-        return Element(found[3], name=name, site=site.name)
-    return None
+    turned = TURNED.fullmatch(formula)
+    return same_reading(world, name, turned[2] if turned else formula, turned[1] if turned else None, sites)
+
+
+def same_reading(world: World, name: str, sensed: str, turn: str | None, sites: list[Site]) -> Element | None:
+    """The sensor of MuJoCo that reads what a sensor does, after ``turn`` (4,) as text; None where there is none."""
+    sensor = named_sensors(world).get(sensed)
+    if sensor is None or sensor.kind.mjcf is None:
+        return None
+    word, at, owner = sensor.kind.mjcf.word, sensor.kind.mjcf.at, sensor.owner
+    if at in ("axes", "frame"):
+        mount = mount_of(world, owner)
+        if mount is None:
+            return None
+        w, x, y, z = json.loads(turn or "[1, 0, 0, 0]")
+        place = mount[1] if at == "frame" else None
+        return Element(word, name=name, site=site_at(world, sites, mount[0], place, (w, -x, -y, -z)).name)
+    if turn is not None or (isinstance(owner, Body) and owner.massless):
+        return None
+    if at == "joint":
+        return Element(word, name=name, joint=owner.name) if len(owner.kind.coordinates) == 1 else None
+    return Element(word, name=name, objtype=at, objname=owner.name)
+
+
+def mount_of(world: World, owner: Any) -> tuple[int, Sequence[float]] | None:
+    """The body whose axes are those of a sensor, and the sensor's point (3,) on it; None where MuJoCo has none.
+
+    A joint's is the body that hangs on it: MuJoCo reads what a body's parent exerts on it.
+    """
+    if isinstance(owner, Joint):
+        hanging = {link.joint for tree in kinematic_trees(world.joints) for link in tree.links if link.sign > 0}
+        if [joint.name for joint in world.joints].index(owner.name) not in hanging:
+            return None
+        body, point = owner.first, owner.frames[0].point
+    else:
+        body, point = [each.name for each in world.bodies].index(owner.name), (0.0, 0.0, 0.0)
+    return None if world.bodies[body].massless else (body, point)
 
 
 def site_at(

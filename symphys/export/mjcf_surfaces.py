@@ -1,4 +1,4 @@
-"""Surfaces as MJCF geoms, and who may touch whom as explicit pairs of them."""
+"""Write surfaces as MJCF geoms, and the pairs that may touch as explicit pairs of geoms."""
 
 from __future__ import annotations
 
@@ -7,36 +7,32 @@ from math import pi
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from symphys.model.scalar import is_zero
-from symphys.model.shapes import Convex, Plane, Shape, Terrain, surface
+from symphys.model.shapes import Capsule, Convex, Plane, Shape, Terrain, surface
 from symphys.model.world import Law, Side, World, side_name
 
 MJCF_PLACEMENT = {"centre": "pos", "orientation": "quat"}
 APART = {"contype": "1", "conaffinity": "0"}
-"""Of a geom that touches another in an explicit pair only: affinity with none. Readers see that it is no picture."""
+"""Attributes of a geom that touches others in explicit pairs only; readers see that it is no visual geom."""
 IMPEDANCE = 0.01
-"""Impedance of soft contacts: so small that they add to other forces as springs and dampers do, 1 % too soft."""
+"""Impedance of compliant contacts: so small that they act as springs and dampers, 1 % too soft."""
 FRICTION_RATIO = 100.0
-"""Impedance of friction over that of contacts, so that friction is not soft with them."""
+"""Ratio of the impedances of friction and normal force, so that friction is not as soft as the contact."""
 
 
 def text(numbers: Iterable[Any]) -> str:
-    """Numbers of an attribute, so that they are read as they are."""
+    """Format the numbers of an attribute without loss of digits."""
     return " ".join(repr(float(x)) for x in numbers)
 
 
 def geoms(world: World, body: int | None) -> list[Element]:
-    """The surfaces of a body, placed in its frame; of what stands still for None. They touch as ``pairs`` says only.
-
-    Terrain, which needs a grid, comes from ``mjcf_terrain``.
-    """
+    """Write the surfaces of a body in its frame, or the static surfaces for None, terrain aside."""
     count = len(world.statics if body is None else world.bodies[body].shapes)
     made = (geom(world, Side(body, k)) for k in range(count))
     return [each for each in made if each is not None]
 
 
 def geom(world: World, side: Side) -> Element | None:
-    """One surface; None for terrain."""
+    """Write a surface; None for terrain, which ``mjcf_terrain`` writes."""
     shape = surface(world.statics[side.shape]) if side.body is None else world.bodies[side.body].shapes[side.shape]
     if isinstance(shape, Terrain):
         return None
@@ -46,13 +42,13 @@ def geom(world: World, side: Side) -> Element | None:
 
 
 def half_space(plane: Plane) -> dict[str, str]:
-    """Without an edge; the last size is of the grid that is drawn."""
+    """Return the attributes of an infinite plane; its last size is the spacing of the rendered grid."""
     point = [plane.offset * n for n in plane.normal]
     return {"type": "plane", "size": "0 0 1", "pos": text(point), "zaxis": text(plane.normal)}
 
 
 def solid(shape: Shape, name: str) -> dict[str, str]:
-    """Kind, sizes and place; the hull of points is a mesh of the geom's name."""
+    """Return kind, sizes and pose of a solid; a convex hull is a mesh of the geom's name."""
     placed = {MJCF_PLACEMENT[key]: text(numbers) for key, numbers in shape.placement.items()}
     if isinstance(shape, Convex):
         return {"type": "mesh", "mesh": name, **placed}
@@ -60,7 +56,7 @@ def solid(shape: Shape, name: str) -> dict[str, str]:
 
 
 def meshes(world: World) -> list[Element]:
-    """The points of every hull, by the name of its geom: MuJoCo makes the hull of a mesh by itself."""
+    """Write the points of each convex hull as a mesh named as its geom; MuJoCo computes the hull of a mesh."""
     sides = [Side(i, k) for i, body in enumerate(world.bodies) for k in range(len(body.shapes))]
     sides += [Side(None, k) for k in range(len(world.statics))]
     found = []
@@ -73,19 +69,20 @@ def meshes(world: World) -> list[Element]:
 
 
 def pairs(world: World, step: float, stiffer: Mapping[tuple[str, str], float]) -> Element:
-    """Every two surfaces that may touch, with the numbers of their law; ``stiffer``: see ``mjcf_model``."""
+    """Write each pair of surfaces that may touch, with its contact law; ``stiffer`` is that of ``mjcf_model``."""
     contact = Element("contact")
     laws = {(pair.first, pair.second): pair.law for pair in world.pairs}
     for sides, law in laws.items():
         first, second = (side_name(world.bodies, world.statics, side) for side in sides)
-        friction = (law.friction, law.friction, law.torsion, law.rolling, law.rolling)
-        given = {"geom1": first, "geom2": second, "condim": directions(law), "friction": text(friction)}
+        friction = law.mujoco_friction(normal_of(world, sides))
+        given = {"condim": str(friction.directions), "friction": text(friction.coefficients)}
+        given = {"geom1": first, "geom2": second, **given}
         contact.append(Element("pair", given | softness(law, step, stiffer.get((first, second), 1.0))))
     return contact
 
 
 def softness(law: Law, step: float, factor: float) -> dict[str, str]:
-    """Attributes of a soft contact: stiffness and damping by mass, MuJoCo's direct form; friction acts within steps."""
+    """Return the attributes of a compliant contact: stiffness and damping by mass, MuJoCo's direct form."""
     if not law.soft:
         return {}
     rate, stop = 2 * pi * float(law.frequency), IMPEDANCE / step
@@ -94,10 +91,7 @@ def softness(law: Law, step: float, factor: float) -> dict[str, str]:
     return {"solref": text(spring), **held}
 
 
-def directions(law: Law) -> str:
-    """In how many directions a contact acts: the normal, two across, about the normal, two rolling."""
-    if not is_zero(law.rolling):
-        return "6"
-    if not is_zero(law.torsion):
-        return "4"
-    return "1" if is_zero(law.friction) else "3"
+def normal_of(world: World, sides: tuple[Side, Side]) -> tuple[Any, ...] | None:
+    """(3,): the normal of a contact with a plane; None where the frame of MuJoCo's contact turns with a body."""
+    shape, other = world.surface(sides[1]), world.surface(sides[0])
+    return tuple(shape.normal) if isinstance(shape, Plane) and not isinstance(other, Capsule) else None

@@ -1,4 +1,4 @@
-"""Terrain as MJCF height fields: heights on a grid, triangles between them, and how far off these are."""
+"""Write terrain as MJCF height fields, triangles between heights on a grid, and measure their error."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from symphys.model.shapes import Terrain
 from symphys.types import Array
 
 AROUND = 10.0
-"""[m] on every side of the bodies at the start, where terrain without a grid is sampled."""
+"""Margin around the bodies at the start within which terrain without a grid is sampled [m]."""
 STEP = 0.2
-"""[m] between its samples."""
+"""Distance of its samples [m]."""
 THICKNESS = 1.0
-"""[m] of what is solid below the lowest height."""
+"""Thickness of the solid below the lowest height [m]."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Where heights are read.
+    """The grid of a height field.
 
     Attributes:
-        origin: (2,) x and y of the first height [m].
-        spacing: (2,) [m].
-        count: (2,) of heights along x and along y.
+        origin: (2,) x and y of the first height [m], world frame.
+        spacing: (2,) distances along x and along y [m].
+        count: (2,) numbers of heights along x and along y.
     """
 
     origin: tuple[float, float]
@@ -38,7 +38,7 @@ class Grid:
 
 
 def window(start: StartState, terrain: Terrain) -> Grid:
-    """The grid of a height field; of other terrain one around the bodies at the start."""
+    """Return the grid of terrain that has one; otherwise one around the bodies at the start."""
     height = terrain.height
     if isinstance(height, Heightfield):
         return Grid(height.origin, height.spacing, (len(height.heights[0]), len(height.heights)))
@@ -49,7 +49,7 @@ def window(start: StartState, terrain: Terrain) -> Grid:
 
 
 def sampled(terrain: Terrain, grid: Grid, finer: int = 1) -> Array:
-    """(rows, columns) [m]: heights on a grid, rows along y; with ``finer`` parts in each spacing."""
+    """Sample heights (rows, columns) [m] on a grid, rows along y, with ``finer`` parts in each spacing."""
     columns, rows = (finer * (n - 1) + 1 for n in grid.count)
     height = terrain.height
     if isinstance(height, Heightfield):
@@ -65,13 +65,13 @@ def sampled(terrain: Terrain, grid: Grid, finer: int = 1) -> Array:
 
 
 def deviation(terrain: Terrain, grid: Grid) -> float:
-    """[m]: the farthest that a surface is from the triangles on its grid, whichever way the squares are cut."""
+    """Return the largest distance of a surface from triangles on its grid [m], for either diagonal of each square."""
     fine = sampled(terrain, grid, FINER)
     return off_triangles(fine, fine[::FINER, ::FINER], FINER)
 
 
 def height_field(start: StartState, terrain: Terrain) -> Element:
-    """The asset: heights between 0 and 1, and what they are multiplied with."""
+    """Write the asset of a height field: heights between 0 and 1, and their scale."""
     grid = window(start, terrain)
     heights = sampled(terrain, grid)
     low, high = float(heights.min()), float(heights.max())
@@ -89,7 +89,7 @@ def height_field(start: StartState, terrain: Terrain) -> Element:
 
 
 def middle(start: StartState, terrain: Terrain) -> tuple[float, float, float]:
-    """(3,) [m]: where the height field stands, whose lowest point has height 0."""
+    """Return the position (3,) [m] of a height field, whose lowest point has height 0."""
     grid = window(start, terrain)
     x, y = (o + step * (n - 1) / 2 for o, step, n in zip(grid.origin, grid.spacing, grid.count, strict=True))
     return x, y, float(sampled(terrain, grid).min())

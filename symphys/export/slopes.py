@@ -1,4 +1,4 @@
-"""The slopes of one step as casadi functions, for other programs: by one direction, and as matrices."""
+"""Derivatives of one step as casadi functions for other programs: along one direction, and as matrices."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ ARGUMENTS = ["x", "u", "p", "smoothing"]
 
 
 def directional_slope(arguments: StepArguments) -> ca.Function:
-    """(x, u, p, smoothing, dx, du, dp) -> (after (nx,), dafter (n,)): one step, and how its tangent moves.
+    """Return the function (x, u, p, smoothing, dx, du, dp) -> (x_next (nx,), dx_next (n,)), all of it dense.
 
-    dx (n,) is of the tangent of x and dafter of the tangent of the state after; see ``Tangent``. With controllers u has
-    the time [s] after the inputs, and du does not. All is dense.
+    dx (n,) is a tangent of x, and dx_next one of the next state; ``Tangent`` defines their coordinates. If there are
+    controllers, the last entry of u is the time [s], which du does not have.
     """
     tangent, closed = arguments.tangent, arguments.rollout.closed
     x, u, p, smoothing = (ca.SX.sym(name, closed.size1_in(i)) for i, name in enumerate(ARGUMENTS))
@@ -32,7 +32,7 @@ def directional_slope(arguments: StepArguments) -> ca.Function:
 
 
 def slopes_function(arguments: StepArguments) -> ca.Function:
-    """(x, u, p, smoothing) -> (x_next (nx,), A (n, n), B (n, m), C (n, np)): one step and its slopes, in tangents."""
+    """Return the function (x, u, p, smoothing) -> (x_next (nx,), A (n, n), B (n, m), C (n, np)), in tangents."""
     one = directional_slope(arguments)
     x, u, p, smoothing = (ca.MX.sym(name, one.size1_in(i)) for i, name in enumerate(ARGUMENTS))
     n, m, np_ = arguments.sizes[1:]

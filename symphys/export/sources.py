@@ -1,4 +1,4 @@
-"""A problem as C sources: the step, the rollout and its gradient, with a header, an example and a Makefile."""
+"""Write a problem as C sources: step, rollout and gradient, with a header, an example and a Makefile."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROOM = "symphys.export"
 
 
 def c_files(transcription: Transcription, version: str) -> dict[str, bytes]:
-    """name -> content of every file."""
+    """Return the files, name -> content."""
     rollout, name = transcription.rollout, identifier(transcription.problem.name)
     program, step = rollout_program(rollout), dense_step(rollout)
     arguments = tangent_of(transcription)
@@ -50,21 +50,21 @@ def c_files(transcription: Transcription, version: str) -> dict[str, bytes]:
 
 
 def identifier(name: str) -> str:
-    """A problem's name as the beginning of C names."""
+    """Turn a problem's name into the prefix of C names."""
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     plain = re.sub(r"\W+", "_", plain).strip("_")
     return plain if plain[:1].isalpha() else f"problem_{plain}".rstrip("_")
 
 
 def dense_step(rollout: Rollout) -> ca.Function:
-    """The step of a rollout, a function (x, u, p, smoothing) -> x_next of dense vectors; controllers come before it."""
+    """Return the step (x, u, p, smoothing) -> x_next of dense vectors, without controllers."""
     step = rollout.step
     arguments = step.sx_in()
     return ca.Function("step", arguments, [ca.densify(step(*arguments))], step.name_in(), step.name_out())
 
 
 def tangent_of(transcription: Transcription) -> StepArguments:
-    """The arguments of a step and its slopes."""
+    """Return the arguments of a step and of its derivatives."""
     return StepArguments(transcription.rollout, Tangent(transcription.rollout))
 
 
@@ -124,7 +124,7 @@ def _places(step: ca.Function) -> str:
 
 
 def string(text: str) -> str:
-    """A C string literal."""
+    """Write a C string literal."""
     kept = [chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode()]
     return f'"{"".join(kept)}"'
 

@@ -61,7 +61,8 @@ def look_up(name: str, namespace: Mapping[str, Any]) -> Expr:
     """Return the value of a name; FormulaError with similar names if it is unknown."""
     if name not in namespace:
         raise FormulaError(f"unknown name {quote(name)}; {hint(name, namespace)}")
-    return call(column, [namespace[name]], name)
+    value = namespace[name]
+    return call(column, [value() if callable(value) else value], name)
 
 
 def call(function: Callable[..., Expr], values: list[Any], piece: str) -> Expr:
@@ -112,7 +113,8 @@ class Formula:
     def evaluate(self, namespace: Mapping[str, Any]) -> Expr:
         """Return the value as a dense casadi column (n,) of SX, MX or DM; (1,) for a number.
 
-        ``namespace`` maps every name to a number, a sequence of numbers or a casadi column; SX and MX do not mix.
+        ``namespace`` maps every name to a number, a sequence of numbers or a casadi column, or to a function that
+        returns one and is called where the formula uses the name; SX and MX do not mix.
         FormulaError for an unknown name or shapes that do not fit.
         """
         return ca.densify(evaluate(self.root, namespace))

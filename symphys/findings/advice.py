@@ -8,8 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from symphys.findings.contacts import CONTACTS, contact_findings, miss_findings
-from symphys.findings.energy import ENERGY, balance_finding, gains_finding, jump_findings, stop_findings
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
 from symphys.findings.numerics import (
@@ -26,8 +24,18 @@ from symphys.findings.numerics import (
     smoothed_findings,
     unfelt,
 )
-from symphys.findings.obstacles import capital, obstacle_findings, obstacles
-from symphys.findings.writing import listed, percent, show
+from symphys.findings.obstacles import obstacle_findings, obstacles
+from symphys.findings.physics import (
+    CONTACTS,
+    ENERGY,
+    balance_finding,
+    contact_findings,
+    gains_finding,
+    jump_findings,
+    miss_findings,
+    stop_findings,
+)
+from symphys.findings.writing import capital, listed, percent, show
 
 FAULT, NO_SLOPE = "fault", "zero"
 SUBJECTS = (GRADIENT, GROWTH, GRID, SMOOTHING, ENERGY, CONTACTS)
@@ -36,7 +44,7 @@ VERDICTS = {GOOD: "agrees", FAIR: "agrees roughly", BAD: "disagrees", UNKNOWN: "
 
 
 def findings(trust: Examination, judged: Judged) -> list[Finding]:
-    """Every line for which there is a number."""
+    """List a finding for each number of an examination that is known."""
     lines = [Finding(FAULT, BAD, "A number that is not finite", "", f"{sentence(trust.fault)}")] if trust.fault else []
     lines += [gradient_finding(check) for check in trust.gradient]
     lines += [refined_finding(refined, judged) for refined in trust.refined]
@@ -73,7 +81,7 @@ def answers(trust: Examination, judged: Judged) -> tuple[list[str], list[list[st
 
 
 def advice(trust: Examination, judged: Judged) -> str:
-    """One paragraph: what follows from the findings."""
+    """Write one paragraph of what follows from the findings."""
     lines = findings(trust, judged)
     if trust.fault:
         return f"Mend this first, since solvers cannot pass it: {trust.fault}."
@@ -92,7 +100,7 @@ def advice(trust: Examination, judged: Judged) -> str:
 
 
 def of_influence(trust: Examination) -> str:
-    """What follows where variables change nothing."""
+    """Advise on variables that change nothing."""
     none = [check.variable for check in trust.gradient if unfelt(check)]
     if not none:
         return ""
@@ -104,13 +112,13 @@ def of_influence(trust: Examination) -> str:
 
 
 def of_misses(trust: Examination) -> str:
-    """What near misses and glancing touches advise."""
+    """Advise on near misses and glancing touches."""
     line = next(iter(miss_findings(trust)), None)
     return f"Close by the motion is another one. {line.meaning}" if line else ""
 
 
 def of_gradient(level: str, growth: str) -> str:
-    """What the comparison with finite differences advises."""
+    """Advise on the comparison of the gradient with finite differences."""
     if level == BAD and growth == BAD:
         return "Gradient and differences disagree, as they must where changes grow so fast."
     return {
@@ -121,7 +129,7 @@ def of_gradient(level: str, growth: str) -> str:
 
 
 def of_growth(trust: Examination, level: str, gradient: str) -> str:
-    """What the growth of changes advises; that a gradient reaches far is said of one that is right, not of none."""
+    """Advise on the growth of changes; only a gradient that is right is said to reach far."""
     far = reach(trust.growth)
     if not math.isnan(far.lost):
         return f"Derivatives break off going back from the end at t = {show(far.lost)} s: begin from another guess."
@@ -141,7 +149,7 @@ def of_growth(trust: Examination, level: str, gradient: str) -> str:
 
 
 def of_grid(trust: Examination, level: str, judged: Judged) -> str:
-    """What refinement advises."""
+    """Advise on the result of refinement."""
     if level == GOOD:
         held = "still meets every check" if judged.met and judged.checked else "changes little"
         return f"The result {held} when it is simulated more finely, so it is not an accident of the time grid."
@@ -152,21 +160,21 @@ def of_grid(trust: Examination, level: str, judged: Judged) -> str:
 
 
 def finer(trust: Examination, judged: Judged) -> str:
-    """What to refine: that by which the answer changes most."""
+    """Name what to refine: that by which the answer changes most."""
     bad = [row for row in trust.refined if refined_finding(row, judged).level == BAD or row.change > SLOPE_LIMITS[1]]
     by_sweeps = bad and all(row.what == "sweeps x 2" for row in bad)
     return "add sweeps" if by_sweeps else "halve the time step"
 
 
 def of_smoothing(level: str) -> str:
-    """What the smoothed rollout advises, where solvers use it."""
+    """Advise on the smoothed rollout, where solvers use it."""
     if level in (FAIR, BAD):
         return "Without the smoothing that solvers see the answer is another: lower it, or solve again without."
     return ""
 
 
 def of_physics(lines: Sequence[Finding], level: dict[str, str]) -> str:
-    """What energy, momentum and the contacts advise."""
+    """Advise on energy, momentum and the contacts."""
     parts = []
     if level[ENERGY] in (FAIR, BAD):
         worst = next(line for line in lines if line.about == ENERGY and line.level == level[ENERGY])
@@ -182,5 +190,5 @@ def of_physics(lines: Sequence[Finding], level: dict[str, str]) -> str:
 
 
 def sentence(clause: str) -> str:
-    """A clause with a capital letter and a full stop."""
+    """Return a clause with a capital letter and a full stop."""
     return capital(clause) + "."

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Ending:
-    """One status of a solve.
+    """A status of a solve, its meaning and its words.
 
     Attributes:
         words: what happened.
@@ -28,6 +28,11 @@ class Ending:
     stationary: bool = False
     usable: bool = True
     faulty: bool = False
+
+    @property
+    def brief_words(self) -> str:
+        """Return what happened in few words, for tables."""
+        return self.in_table or self.words
 
 
 ENDINGS = {
@@ -52,6 +57,6 @@ ENDINGS = {
 
 
 def ending(status: str) -> Ending:
-    """That of a status; one that is unknown is worded as it stands."""
+    """Return the ending of a status; an unknown one is worded as it stands."""
     text = status.replace("_", " ")
     return ENDINGS.get(status) or Ending(text or "no status", text, faulty=not status)

@@ -16,7 +16,7 @@ from symphys.types import Array
 
 
 def nothing() -> Array:
-    """(0,)."""
+    """Return an empty array (0,)."""
     return np.zeros(0)
 
 
@@ -39,7 +39,7 @@ class GradientCheck:
 
 @dataclass(frozen=True)
 class Refined:
-    """The same z simulated more finely: objective, largest error / tolerance, relative change of each gradient."""
+    """A finer simulation of the same z: objective, largest error / tolerance, relative change of each gradient."""
 
     what: str
     objective: float
@@ -48,14 +48,14 @@ class Refined:
 
     @property
     def change(self) -> float:
-        """The largest change of a gradient that is known; nan if none is."""
+        """Return the largest change of a gradient that is known; nan if none is."""
         known = [change for change in self.gradient.values() if not np.isnan(change)]
         return max(known, default=np.nan)
 
 
 @dataclass(frozen=True)
 class Smoothed:
-    """The same z with contacts smoothed over ``smoothing`` [m/s]; ``own``: as the problem's solvers see it.
+    """A simulation of the same z with contacts smoothed over ``smoothing`` [m/s]; ``own``: as the solvers see it.
 
     ``costs``: the sum of what is minimised. ``moved``: how far bodies get from their places in the exact motion, as a
     share of the longest way of one.
@@ -82,7 +82,7 @@ class Columns:
 
 @dataclass(frozen=True)
 class Growth(Columns):
-    """``factor`` (k,): how much a change of the state at ``time`` (k,) [s] is magnified by the end; 1 at the end."""
+    """The magnification ``factor`` (k,), by the end, of a change of the state at ``time`` (k,) [s]; 1 at the end."""
 
     time: Array = field(default_factory=nothing)
     factor: Array = field(default_factory=nothing)
@@ -90,7 +90,7 @@ class Growth(Columns):
 
 @dataclass(frozen=True)
 class Energy(Columns):
-    """At ``time`` [s]: energies, and what forces and contacts have given by then [J]; (k,) each."""
+    """The energies at ``time`` [s], and what forces and contacts have given by then [J]; (k,) each."""
 
     time: Array = field(default_factory=nothing)
     kinetic: Array = field(default_factory=nothing)
@@ -111,7 +111,7 @@ class Gain:
 
 @dataclass(frozen=True)
 class Miss:
-    """Two surfaces that hardly miss or hardly touch each other, by ``gap`` [m] at ``time`` [s].
+    """A near miss or a glancing touch of two surfaces, by ``gap`` [m] at ``time`` [s].
 
     ``touches``: which of the two. ``change`` of ``variable``, in its own unit, makes the one out of the other;
     ``steps`` and ``spreads``: how many scales, or spreads, of all variables together do.
@@ -129,7 +129,7 @@ class Miss:
 
 @dataclass(frozen=True)
 class Slide:
-    """How far [m] two surfaces slid under load, and their largest speed [m/s] and when [s]."""
+    """The distance [m] that two surfaces slid under load, and their largest speed [m/s] and when [s]."""
 
     contact: str
     distance: float
@@ -158,7 +158,7 @@ class HeldBound:
 
 @dataclass(frozen=True)
 class Examination:
-    """How far a solution can be trusted: the measurements of one examination.
+    """The measurements of one examination: how far a solution can be trusted.
 
     Attributes:
         gradient: one per variable.
@@ -251,10 +251,10 @@ class Examination:
 
     @classmethod
     def from_json(cls, value: object, text: Text = name) -> Examination:
-        """The record; what is absent or no number becomes nan."""
+        """Read the record; what is absent or no number becomes nan."""
         return record(cls, value, text)
 
     @property
     def step(self) -> float:
-        """Of the central differences, in units of each variable's scale; nan without any."""
+        """Return the step of the central differences, in units of each variable's scale; nan without any."""
         return self.gradient[0].step if self.gradient else np.nan

@@ -12,7 +12,7 @@ MARKS = {GOOD: "good", FAIR: "look closer", BAD: "do not rely on it", UNKNOWN: "
 
 @dataclass(frozen=True)
 class Finding:
-    """One line: its subject, a level, what was looked at, its number, and what that means.
+    """A line of an examination: its subject, level, check, value and interpretation.
 
     ``doubt``: a clause on why no result that rests on it is to be relied on; empty where that does not follow.
     """
@@ -27,7 +27,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Judged:
-    """How what is examined was judged as it stands.
+    """The judgement of what is examined.
 
     Attributes:
         objective: its value.
@@ -45,14 +45,14 @@ class Judged:
 
 
 def graded(value: float, limits: tuple[float, float]) -> str:
-    """The level of a number that had better be small."""
+    """Return the level of a number that had better be small."""
     if math.isnan(value):
         return UNKNOWN
     return GOOD if value <= limits[0] else FAIR if value <= limits[1] else BAD
 
 
 def worst_of(levels: Iterable[str]) -> str:
-    """The worst level; unknown without any."""
+    """Return the worst level; unknown without any."""
     return max(levels, key=(UNKNOWN, GOOD, FAIR, BAD).index, default=UNKNOWN)
 
 

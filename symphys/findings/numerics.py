@@ -14,7 +14,7 @@ from symphys.findings.writing import listed, percent, show
 GRADIENT, GRID, GROWTH, SMOOTHING = "gradient", "grid", "growth", "smoothing"
 INFLUENCE = "influence"
 
-NOTHING = 1e-8
+NO_INFLUENCE_SHARE = 1e-8
 """A variable whose change by its scale changes no more, as a share of the value, changes nothing; what friction holds
 creeps by about a hundredth of that."""
 NO_INFLUENCE = "Nothing that the problem asks for depends on it here, so no solver that follows gradients moves it."
@@ -23,9 +23,9 @@ GRADIENT_LIMITS = (1e-4, 1e-2)
 """Relative errors of a gradient: below the first it agrees, above the second it must not be used."""
 JUMP_LIMITS = (1e-3, 1e-1)
 """Of jumps: a solver does not notice those below the first."""
-FLAT = 1e-6
+FLAT_GRADIENT = 1e-6
 """A gradient whose norm is below this is too small to be compared."""
-TINY = 1e-12
+NO_COSTS = 1e-12
 """A sum of costs below this is none."""
 OBJECTIVE_LIMITS = (0.05, 0.3)
 """Relative changes of the objective under refinement."""
@@ -40,12 +40,12 @@ ORDERS = (0.3, 5.0)
 
 
 def gradient_finding(check: GradientCheck) -> Finding:
-    """The adjoint gradient against central differences, for one variable."""
+    """Return the adjoint gradient against central differences, for one variable."""
     what, number = f"Gradient of {check.variable}", show(check.error, 2)
     if unfelt(check):
         return Finding(INFLUENCE, FAIR, what, show(check.scale), NO_INFLUENCE)
     level = graded(check.error, GRADIENT_LIMITS)
-    if level in (FAIR, BAD) and check.scale <= FLAT:
+    if level in (FAIR, BAD) and check.scale <= FLAT_GRADIENT:
         return Finding(
             GRADIENT, UNKNOWN, what, number, "The gradient is almost zero here, so the comparison says little."
         )
@@ -64,11 +64,11 @@ def gradient_finding(check: GradientCheck) -> Finding:
 
 def unfelt(check: GradientCheck) -> bool:
     """Whether nothing that is asked for depends on the variable here."""
-    return check.felt <= NOTHING
+    return check.felt <= NO_INFLUENCE_SHARE
 
 
 def refined_finding(refined: Refined, judged: Judged) -> Finding:
-    """The same z, simulated more finely; what was met and is missed by far then is refuted."""
+    """Judge a finer simulation of the same z; what was met and is missed by far then is refuted."""
     what = f"Simulated again with {unbroken(refined.what) or 'a refinement'}"
     number = f"objective {show(refined.objective)}"
     if judged.checked and not math.isnan(refined.worst):
@@ -93,7 +93,7 @@ def refined_finding(refined: Refined, judged: Judged) -> Finding:
 
 
 def slope_finding(trust: Examination) -> list[Finding]:
-    """What refinement does to the gradient; nothing where that was not measured, or where nothing is felt."""
+    """Judge how refinement changes the gradient; empty where that was not measured, or where all gradients are 0."""
     if trust.gradient and all(unfelt(check) for check in trust.gradient):
         return []
     changes = [(unbroken(refined.what), refined.change) for refined in trust.refined]
@@ -114,13 +114,13 @@ def slope_finding(trust: Examination) -> list[Finding]:
 
 
 def unbroken(text: str) -> str:
-    """The text on one line."""
+    """Return the text on one line."""
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 @dataclass(frozen=True)
 class GradientReach:
-    """How far gradients reach along a growth curve.
+    """The reach of gradients along a growth curve.
 
     Attributes:
         total: the largest magnification of a change by the end.
@@ -138,7 +138,7 @@ class GradientReach:
 
 
 def reach(growth: Growth) -> GradientReach:
-    """How far a gradient reaches.
+    """Compute how far a gradient reaches.
 
     |dx_T/dx_s| <= |dx_T/dx_t| |dx_t/dx_s|: what the curve has fallen from s to t, a change has at least grown. So a
     gradient with respect to the state at s is not to be trusted beyond the t where the curve has fallen by the second
@@ -160,7 +160,7 @@ def reach(growth: Growth) -> GradientReach:
 
 
 def growth_finding(growth: Growth) -> Finding:
-    """The growth of changes along the horizon."""
+    """Return the growth of changes along the horizon."""
     what, far = "Growth of a change until the end", reach(growth)
     if not math.isnan(far.lost):
         meaning = f"The derivatives are not finite before t = {show(far.lost)} s: nothing before can be optimised."
@@ -178,14 +178,14 @@ def growth_finding(growth: Growth) -> Finding:
 
 
 def too_far(far: GradientReach) -> str:
-    """Where a gradient ends, as a clause."""
+    """Write as a clause where a gradient ends."""
     if not math.isfinite(far.end):
         return ""
     return f"; the gradient is not to be trusted beyond {show(far.end, 2)} s"
 
 
 def smoothed_findings(rows: tuple[Smoothed, ...], judged: Judged) -> list[Finding]:
-    """What smoothing changes: of the problem's own what it hides, else how much would do no harm."""
+    """Judge what the problem's own smoothing hides, or else how much smoothing would do no harm."""
     if not rows:
         return []
     what = f"Smoothed over {listed([show(row.smoothing) for row in rows])} m/s"
@@ -206,7 +206,7 @@ def smoothed_findings(rows: tuple[Smoothed, ...], judged: Judged) -> list[Findin
 
 
 def smoothed_level(row: Smoothed, judged: Judged) -> str:
-    """How much this smoothing changes the answer: what is met, what is minimised, and the motion."""
+    """Grade how much this smoothing changes the answer: what is met, what is minimised, and the motion."""
     if judged.met and judged.checked:
         answer = worst_of([graded(row.worst, WORST_LIMITS), graded(share(judged.costs, row.costs), OBJECTIVE_LIMITS)])
     else:
@@ -215,5 +215,5 @@ def smoothed_level(row: Smoothed, judged: Judged) -> str:
 
 
 def share(before: float, after: float) -> float:
-    """The relative change; 0 where both are rounding, nan where one is not known."""
-    return 0.0 if max(abs(before), abs(after)) < TINY else relative_change(before, after)
+    """Return the relative change; 0 where both are rounding, nan where one is not known."""
+    return 0.0 if max(abs(before), abs(after)) < NO_COSTS else relative_change(before, after)

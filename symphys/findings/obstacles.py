@@ -6,11 +6,10 @@ import math
 
 from symphys.findings.examination import Examination, HeldBound
 from symphys.findings.levels import FAIR, UNKNOWN, Finding, Judged
-from symphys.findings.writing import listed, several, show
+from symphys.findings.numerics import NO_COSTS
+from symphys.findings.writing import capital, listed, several, show
 
 TARGETS, BOUNDS = "targets", "bounds"
-TINY = 1e-12
-"""A sum of costs below this is none."""
 MOST_BOUNDS = 3
 """How many bounds are named."""
 CONTRADICTING = (
@@ -30,7 +29,7 @@ HELD = "It ends there, and what is minimised falls beyond: the bound holds it ba
 
 
 def obstacle_findings(trust: Examination, judged: Judged) -> list[Finding]:
-    """Every line on what stands in the way; of targets only where something is missed."""
+    """List what stands in the way of an answer; targets only where something is missed."""
     lines = []
     if not judged.met:
         kinds = (
@@ -51,7 +50,7 @@ def obstacle_findings(trust: Examination, judged: Judged) -> list[Finding]:
 
 
 def obstacles(trust: Examination, judged: Judged) -> tuple[str, ...]:
-    """A clause for each of them: what they do and what to try. Equations are no reason by themselves."""
+    """Return a clause for each of them: what they do and what to try. Equations are no reason by themselves."""
     clauses = []
     if not judged.met:
         if trust.contradicting:
@@ -70,23 +69,23 @@ def obstacles(trust: Examination, judged: Judged) -> tuple[str, ...]:
 
 
 def against(trust: Examination) -> tuple[str, ...]:
-    """The targets that oppose each other, unless they are said to contradict each other anyway."""
+    """Return the targets that oppose each other, unless they are said to contradict each other anyway."""
     return () if set(trust.opposed) <= set(trust.contradicting) else trust.opposed
 
 
 def holding(trust: Examination, judged: Judged) -> tuple[HeldBound, ...]:
-    """The bounds that hold something back; none where everything is met and nothing is minimised."""
-    wanted = not judged.met or not judged.checked or abs(judged.costs) > TINY
+    """Return the bounds that hold something back; none where everything is met and nothing is minimised."""
+    wanted = not judged.met or not judged.checked or abs(judged.costs) > NO_COSTS
     return trust.bounds if wanted else ()
 
 
 def said_of(names: tuple[str, ...], clause: str) -> str:
-    """A clause on targets by their names."""
+    """Return a clause on targets by their names."""
     return clause.format(names=listed([f'"{name}"' for name in names]), all="both" if len(names) == 2 else "all")
 
 
 def bound_words(bound: HeldBound, knots: bool = True) -> str:
-    """``the upper bound 5 of throw[0]``; ``knots``: with those that lie there, where there are several."""
+    """Write ``the upper bound 5 of throw[0]``; ``knots``: with the number of knots that lie there."""
     value = "" if math.isnan(bound.bound) else f" {show(bound.bound)}"
     where = f" (at {bound.knots} of {bound.of} knots)" if knots and bound.of > 1 else ""
     return f"the {bound.side} bound{value} of {place(bound)}{where}"
@@ -98,11 +97,6 @@ def place(bound: HeldBound) -> str:
 
 
 def extent(bound: HeldBound) -> str:
-    """The bound, and how many knots lie there."""
+    """Return the bound, and how many knots lie there."""
     knots = f"{bound.knots} of {bound.of} knots" if bound.of > 1 else ""
     return ", ".join(filter(None, ("" if math.isnan(bound.bound) else show(bound.bound), knots)))
-
-
-def capital(clause: str) -> str:
-    """With a capital letter."""
-    return clause[:1].upper() + clause[1:]

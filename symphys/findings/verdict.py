@@ -26,26 +26,26 @@ ACCEPTED = (SOLVED, BEST_FOUND)
 
 
 @dataclass(frozen=True)
-class Ruling:
+class Verdict:
     """The verdict on a run, and why it is not to be relied on, where it is not."""
 
-    verdict: str
+    word: str
     doubts: tuple[str, ...]
 
     @property
     def solved(self) -> bool:
-        """Whether that is "solved"."""
-        return self.verdict == SOLVED
+        """Whether the word is "solved"."""
+        return self.word == SOLVED
 
 
-def rule(status: str, judged: Judged, trust: Mapping[str, object] | None) -> Ruling:
-    """The ruling on a run that ended with ``status``; ``trust`` as in result.json, None where nothing was measured."""
+def judge_run(status: str, judged: Judged, trust: Mapping[str, object] | None) -> Verdict:
+    """Judge a run that ended with ``status``; ``trust`` as in result.json, None where nothing was measured."""
     found = doubts(Examination.from_json(dict(trust or {})), judged)
-    return Ruling(verdict(status, judged, bool(found)), found)
+    return Verdict(verdict_word(status, judged, bool(found)), found)
 
 
 def doubts(trust: Examination, judged: Judged) -> tuple[str, ...]:
-    """Why a result is not to be relied on, one clause for each finding that refutes it; empty if none does.
+    """List why a result is not to be relied on, one clause for each finding that refutes it; empty if none does.
 
     That changes grow beyond use spoils gradients. It refutes a result unless finer simulations come to the same: a walk
     may be a walk whatever its last state is.
@@ -59,8 +59,8 @@ def holds(trust: Examination, judged: Judged) -> bool:
     return bool(trust.refined) and all(refined_finding(row, judged).level in (GOOD, FAIR) for row in trust.refined)
 
 
-def verdict(status: str, judged: Judged, doubted: bool) -> str:
-    """The word for a run.
+def verdict_word(status: str, judged: Judged, doubted: bool) -> str:
+    """Return the word for a run.
 
     Args:
         status: how its solver ended.
@@ -77,7 +77,7 @@ def verdict(status: str, judged: Judged, doubted: bool) -> str:
 
 
 def verdict_words(word: str, status: str, checked: bool) -> str:
-    """A verdict in a few words, such as "best found, budget ended"."""
+    """Return a verdict in a few words, such as "best found, budget ended"."""
     how = ending(status).brief
     return {
         SOLVED: "solved",

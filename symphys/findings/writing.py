@@ -8,11 +8,11 @@ from collections.abc import Sequence
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MINUS = "\N{MINUS SIGN}"
 DASH = "\N{EN DASH}"
-THIN = "\N{NARROW NO-BREAK SPACE}"
+THIN_SPACE = "\N{NARROW NO-BREAK SPACE}"
 
 
 def show(value: float, digits: int = 3) -> str:
-    """A number with ``digits`` significant digits, as people write it; a dash for nan."""
+    """Return a number with ``digits`` significant digits, as people write it; a dash for nan."""
     if math.isnan(value):
         return DASH
     if math.isinf(value):
@@ -25,37 +25,42 @@ def show(value: float, digits: int = 3) -> str:
 
 
 def percent(share: float) -> str:
-    """A share >= 0 in percent; a dash for nan."""
+    """Return a share >= 0 in percent; a dash for nan."""
     if not math.isfinite(share):
         return show(share)
     return f"{show(100 * share, 2)} %" if share == 0 or share >= 1e-6 else "< 0.0001 %"
 
 
 def plain(value: float, decimals: int) -> str:
-    """Without an exponent; trailing zeros after the point go, thousands are set apart from 10 000 on."""
+    """Write a number without an exponent or trailing zeros; thousands are set apart from 10 000 on."""
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     if abs(value) >= 10_000:
         whole, point, rest = text.partition(".")
-        text = f"{int(whole):,}".replace(",", THIN) + point + rest
+        text = f"{int(whole):,}".replace(",", THIN_SPACE) + point + rest
     return sign("0" if text == "-0" else text)
 
 
 def sign(text: str) -> str:
-    """A true minus sign."""
+    """Return a true minus sign."""
     return text.replace("-", MINUS)
 
 
 def power(exponent: int) -> str:
-    """An exponent in superscripts."""
+    """Return an exponent in superscripts."""
     return str(exponent).translate(SUPERSCRIPTS)
 
 
 def several(number: int, noun: str, plural: str = "") -> str:
-    """``1 run``, ``3 runs``."""
+    """Write ``1 run``, ``3 runs``."""
     return f"{number} {noun if number == 1 else plural or noun + 's'}"
 
 
 def listed(parts: Sequence[str]) -> str:
-    """``a``, ``a and b``, ``a, b and c``."""
+    """Write ``a``, ``a and b``, ``a, b and c``."""
     return " and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else "".join(parts)
+
+
+def capital(text: str) -> str:
+    """Return the text with a capital letter."""
+    return text[:1].upper() + text[1:]

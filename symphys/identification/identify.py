@@ -1,9 +1,9 @@
-"""From recorded residuals to an Identification: fit, uncertainty, bootstrap, what is left, what is open."""
+"""From recorded residuals to an Identification: fit, uncertainty, bootstrap, residual analysis, and why to doubt it."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
@@ -11,21 +11,20 @@ import numpy as np
 
 from symphys.identification.fitting.fit import FittedRecordings, Monitor, fit, own_numbers
 from symphys.identification.fitting.multistart import SearchOptions, search
-from symphys.identification.fitting.state import FitOptions, FitState, begin
-from symphys.identification.inference.assessment import doubts, estimates
+from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, begin
 from symphys.identification.inference.bootstrap import Bootstrap, bootstrap, no_bootstrap, refitted
 from symphys.identification.inference.identifiability import open_directions
-from symphys.identification.inference.impacts import timed
 from symphys.identification.inference.residual_study import (
     ResidualSamples,
     prediction_errors,
     recording_errors,
     samples,
     study,
+    timed,
 )
 from symphys.identification.inference.uncertainty import Uncertainty
 from symphys.identification.interface import IdentificationError, RecordedResiduals
-from symphys.results.identification import HISTORY, GlobalSearch, Identification
+from symphys.results.identification import HISTORY, GlobalSearch, Identification, ParameterEstimate, QuantityResiduals
 from symphys.suggest import hint
 from symphys.types import Array, Ints
 
@@ -35,7 +34,7 @@ STARTS = ("guess", "before impact", "whole")
 
 @dataclass(frozen=True)
 class IdentificationOptions:
-    """What is computed.
+    """Options of an identification.
 
     Attributes:
         fit: of Levenberg-Marquardt and the loss.
@@ -66,7 +65,7 @@ class Clock:
     """Wall time by part."""
 
     def __init__(self) -> None:
-        """Nothing has taken time yet."""
+        """Begin with no time counted."""
         self.seconds: dict[str, float] = {}
 
     @contextmanager
@@ -86,9 +85,9 @@ def identify(
     name: str = "",
     title: str = "",
 ) -> Identification:
-    """All that the recordings say: see ``Identification``.
+    """Identify the numbers of a problem from its recordings.
 
-    ``start`` goes on from an interrupted fit; ``stop`` is asked after each iteration, ``monitor`` told of each.
+    ``start`` goes on from an interrupted fit; ``stop`` and ``monitor`` are called after each iteration.
 
     Raises:
         IdentificationError: nothing to fit to, or a simulation that is not finite at the guess, by name.
@@ -120,7 +119,7 @@ def assessed(
     name: str = "",
     title: str = "",
 ) -> Identification:
-    """The record of a fit of the recordings in ``which``; ``source`` is the problem with its first noise."""
+    """Return the record of a fit of the recordings in ``which``; ``source`` is the problem with its first noise."""
     problem, outcome, known = fitted.problem, fitted.outcome, fitted.uncertainty
     assert known is not None
     shared, own = outcome.state.shared, outcome.state.own
@@ -173,7 +172,7 @@ def assessed(
 def arrays(
     fitted: FittedRecordings, known: Uncertainty, which: Ints, everything: ResidualSamples, drawn: Bootstrap
 ) -> dict[str, Array]:
-    """Those of the record."""
+    """Return the arrays of the record."""
     rows, recordings = everything.rows, np.arange(len(fitted.problem.recordings))
     history = [[getattr(row, column) for column in HISTORY] for row in fitted.outcome.state.history]
     return {
@@ -197,7 +196,7 @@ def arrays(
 def resampled(
     fitted: FittedRecordings, which: Ints, options: IdentificationOptions, stop: Callable[[], bool] | None
 ) -> Bootstrap:
-    """The bootstrap, with some draws fitted in full where that is asked for."""
+    """Return the bootstrap, with some draws fitted in full where that is asked for."""
     problem, outcome, known = fitted.problem, fitted.outcome, fitted.uncertainty
     assert known is not None
     state = outcome.state
@@ -210,3 +209,82 @@ def resampled(
             found, refits=refitted(problem, options.fit, state, which, draws, options.seed, options.draws, stop)
         )
     return found
+
+
+DOUBTED_RATIO = 1.5
+"""Ratio of residuals to a given noise, or of both intervals, above which those of the Jacobian are doubted."""
+DOUBTED_DIFFERENCE = 0.5
+"""Difference of a refitted draw from its step, in standard deviations of the draws, above which steps are doubted."""
+
+
+def estimates(
+    problem: RecordedResiduals, outcome: FitOutcome, known: Uncertainty, drawn: Bootstrap
+) -> tuple[ParameterEstimate, ...]:
+    """Return the shared numbers with both intervals; at a kink that of the Jacobian reaches to that of its side."""
+    parameters, shared = problem.shared, outcome.state.shared
+    away = outcome.one_sided if outcome.one_sided.size else np.zeros(len(shared))
+    interval = known.interval(shared) + np.stack([np.minimum(away, 0), np.maximum(away, 0)], axis=1)
+    units = parameters.units or ("",) * len(parameters.names)
+    return tuple(
+        ParameterEstimate(
+            name=name,
+            unit=units[i],
+            value=float(shared[i]),
+            error=float(known.error[i]),
+            lower=float(interval[i, 0]),
+            upper=float(interval[i, 1]),
+            bootstrap_lower=float(drawn.interval[i, 0]),
+            bootstrap_upper=float(drawn.interval[i, 1]),
+            at_bound={-1: "lower", 0: "", 1: "upper"}[int(known.at_bound[i])],
+            guess=float(parameters.guess[i]),
+            least=float(parameters.lower[i]),
+            most=float(parameters.upper[i]),
+            prior_mean=float(parameters.prior_mean[i]),
+            prior_deviation=float(parameters.prior_deviation[i]),
+        )
+        for i, name in enumerate(parameters.names)
+    )
+
+
+def doubts(
+    outcome: FitOutcome,
+    parameters: Sequence[ParameterEstimate],
+    quantities: Sequence[QuantityResiduals],
+    drawn: Bootstrap,
+    freedom: int,
+) -> tuple[str, ...]:
+    """Return a sentence for each reason not to rely on the estimates or on their intervals.
+
+    ``freedom``: residuals less numbers that were estimated.
+    """
+    found = [] if outcome.status is FitStatus.CONVERGED else [f"the fit has not converged: {outcome.reason}"]
+    found += [f"{each.name} is at its {each.at_bound} bound, {each.value:.6g}" for each in parameters if each.at_bound]
+    if freedom < 1:
+        found.append(f"numbers are {1 - freedom} too many for the residuals: nothing is left to judge the fit by")
+    for quantity in quantities:
+        if quantity.verdict == "missing effect":
+            found.append(f"the model misses an effect on {quantity.name}: {quantity.text}")
+        elif quantity.noise_known and quantity.ratio > DOUBTED_RATIO:
+            found.append(f"residuals of {quantity.name} are {quantity.ratio:.2g} times the given noise")
+    wider = [each.name for each in parameters if bootstrap_share(each) > DOUBTED_RATIO]
+    if wider:
+        found.append(
+            "recordings differ by more than the noise explains: rely on the bootstrap's intervals, which are wider, of "
+            + ", ".join(wider)
+        )
+    if drawn.refits.size:
+        spread = drawn.draws.std(axis=0)
+        away = np.abs(drawn.refits - drawn.draws[: len(drawn.refits)])
+        worst = float(np.max(away / np.where(spread > 0, spread, np.inf)))
+        if worst > DOUBTED_DIFFERENCE:
+            found.append(
+                f"draws of the bootstrap that were fitted in full differ from its steps by up to {worst:.2g} standard "
+                "deviations: within the intervals the model is not linear"
+            )
+    return tuple(found)
+
+
+def bootstrap_share(each: ParameterEstimate) -> float:
+    """Return the bootstrap's interval by that of the Jacobian; nan where either is not known."""
+    width = each.upper - each.lower
+    return (each.bootstrap_upper - each.bootstrap_lower) / width if width > 0 else np.nan

@@ -65,7 +65,7 @@ class FitParameters:
 
     @property
     def sets(self) -> tuple[str, ...]:
-        """(n,) what each sets."""
+        """Return (n,) what each number sets."""
         return self.quantities or self.names
 
 
@@ -102,7 +102,7 @@ def fit_parameters(
 
 @dataclass(frozen=True, eq=False)
 class ResidualRows:
-    """What the m residuals of one recording are of.
+    """The meaning of the m residuals of one recording.
 
     Attributes:
         quantity: (m,) index into the measured quantities of the problem.
@@ -119,7 +119,7 @@ class ResidualRows:
     impact: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        """Without impacts none is known."""
+        """Take times since impacts as unknown where none are given."""
         if not self.impact.size:
             object.__setattr__(self, "impact", np.full(self.time.shape, np.nan))
 
@@ -147,10 +147,33 @@ class RecordedResiduals(Protocol):
     """Of the quantities: False where ``noise`` is a guess, whose scale is estimated."""
 
     def rows(self, recording: int) -> ResidualRows:
-        """What the residuals of a recording are of; asked often, so worth keeping."""
+        """Describe the residuals of a recording; called often, so worth keeping."""
 
     def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
-        """(m_k,) residuals of each recording in ``which``; shared (s,), own (K, o)."""
+        """Return the residuals (m_k,) of each recording in ``which``; shared (s,), own (K, o)."""
 
     def jacobian(self, shared: Array, own: Array, which: Ints) -> Rows:
         """Residuals and derivatives of each recording in ``which``."""
+
+
+class DerivedResiduals:
+    """A problem made from another one, with the same recordings, numbers and quantities."""
+
+    def __init__(self, problem: RecordedResiduals) -> None:
+        """Take all but the residuals from ``problem``."""
+        self.problem = problem
+        self.recordings, self.held_back = problem.recordings, problem.held_back
+        self.shared, self.own = problem.shared, problem.own
+        self.quantities, self.units, self.noise_known = problem.quantities, problem.units, problem.noise_known
+
+    def rows(self, recording: int) -> ResidualRows:
+        """Describe the residuals of a recording."""
+        return self.problem.rows(recording)
+
+    def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
+        """Return the residuals (m_k,) of each recording in ``which``."""
+        return self.problem.residuals(shared, own, which)
+
+    def jacobian(self, shared: Array, own: Array, which: Ints) -> Rows:
+        """Return residuals and derivatives of each recording in ``which``."""
+        return self.problem.jacobian(shared, own, which)

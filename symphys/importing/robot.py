@@ -14,7 +14,7 @@ from symphys.importing.packages import model_file
 from symphys.importing.records import CompiledModel, Finding, ImportOptions, Kind, gathered
 from symphys.importing.source import AS_IT_IS, read_source
 from symphys.importing.tables.contacts import read_contacts
-from symphys.importing.tables.joints import read_joints, read_loops, read_motors
+from symphys.importing.tables.joints import read_couplings, read_joints, read_loops, read_motors
 from symphys.importing.tables.links import body_table, read_links
 from symphys.importing.tables.pose import begin, keyframe, lift, reference_pose
 from symphys.importing.tables.reading import ModelReading, numbers
@@ -112,7 +112,8 @@ def tables_of(source: CompiledModel, options: ImportOptions) -> tuple[dict[str, 
             table["collide"] = True
     begin(reading, joints)
     sites = read_sites(reading)
-    loops, couplings = read_loops(reading, touching)
+    couplings = read_couplings(reading)
+    loops = read_loops(reading, touching)
     sensors = read_sensors(reading)
     nothing_of(reading)
     found = {

@@ -54,7 +54,7 @@ class Body:
         SymphysError: names the body and what would be valid.
 
     Example:
-        >>> from symphys import Body
+        >>> from symphys.model import Body
         >>> crate = Body.box("crate", size=(0.4, 0.3, 0.2), density=500, position=(0, 0, 1))
         >>> round(crate.mass, 9), [round(moment, 9) for moment in crate.inertia]
         (12.0, [0.13, 0.2, 0.25])

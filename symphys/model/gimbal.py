@@ -28,9 +28,10 @@ class Screw:
 
     Attributes:
         axis: (3,) unit vector.
-        point: (3,) on the axis of a hinge [m]; None of a slide.
+        point: (3,) on the axis [m]; None of a slide.
         low, high: bounds of the coordinate [rad], [m].
         carried: whether a rotor's inertia, an armature, answers the coordinate itself.
+        lead: displacement along an axis with a point, by the angle [m/rad].
     """
 
     axis: Array
@@ -38,6 +39,7 @@ class Screw:
     low: float = -np.inf
     high: float = np.inf
     carried: bool = False
+    lead: float = 0.0
 
 
 def locks(screws: Sequence[Screw], paths: Sequence[Sequence[int]] | None = None) -> bool:
@@ -95,7 +97,8 @@ def _velocities(screws: Sequence[Screw], path: Sequence[int], q: Array, centre: 
             moved = moved + q[k] * axis
             continue
         point = turned.apply(given - centre) + moved
-        columns[:3, k], columns[3:, k] = axis, np.cross(point, axis) / size
+        lead = screws[k].lead
+        columns[:3, k], columns[3:, k] = axis, (np.cross(point, axis) + lead * axis) / size
         step = Rotation.from_rotvec(q[k] * axis)
-        turned, moved = step * turned, point + step.apply(moved - point)
+        turned, moved = step * turned, point + step.apply(moved - point) + q[k] * lead * axis
     return columns

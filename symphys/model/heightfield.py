@@ -62,7 +62,7 @@ class Heightfield:
         origin: (2,) x and y of the first height [m].
 
     Example:
-        >>> from symphys import Heightfield, Terrain
+        >>> from symphys.model import Heightfield, Terrain
         >>> hills = Terrain("hills", Heightfield(((0, 0, 0), (0, 0.2, 0), (0, 0, 0)), spacing=(1, 1), origin=(-1, -1)))
         >>> float(hills.height(0, 0))
         0.2

@@ -104,7 +104,7 @@ def initial_state(world: World, values: Mapping[str, Any] = NOTHING) -> Any:
     ``hinge.unwrapped`` [rad] that fit the poses; by itself that is the joint's ``start``.
 
     Example:
-        >>> from symphys import Body, Layout, initial_state, make_world
+        >>> from symphys.model import Body, Layout, initial_state, make_world
         >>> world = make_world([Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1))])
         >>> x = initial_state(world, {"ball.velocity": [3, 0, 2]})
         >>> x[Layout(world)["ball.velocity"]]

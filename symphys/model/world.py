@@ -7,11 +7,15 @@ SI units; vectors are in world coordinates unless a field says "body frame".
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from math import inf, prod
+from operator import itemgetter
 from types import MappingProxyType
 from typing import Any
+
+import casadi as ca
+import numpy as np
 
 from symphys.errors import SymphysError
 from symphys.model.body import Body
@@ -23,6 +27,7 @@ from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Static, Surface, contact_points, surface
 from symphys.model.site import Site
 from symphys.suggest import hint, quote
+from symphys.types import Array
 
 Vector = Sequence[Any]
 """three of them"""
@@ -43,20 +48,36 @@ class Law:
     table states; where 0 leaves equations out, it is ``structural``: then variables set it only where it is not 0.
 
     Attributes:
-        friction: Coulomb's coefficient mu; |tangential impulse| <= mu * normal impulse, on the exact disc.
+        friction: Coulomb's coefficient mu; |tangential impulse| <= mu * normal impulse, on the exact disc. Two numbers:
+            mu along ``friction_direction`` and across it; tangential impulses are in the ellipse with these half axes,
+            times the normal impulse.
         restitution: Newton's e in [0, 1].
         torsion: radius [m] of the torque about the normal: |torque| <= torsion * normal force.
         rolling: radius [m] of the torque across the normal: |torque| <= rolling * normal force.
         frequency: [Hz] of a soft contact (Catto, GDC 2011); 0 is a rigid contact. A soft contact has no restitution.
         damping: damping ratio of a soft contact.
+        friction_direction: (3,) of any length but 0; what of it lies across the contact's normal counts.
+        friction_frame: the body in whose frame that direction is, and with which it turns; None: the world's axes.
+        friction_side: which of the two bodies of a pair that is, 0 or 1; worlds set it.
     """
 
-    friction: Scalar = field(default=0.5, metadata={"combine": prod, "physical": (0.0, inf)})
+    friction: Scalar | tuple[Scalar, Scalar] = field(
+        default=0.5, metadata={"combine": lambda both: _product(*both), "physical": (0.0, inf)}
+    )
     restitution: Scalar = field(default=0.0, metadata={"combine": prod, "physical": (0.0, 1.0)})
     torsion: Scalar = field(default=0.0, metadata={"combine": sum, "physical": (0.0, inf), "structural": True})
     rolling: Scalar = field(default=0.0, metadata={"combine": sum, "physical": (0.0, inf), "structural": True})
     frequency: Scalar = field(default=0.0, metadata={"physical": (0.0, inf), "structural": True})
     damping: Scalar = field(default=1.0, metadata={"physical": (0.0, inf)})
+    friction_direction: tuple[float, ...] | None = field(default=None, metadata={"combine": itemgetter(0)})
+    friction_frame: str | None = field(default=None, metadata={"states": "pairs"})
+    friction_side: int | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Lists become tuples."""
+        for key in ("friction", "friction_direction"):
+            if isinstance(getattr(self, key), list):
+                object.__setattr__(self, key, tuple(getattr(self, key)))
 
     @property
     def soft(self) -> bool:
@@ -64,9 +85,149 @@ class Law:
         return not is_zero(self.frequency)
 
     @property
+    def rubs(self) -> bool:
+        """Whether the contact has friction across its normal."""
+        return not all(map(is_zero, _both(self.friction)))
+
+    @property
     def spins(self) -> bool:
         """Whether the contact resists spinning or rolling."""
         return not (is_zero(self.torsion) and is_zero(self.rolling))
+
+    @property
+    def largest_friction(self) -> Scalar:
+        """The largest friction force per unit of normal force, in any direction."""
+        one, other = _both(self.friction)
+        return one if one is other else ca.fmax(one, other)
+
+    def between(self, names: Sequence[str]) -> Law:
+        """The law of a pair of bodies, by their names; without the name of what stands still."""
+        frame = self.friction_frame if self.friction_frame in names else None
+        return replace(self, friction_frame=frame, friction_side=None if frame is None else names.index(frame))
+
+    @classmethod
+    def of(cls, stated: Statements) -> Law:
+        """The law of two surfaces: what one table states holds, and what two state is combined.
+
+        A direction that a surface states is in the frame of that surface.
+        """
+        found = {}
+        for key, sources in stated.items():
+            numbers = [number for _, number in sources]
+            found[key] = numbers[0] if len(numbers) == 1 else COMBINE[key](numbers)
+        if found.get("friction_direction") is not None and not _frame_is_stated(stated):
+            found["friction_frame"] = stated["friction_direction"][0][0]
+        if not isinstance(found.get("friction"), tuple):  # one number, as a pair may state it, has no direction
+            found |= dict.fromkeys(("friction_direction", "friction_frame"))
+        return cls(**found)
+
+    def mujoco_friction(self, normal: Vector | None) -> MujocoFriction:
+        """The friction of the contact as MuJoCo has it.
+
+        Args:
+            normal: (3,) unit vector of the contact; None where MuJoCo's contact frame turns with a body.
+        """
+        rolls, twists = not is_zero(self.rolling), not is_zero(self.torsion)
+        directions = 6 if rolls else 4 if twists else 3 if self.rubs else 1
+        turns, (along, across) = self._turns_in_mujoco(normal), _both(self.friction)
+        if turns is None:
+            along = across = self.largest_friction
+        first, second = (across, along) if turns else (along, across)
+        departure = "" if turns is not None else NO_DIRECTION
+        return MujocoFriction(directions, (first, second, self.torsion, self.rolling, self.rolling), departure)
+
+    def _turns_in_mujoco(self, normal: Vector | None) -> bool | None:
+        """Whether the direction of friction is MuJoCo's second tangent, not the first; None if it is neither."""
+        if not isinstance(self.friction, tuple) or self.friction_direction is None:
+            return False
+        if normal is None or self.friction_side is not None:
+            return None
+        first = mujoco_tangent(normal)
+        one, other = (
+            abs(float(np.dot(tangent, self.friction_direction))) for tangent in (first, np.cross(normal, first))
+        )
+        return False if other < ROUNDING * one else True if one < ROUNDING * other else None
+
+
+def mujoco_tangent(normal: Any) -> Array:
+    """(3,) unit vector: the first tangent of a contact in MuJoCo whose frame follows from its normal (3,) alone.
+
+    It is the part of the y axis across the normal; of the z axis where the normal is nearer than 60 degrees to y.
+    """
+    n = np.array(normal, float)
+    axis = np.array([0.0, 1.0, 0.0]) if abs(n[1]) < 0.5 else np.array([0.0, 0.0, 1.0])
+    across = axis - n * (n @ axis)
+    return np.asarray(across / np.linalg.norm(across))
+
+
+def _both(friction: Any) -> tuple[Any, Any]:
+    """Friction along and across a direction; one coefficient twice."""
+    return friction if isinstance(friction, tuple) else (friction, friction)
+
+
+def _product(one: Any, other: Any) -> Any:
+    """The friction of two surfaces."""
+    if not isinstance(one, tuple) and not isinstance(other, tuple):
+        return prod((one, other))
+    return tuple(a * b for a, b in zip(_both(one), _both(other), strict=True))
+
+
+def _frame_is_stated(stated: Statements) -> bool:
+    """Whether the table that states the direction of friction also states in whose frame it is."""
+    owners = [stated.get(key, [("", None)])[0][0] for key in ("friction_direction", "friction_frame")]
+    return owners[0] == owners[1]
+
+
+NO_DIRECTION = (
+    "friction along and across a direction that is no tangent of MuJoCo's contact, as y and x are on the ground; "
+    "the larger coefficient holds in all directions"
+)
+ROUNDING = 1e-9
+
+Statements = Mapping[str, Sequence[tuple[str, Any]]]
+"""By coefficient: the tables that state it for two surfaces (a pair, [contact], one surface or both), and its value."""
+COMBINE: dict[str, Callable[[list[Any]], Any]] = {
+    each.name: each.metadata["combine"] for each in fields(Law) if "combine" in each.metadata
+}
+"""The coefficients that surfaces state, and what makes one of the numbers of two surfaces."""
+
+
+@dataclass(frozen=True)
+class MujocoFriction:
+    """Friction of a contact in MuJoCo.
+
+    Attributes:
+        directions: in how many a contact acts (condim): the normal, two across, about the normal, two rolling.
+        coefficients: (5,) along the two tangents of its contact frame, torsion [m], rolling [m] about both tangents.
+        departure: what differs there; empty if nothing does.
+    """
+
+    directions: int
+    coefficients: tuple[Scalar, ...]
+    departure: str = ""
+
+
+def contradictions(names: Sequence[str], stated: Statements) -> Iterator[tuple[str, str]]:
+    """What cannot hold at once for two surfaces: the coefficient that is at fault, and a message with the remedy."""
+    law, both = Law.of(stated), " and ".join(sorted(names)) + ": " * bool(names)
+    if law.soft and law.restitution:
+        text = f"a contact is either soft (frequency {law.frequency:g} Hz) or has restitution ({law.restitution:g})"
+        yield "frequency", f"{both}{text}; leave one out, or make one of them 0 for these two in a [[pair]] table"
+    owners = {key: [owner for owner, _ in sources] for key, sources in stated.items()}
+    directions = [owner for owner, direction in stated["friction_direction"] if direction is not None]
+    overridden = not {*owners["friction"]} <= {*names, *directions, "contact"}  # by a pair: what surfaces state waits
+    if isinstance(law.friction, tuple) and not directions:
+        yield "friction", f"{both}two numbers are friction along and across friction_direction; give that too"
+    if not isinstance(law.friction, tuple) and directions and not overridden:
+        yield "friction_direction", f"{both}has no effect with one number of friction; give it two: [along, across]"
+    if len(directions) > 1:
+        text = "both surfaces state a direction of friction; state friction and friction_direction of these two in a"
+        yield "friction_direction", f"{both}{text} [[pair]] table"
+    frame = stated["friction_frame"][0][1]
+    if frame is not None and not (directions and _frame_is_stated(stated)):
+        yield "friction_frame", f"{both}has no effect without a friction_direction beside it; give that too"
+    elif frame is not None and frame not in names:
+        yield "friction_frame", f"{both}must be the name of one of these two, not {quote(frame)}"
 
 
 @dataclass(frozen=True)
@@ -200,7 +361,8 @@ def make_world(
         SymphysError: names the body, joint or pair, and what would be valid.
 
     Example:
-        >>> from symphys import Body, Law, Plane, Problem, make_world, simulate
+        >>> from symphys import Problem, simulate
+        >>> from symphys.model import Body, Law, Plane, make_world
         >>> ball = Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1), velocity=(3, 0, 2))
         >>> crate = Body.box("crate", size=(0.4, 0.4, 0.4), density=100, position=(2, 0, 0.2))
         >>> laws = {("ball", "ground"): Law(friction=0.3, restitution=0.8)}
@@ -218,6 +380,7 @@ def make_world(
     own = {frozenset(names): each for names, each in laws.items()}
     own |= {frozenset(joint.between): None for joint in joints if not joint.collide}
     world = World(bodies, statics, all_pairs(bodies, statics, law or Law(), own), tuple(gravity), held)
+    _check_friction(law or Law(), ())
     for names, each in laws.items():
         _check_law(world, names, each)
     return world
@@ -246,6 +409,8 @@ def points_of(bodies: Sequence[Body], statics: Sequence[Static], a: Side, b: Sid
     """The points where two surfaces may touch."""
     count = contact_points(surface_of(bodies, statics, a), surface_of(bodies, statics, b))
     name = f"{side_name(bodies, statics, a)}-{side_name(bodies, statics, b)}"
+    if law.friction_direction is not None:
+        law = law.between([owner(bodies, statics, side) for side in (a, b) if side.body is not None])
     return [Pair(f"{name}:{k}" if count > 1 else name, a, b, law, k) for k in range(count)]
 
 
@@ -276,6 +441,13 @@ def _check_names(bodies: Sequence[Body], statics: Sequence[Static], joints: Sequ
         seen.add(part.name)
 
 
+def _check_friction(law: Law, names: Sequence[str]) -> None:
+    """Two coefficients need a direction, in the world's axes or those of one of the two."""
+    for key, text in contradictions(names, {key: [("law", number)] for key, number in vars(law).items()}):
+        if key.startswith("friction"):
+            raise SymphysError(f"law: {key}: {text}")
+
+
 def _check_law(world: World, names: tuple[str, str], law: Law | None) -> None:
     """The two must exist, and touch if they have a law."""
     known = [part.name for part in (*world.bodies, *world.statics)]
@@ -283,6 +455,7 @@ def _check_law(world: World, names: tuple[str, str], law: Law | None) -> None:
         if name not in known:
             raise SymphysError(f"laws: no body and no static surface is called {quote(name)}; {hint(name, known)}")
     met = {frozenset(owner(world.bodies, world.statics, side) for side in (p.first, p.second)) for p in world.pairs}
+    _check_friction(law or Law(), names)
     if law is not None and frozenset(names) not in met:
         raise SymphysError(
             f"laws: {' and '.join(names)} never touch; a joint keeps its bodies apart unless collide=True"

@@ -1,4 +1,4 @@
-"""A controller: state in, command out."""
+"""Model predictive control: a measured state in, a command out."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from symphys.transcription.feedback.state_reader import StateReader
 from symphys.types import Array
 
 State = ArrayLike | Mapping[str, ArrayLike]
+"""A measured state: (nx,), or quantities by name."""
 
 
 class Controller:
     """Model predictive control of a problem with a table [mpc].
 
-    Each call measures, plans and commands: the last plan is shifted to now and begins at the measured state; iterations
-    of iLQR improve it; the command is what it does first. Plans keep the bounds of the variables. Costs and constraints
-    count from now to the end of the horizon, targets at its end.
+    Each call takes a measured state and returns a command. It shifts the last plan to the current time and to this
+    state, improves it by iterations of iLQR, and returns its first inputs. Plans respect the bounds of the variables.
+    Costs and constraints count from the current time to the end of the horizon, targets at its end.
 
     Attributes:
-        problem: what it controls.
-        horizon: its [mpc].
-        inputs: names of the commands, one for each number: ``elbow.command``, ``ball.force[2]``.
+        problem: the problem that is controlled.
+        horizon: its table [mpc].
+        inputs: the name of each entry of a command: ``elbow.command``, ``ball.force[2]``.
         plan: the last plan; None before the first call.
 
     Example:
@@ -46,10 +47,10 @@ class Controller:
 
         Args:
             problem: what ``load`` takes.
-            threads: that share the steps of a plan; None: one for each processor.
+            threads: number of threads that share the steps of a plan; None: one for each processor.
 
         Raises:
-            ProblemError: there is no [mpc], or a receding horizon makes no sense for the problem.
+            ProblemError: there is no [mpc], or the problem cannot have a receding horizon.
         """
         self.problem: Problem = load(problem)
         self._planner = Planner(self.problem, threads)
@@ -66,28 +67,29 @@ class Controller:
 
     @property
     def start(self) -> Array:
-        """(nx,) the first state of the file."""
+        """The first state (nx,) of the problem."""
         return self._planner.start
 
     @property
     def planner(self) -> Planner:
-        """What plans."""
+        """The planner, which optimises over the horizon."""
         return self._planner
 
     def __call__(self, state: State, time: float) -> Array:
-        """RecedingPlan from a measured state, and command.
+        """Plan from a measured state and return the command (m,).
+
+        If the model is not finite from the measured state, the previous plan is used until its horizon ends.
 
         Args:
-            state: (nx,) the state of this engine, or coordinates and rates by name: see ``state_names``.
-            time: [s], not before that of the last call; the first call takes longer, since it plans from the guess.
-
-        Where the model is not finite from the measured state, the plan before goes on, as far as it reaches.
+            state: the state vector (nx,), or coordinates and rates by name, as ``state_names`` lists them.
+            time: the time of the measurement [s], not before that of the last call. The first call takes longer, since
+                it plans from the guess.
 
         Returns:
-            (m,) the inputs from now on, in the order of ``inputs``, in the units of their motors, or N and N m.
+            The inputs (m,) in the order of ``inputs``, in the units of their motors, or N and N m, world frame.
 
         Raises:
-            SymphysError: a state that does not fit, a time that goes back, a model that does not stay finite.
+            SymphysError: the state does not fit, the time decreases, or no plan is finite.
         """
         plan = self.plan
         if plan is not None and time < plan.time:
@@ -103,12 +105,15 @@ class Controller:
         return self.command(time)
 
     def command(self, time: float, state: State | None = None, plan: RecedingPlan | None = None) -> Array:
-        """(m,) what a plan commands at a time, between ticks or after its own.
+        """Return the command (m,) of a plan at a time between two calls.
 
         Args:
-            time: [s].
-            state: as measured then: the command answers it by the gains of the plan; None: as planned.
-            plan: None: the last.
+            time: the time [s].
+            state: the state measured at this time, to whose deviation the gains of the plan respond; None: as planned.
+            plan: the plan; None: the last.
+
+        Raises:
+            SymphysError: there is no plan yet.
         """
         plan = self.plan if plan is None else plan
         if plan is None:
@@ -125,9 +130,9 @@ class Controller:
 
     @property
     def state_names(self) -> dict[str, int]:
-        """What a state by name has, and how many numbers each is; see ``StateReader``."""
+        """The quantities of a state by name, and the number of entries of each."""
         return dict(self.reader.sizes)
 
     def reset(self) -> None:
-        """Forget the plan: the next call plans from the guess."""
+        """Discard the plan: the next call plans from the guess."""
         self.plan = None

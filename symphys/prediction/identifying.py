@@ -1,26 +1,32 @@
-"""``symphys.identify``: what the recordings of a problem say about its variables."""
+"""``symphys.identify``: what recordings say about the variables of a problem; replays of the worst recordings."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from symphys import files
 from symphys import identification as numbers
 from symphys.errors import SymphysError
 from symphys.identification import FitOptions, FitState, FitStep, IdentificationOptions, SearchOptions, revive_state
-from symphys.prediction.replays import worst_replays
-from symphys.prediction.residuals import RecordingResiduals, residuals_of
+from symphys.prediction.residuals import RecordingResiduals, difference, residuals_of
 from symphys.problem import IdentifySettings, Problem
 from symphys.problem.loading import Source, load
 from symphys.results.identification import Identification
-from symphys.results.identification.replays import write_replays
+from symphys.results.identification.replays import RecordingReplay, ReplayedQuantity, write_replays
+from symphys.results.scene import Scene
+from symphys.results.scene_of_problem import make_scene
 from symphys.suggest import hint
 from symphys.threads import limited
+from symphys.trajectory import Trajectory, shapes
+from symphys.types import Array
 
 STATE = "identification_state.json"
 """Of a folder: where an interrupted fit goes on."""
@@ -46,8 +52,8 @@ def identify(
         problem: what ``load`` takes, with [[recording]] tables.
         folder: gets identification.json and identification.npz, and what an interrupted fit goes on from; None: none.
         threads: that share the simulations; None: one for each processor.
-        monitor: is told of each iteration.
-        stop: is asked after each iteration whether to stop there.
+        monitor: is called with each iteration.
+        stop: is called after each iteration; True ends the fit there.
         settings: in place of those in [identify]: ``loss="huber"``, ``bootstrap=200``, ``check="cma"``,
             ``horizons=(0.3, 0.5, 0.7, 0.85, 1)``, ``held_back_starts="before impact"``.
 
@@ -73,7 +79,7 @@ def identify(
         key = state_key(loaded, chosen)
         start = None if place is None else saved_state(place, key, residuals)
 
-        def told(step: FitStep, state: FitState) -> None:
+        def save_step(step: FitStep, state: FitState) -> None:
             if place is not None:
                 files.write_json(place / STATE, {"key": key, **state.plain()})
             if monitor is not None:
@@ -81,7 +87,7 @@ def identify(
 
         if place is not None:
             files.make_folder(place)
-        found = numbers.identify(residuals, options_of(chosen), start, told, stop, loaded.name, loaded.title)
+        found = numbers.identify(residuals, options_of(chosen), start, save_step, stop, loaded.name, loaded.title)
     if place is not None:
         write_replays(place, *worst_replays(loaded, residuals, found))
         found.write(place)
@@ -91,7 +97,7 @@ def identify(
 
 
 def with_settings(given: IdentifySettings, settings: dict[str, Any]) -> IdentifySettings:
-    """Those of the file with others in their place; SymphysError names one that there is not, or has no such value."""
+    """Replace settings of the file; SymphysError names one that there is not, or that has no such value."""
     for name in settings:
         if name not in vars(given):
             raise SymphysError(f"identify has no setting {name!r}; {hint(name, vars(given))}")
@@ -101,7 +107,7 @@ def with_settings(given: IdentifySettings, settings: dict[str, Any]) -> Identify
 
 
 def options_of(settings: IdentifySettings) -> IdentificationOptions:
-    """What is computed."""
+    """Return the options of the identification."""
     threshold = settings.threshold if settings.loss == "huber" else math.inf
     search = SearchOptions(settings.check_evaluations, seed=settings.seed) if settings.check == "cma" else None
     horizons = tuple(map(float, settings.horizons))
@@ -111,13 +117,85 @@ def options_of(settings: IdentifySettings) -> IdentificationOptions:
 
 
 def state_key(problem: Problem, settings: IdentifySettings) -> str:
-    """The same for the same problem, recordings and settings."""
+    """Return a key that is equal for the same problem, recordings and settings."""
     return sha256(f"{problem.identity}\n{dict(problem.settings)}\n{settings}".encode()).hexdigest()
 
 
 def saved_state(folder: Path, key: str, residuals: RecordingResiduals) -> FitState | None:
-    """Where an interrupted fit of the same problem was; None: nowhere."""
+    """Read where an interrupted fit of the same problem stopped; None where there is none."""
     if not (folder / STATE).exists():
         return None
     saved = files.read_json(folder / STATE)
     return revive_state(saved, residuals) if isinstance(saved, dict) and saved.get("key") == key else None
+
+
+MOST = 3
+"""Recordings that are replayed."""
+POSE = re.compile(r"(?P<body>[^.]+)\.(?P<field>position|orientation)(\[(?P<component>[0-9])\])?")
+"""A quantity that is a pose, or one number of it."""
+
+
+def worst_replays(
+    problem: Problem, residuals: RecordingResiduals, found: Identification
+) -> tuple[tuple[RecordingReplay, ...], Scene]:
+    """Return the recordings with the largest residuals, and the world of the first of them."""
+    names = [name for name, _ in found.worst(MOST)]
+    shared = np.array([each.value for each in found.parameters])
+    replays = tuple(_replay(residuals, found, shared, found.recordings.index(name)) for name in names)
+    predictor = residuals.predictor
+    z = predictor.by_variable(shared, found.own[found.recordings.index(names[0])], found.recordings.index(names[0]))
+    return replays, make_scene(problem, z, replays[0].motion)
+
+
+def _replay(residuals: RecordingResiduals, found: Identification, shared: Array, k: int) -> RecordingReplay:
+    predictor = residuals.predictor
+    taken, own = predictor.recordings[k], found.own[k]
+    motion, last, time = predictor.motion(shared, own, k)
+    (sampled,) = predictor.values(shared, found.own, [k])
+    motion = shortened(motion, last)
+    quantities, poses = list[ReplayedQuantity](), dict[tuple[str, str], Array]()
+    for each, unit, predicted, factor in residuals.columns(k, sampled):
+        if each.orientation:
+            off = -difference(each, predicted)
+            quantities.append(ReplayedQuantity(each.name, "rad", off, np.zeros_like(off)))
+        else:
+            measured = predicted - difference(each, predicted) if each.angle else factor * each.values
+            quantities.append(ReplayedQuantity(each.name, unit, measured, factor * predicted))
+        if (pose := POSE.fullmatch(each.value.text)) and pose["body"] in motion.body_names:
+            key = pose["body"], pose["field"]
+            whole = poses.setdefault(key, simulated(motion, *key, time))
+            columns = slice(None) if pose["component"] is None else [int(pose["component"])]
+            whole[:, columns] = each.values if each.orientation else factor * each.values
+    bodies = tuple(dict.fromkeys(body for body, field in poses if field == "position"))
+    turned = [poses.get((name, "orientation"), simulated(motion, name, "orientation", time)) for name in bodies]
+    n = len(time)
+    return RecordingReplay(
+        name=taken.name,
+        held_back=taken.held_back,
+        ratio=float(found.recording_ratio[k]),
+        time=time,
+        quantities=tuple(quantities),
+        bodies=bodies,
+        position=np.stack([poses[name, "position"] for name in bodies], 1) if bodies else np.zeros((n, 0, 3)),
+        orientation=np.stack(turned, 1) if bodies else np.zeros((n, 0, 4)),
+        motion=motion,
+    )
+
+
+def simulated(motion: Trajectory, body: str, field: str, time: Array) -> Array:
+    """Interpolate a simulated pose at other times: (n, 3 or 4)."""
+    values = motion[f"{body}.{field}"]
+    return np.stack([np.interp(time, motion.time, column) for column in values.T], axis=1)
+
+
+def shortened(motion: Trajectory, steps: int) -> Trajectory:
+    """Return the first steps of a motion."""
+    parts: dict[str, Any] = dict(_parts(motion, steps))
+    return replace(motion, time=motion.time[: steps + 1], **parts)
+
+
+def _parts(motion: Trajectory, steps: int) -> Iterator[tuple[str, Array]]:
+    lengths = {"N + 1": steps + 1, "N": steps}
+    for name, letters in shapes().items():
+        if letters and letters[0] in lengths:
+            yield name, getattr(motion, name)[: lengths[letters[0]]]

@@ -13,9 +13,9 @@ from symphys.problem import Problem, Variable
 from symphys.problem.units import formula_units
 from symphys.types import Array, Ints
 
-DRY = "dry_friction"
+JOINT_FRICTION = "dry_friction"
 """What advice calls the friction of a joint, which another recording determines than that of a surface."""
-TURN = 0.1
+ORIENTATION_SCALE = 0.1
 """[rad] a sensible change of an orientation."""
 
 
@@ -42,7 +42,7 @@ class NumberBlock:
 
     @cached_property
     def count(self) -> int:
-        """How many they are."""
+        """Return how many numbers the block has."""
         return 3 if self.turns else len(self.where)
 
     @cached_property
@@ -52,7 +52,7 @@ class NumberBlock:
 
 
 def number_blocks(problem: Problem, start: int) -> tuple[tuple[NumberBlock, ...], tuple[NumberBlock, ...]]:
-    """Those of shared variables, then those with a value for each recording; ``start``: where variables begin in z."""
+    """Return the blocks of shared variables, and those of variables with a value for each recording."""
     found: dict[bool, list[NumberBlock]] = {False: [], True: []}
     for variable in problem.variables:
         blocks = found[variable.each]
@@ -65,7 +65,7 @@ def number_blocks(problem: Problem, start: int) -> tuple[tuple[NumberBlock, ...]
 
 
 def fit_numbers(problem: Problem, blocks: Sequence[NumberBlock], guess: Array) -> FitParameters:
-    """The numbers with bounds, scales and priors; ``guess`` (n,) or (K, n)."""
+    """Return the numbers with bounds, scales and priors; ``guess`` (n,) or (K, n)."""
     world = problem.world()
     columns: dict[str, list[Array]] = {key: [] for key in ("lower", "upper", "scale", "mean", "deviation")}
     names, sets, units = list[str](), list[str](), list[str]()
@@ -74,7 +74,7 @@ def fit_numbers(problem: Problem, blocks: Sequence[NumberBlock], guess: Array) -
         variable, slot = block.variable, block.variable.slots[0]
         labels = axes(variable.name, block.count)
         names += labels
-        sets += [DRY if slot.name in frictions else slot.name] * len(labels)
+        sets += [JOINT_FRICTION if slot.name in frictions else slot.name] * len(labels)
         unit = formula_units(world, (), [variable]).get(variable.name, "")
         units += ["rad" if block.turns else unit] * len(labels)
         for key, numbers in numbers_of(block).items():
@@ -103,7 +103,7 @@ def numbers_of(block: NumberBlock) -> dict[str, Array]:
     if block.turns:
         deviation = free if variable.prior is None else np.full(3, float(variable.prior[1].max()))
         zero = np.zeros(3)
-        return {"lower": -free, "upper": free, "scale": zero + TURN, "mean": zero, "deviation": deviation}
+        return {"lower": -free, "upper": free, "scale": zero + ORIENTATION_SCALE, "mean": zero, "deviation": deviation}
     mean, deviation = (np.zeros(block.count), free) if variable.prior is None else variable.prior
     return {
         "lower": variable.lower,
@@ -115,5 +115,5 @@ def numbers_of(block: NumberBlock) -> dict[str, Array]:
 
 
 def axes(name: str, count: int) -> list[str]:
-    """``size[0]``, ``size[1]``; the name alone of one number."""
+    """Write ``size[0]``, ``size[1]``; the name alone of one number."""
     return [name] if count == 1 else [f"{name}[{k}]" for k in range(count)]

@@ -11,7 +11,6 @@ import numpy as np
 
 from symphys.expression import parse
 from symphys.model.joints.joint import UNWRAPPED
-from symphys.prediction.impacts import impact_times
 from symphys.prediction.parameters import number_blocks
 from symphys.prediction.recorded_inputs import delays, input_variables, step_means
 from symphys.prediction.rotations import turned
@@ -59,7 +58,7 @@ class Predictor:
     """
 
     def __init__(self, problem: Problem, recordings: Sequence[Recording], threads: int | None = None) -> None:
-        """Nothing is compiled before it is asked for; KernelUnavailable then, where nothing can be compiled."""
+        """Trace the simulation, which is compiled when it is first used; KernelUnavailable where it cannot be."""
         self.recordings, self.dt = tuple(recordings), problem.simulation.dt
         last = math.ceil(max(r.time[-1] for r in self.recordings) / self.dt - CLOSE)
         steps = max(last, problem.simulation.steps) + 2
@@ -74,9 +73,8 @@ class Predictor:
         self._variables = whole.variables
         watched = {text: formula for text, formula in velocities.items() if text not in formulas}
         driven = [variable.name for variable in self._given if variable.kind == "control"]
-        self._motion = QuantitySlopes(
-            symbolic_rollout(whole), formulas, threads=threads, by_step=driven, watched=watched
-        )
+        rollout = symbolic_rollout(whole, asked=formulas.values())
+        self._motion = QuantitySlopes(rollout, formulas, threads=threads, by_step=driven, watched=watched)
         self.sizes = {text: self._motion.sizes[text] for text in formulas}
         self._velocities, self._gravity = tuple(velocities), np.asarray(problem.world().gravity, float)
         guess = np.concatenate([variable.guess for variable in whole.variables])
@@ -92,7 +90,7 @@ class Predictor:
             yield PredictedSamples(interpolated(samples, each.at)[0], None, each.scale, each.by_scale)
 
     def slopes(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[PredictedSamples]:
-        """The same with derivatives."""
+        """Predict the recordings, with derivatives by shared and own numbers."""
         set_ = [self._set(shared, own[k], k) for k in which]
         lasts = [each.last(self._motion.steps) for each in set_]
         z, along = np.array([each.z for each in set_]), np.array([each.along for each in set_])
@@ -102,7 +100,7 @@ class Predictor:
             yield PredictedSamples(values, by, each.scale, each.by_scale)
 
     def impacts(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[Array]:
-        """(i,) [s] when the recordings have impacts, on their clocks; see ``impact_times``."""
+        """Yield (i,) [s] the instants of impacts of the recordings, on their clocks."""
         set_ = [self._set(shared, own[k], k) for k in which]
         lasts = [each.last(self._motion.steps) for each in set_]
         z = np.array([each.z for each in set_])
@@ -117,7 +115,7 @@ class Predictor:
         return record.motion, each.last(rollout.steps), each.at * self.dt
 
     def by_variable(self, shared: Array, own: Array, k: int) -> dict[str, Array]:
-        """What the simulation of a recording gets, by variable: (components, 1) each."""
+        """Return the simulation's inputs for a recording, by variable: (components, 1) each."""
         z, found, place = self._set(shared, own, k).z, dict[str, Array](), 0
         for variable in self._variables:
             found[variable.name] = z[place : place + variable.guess.size].reshape(variable.knots, -1).T
@@ -125,7 +123,7 @@ class Predictor:
         return found
 
     def _set(self, shared: Array, own: Array, k: int) -> _Set:
-        """What the simulation of a recording gets."""
+        """Return the simulation's inputs for a recording, with derivatives."""
         recording, width = self.recordings[k], len(shared)
         z, along = self.starts[k].copy(), np.zeros((self.starts.shape[1], width + len(own)))
         offset, scale = f"{recording.table}.offset", f"{recording.table}.scale"
@@ -156,7 +154,7 @@ class Predictor:
         return _Set(z, along, at, by[offset], measured[scale], by[scale])
 
     def _start(self, recording: Recording, guess: Array) -> Array:
-        """(n,): z at the guess, with what the recording sets."""
+        """Return (n,) z at the guess, with what the recording sets."""
         z = guess.copy()
         for variable, part in zip(self._given, self._parts, strict=True):
             z[part] = recording.start.get(variable.slots[0].name, variable.guess)
@@ -169,7 +167,7 @@ class Predictor:
         return z
 
     def _coordinates(self, recording: Recording) -> Array:
-        """(n,): by how much what own numbers set of joints is less in z, which begins at recorded coordinates."""
+        """Return (n,) the recorded joint coordinates at the start, where own numbers set these; else 0."""
         by = np.zeros(self.starts.shape[1])
         for block in self.own:
             slot = block.variable.slots[0]
@@ -178,7 +176,7 @@ class Predictor:
         return by
 
     def guesses(self, own: bool) -> Array:
-        """(s,) or (K, o): where numbers begin."""
+        """Return (s,) or (K, o) the guesses of shared or own numbers."""
         blocks = self.own if own else self.shared
         starts = self.starts + self._recorded if own else self.starts[0]
         found = np.zeros((*starts.shape[:-1], blocks[-1].part.stop if blocks else 0))
@@ -205,7 +203,7 @@ class _Set:
 
 
 def given_variables(problem: Problem, recordings: Sequence[Recording]) -> tuple[Variable, ...]:
-    """What recordings set at the start, as variables that nobody chooses."""
+    """Return what recordings set at the start, as variables that no solver chooses."""
     names = dict.fromkeys(name for recording in recordings for name in recording.start)
     nominal = problem.initial | {
         f"{joint.name}.{UNWRAPPED}": problem.parametric.starts()[f"{joint.name}.start"]
@@ -220,9 +218,31 @@ def _given(name: str, nominal: Array) -> Variable:
 
 
 def interpolated(samples: Array, at: Array) -> tuple[Array, Array]:
-    """(n, ...) linear between the rows of samples (steps, ...) at places in steps (n,), and the slope by the place."""
+    """Interpolate rows of samples (steps, ...) at places in steps (n,): (n, ...), and the slope by the place."""
     first = np.clip(np.floor(at + CLOSE).astype(int), 0, len(samples) - 2)
     share = np.clip(at - first, 0, 1).reshape(-1, *[1] * (samples.ndim - 1))
     share = np.where(share < CLOSE, 0.0, share)
     rise = samples[first + 1] - samples[first]
     return np.where(share == 0, samples[first], samples[first] + share * rise), rise
+
+
+JUMP = 0.1
+"""Share of the greatest speed of a body in a motion by which its velocity jumps at an impact, at least."""
+FALLS = 3.0
+"""And by so many times what gravity changes in a step: bodies that come to rest or rock have no impacts."""
+WITHIN = 1e-6
+"""Steps: an impact is counted from just after the start of its step, so that a sample there is before it."""
+
+
+def impact_times(velocity: Array, gravity: Array, dt: float) -> Array:
+    """Return (i,) [s] the starts of steps with an impact, of velocities (n, bodies, 3) [m/s] at the starts of n steps.
+
+    An impact changes a velocity by more than gravity (3,) [m/s^2] and by another amount than the step before, so that
+    motors and springs, which act over many steps, make none. The first step has none: nothing is before it.
+    """
+    change = np.diff(velocity, axis=0) - gravity * dt
+    speed = np.max(np.linalg.norm(velocity, axis=2), axis=0, initial=0.0)
+    least = np.maximum(JUMP * speed, FALLS * float(np.linalg.norm(gravity)) * dt)
+    jumps = np.linalg.norm(np.diff(change, axis=0, prepend=change[:1]), axis=2) > least
+    struck = np.any(jumps & (np.linalg.norm(change, axis=2) > least) & (least > 0), axis=1)
+    return np.asarray((np.flatnonzero(struck) + WITHIN) * dt, np.float64)

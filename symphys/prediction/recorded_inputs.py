@@ -20,12 +20,12 @@ from symphys.problem import RecordedInput, Recording, Variable, VariableSlot
 from symphys.transcription.randomization.sampler import hidden
 from symphys.types import Array
 
-SLACK = 1e-9
+JUMP_TOLERANCE = 1e-9
 """Of a step: a jump so near to the end of a step is there."""
 
 
 def input_variables(recordings: Iterable[Recording], steps: int) -> tuple[Variable, ...]:
-    """A variable for each recorded input, with a knot for each step, that nobody chooses; 0 at its guess."""
+    """Return a variable for each recorded input, with a knot for each step, that nobody chooses; 0 at its guess."""
     sizes = {name: each.values.shape[1] for recording in recordings for name, each in recording.inputs.items()}
     return tuple(
         hidden(f"{name}:recorded", "control", VariableSlot(name, tuple(range(size))), np.zeros(size * steps), steps)
@@ -39,7 +39,7 @@ def delays(recording: Recording) -> Mapping[str, float]:
 
 
 def step_means(recorded: RecordedInput, steps: int, dt: float, delay: float) -> tuple[Array, Array]:
-    """(steps, m) the inputs of the steps, and (steps, m) their derivatives by the delay [s].
+    """Return (steps, m) the inputs of the steps, and (steps, m) their derivatives by the delay [s].
 
     Args:
         recorded: with samples at times (k,) [s].
@@ -48,12 +48,12 @@ def step_means(recorded: RecordedInput, steps: int, dt: float, delay: float) -> 
         delay: [s] by which what was recorded acts later, on the clock of the simulation.
     """
     edges = np.arange(steps + 1, dtype=np.float64) * dt - delay
-    values, integral = _signal(recorded, edges, SLACK * dt)
+    values, integral = _signal(recorded, edges, JUMP_TOLERANCE * dt)
     return np.diff(integral, axis=0) / dt, -np.diff(values, axis=0) / dt
 
 
 def _signal(recorded: RecordedInput, at: Array, slack: float) -> tuple[Array, Array]:
-    """(n, m) the signal just before times (n,), and its integral from the first sample."""
+    """Return (n, m) the signal just before times (n,), and its integral from the first sample."""
     time, values = recorded.time, recorded.values
     span, rise = np.diff(time)[:, None], np.diff(values, axis=0)
     slopes = rise / span if recorded.interpolation == "linear" else np.zeros_like(rise)

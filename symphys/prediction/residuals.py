@@ -64,7 +64,7 @@ class RecordingResiduals:
         return np.asarray(np.maximum(GUESSED * np.where(spread > 0, spread, largest), LEAST))
 
     def rows(self, recording: int) -> ResidualRows:
-        """See ``RecordedResiduals``."""
+        """Describe the residuals of a recording."""
         taken, parts = self.predictor.recordings[recording], list[tuple[Any, ...]]()
         for each, kept in zip(taken.measured, self._present[recording], strict=True):
             place = self._places[_key(taken, each)]
@@ -75,12 +75,12 @@ class RecordingResiduals:
         return ResidualRows(quantity, component, time, noise)
 
     def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
-        """See ``RecordedResiduals``."""
+        """Return the residuals (m_k,) of each recording in ``which``."""
         found = self.predictor.values(shared, own, which.tolist())
         return [self._residuals(int(k), sampled) for k, sampled in zip(which, found, strict=True)]
 
     def jacobian(self, shared: Array, own: Array, which: Ints) -> list[tuple[Array, Array, Array]]:
-        """See ``RecordedResiduals``."""
+        """Return residuals and derivatives of each recording in ``which``."""
         found = []
         for k, sampled in zip(which, self.predictor.slopes(shared, own, which.tolist()), strict=True):
             by = self._slopes(int(k), sampled)
@@ -88,7 +88,7 @@ class RecordingResiduals:
         return found
 
     def simulated_impacts(self, shared: Array, own: Array, which: Ints) -> list[Array]:
-        """(i,) [s] instants of the simulated impacts of each recording in ``which``."""
+        """Return (i,) [s] the instants of the simulated impacts of each recording in ``which``."""
         return list(self.predictor.impacts(shared, own, which.tolist()))
 
     def _residuals(self, k: int, sampled: PredictedSamples) -> Array:
@@ -112,7 +112,7 @@ class RecordingResiduals:
         return np.asarray(np.sqrt(taken.weight) * np.concatenate(parts))
 
     def _parts(self, k: int) -> Iterator[tuple[Measured, Bools, int, slice]]:
-        """What was measured, where there is a number, its place among quantities, and its columns of predictions."""
+        """Yield what was measured, where there is a number, its index among quantities, and its predicted columns."""
         taken = self.predictor.recordings[k]
         stops = np.cumsum(list(self.predictor.sizes.values())).tolist()
         columns = {
@@ -123,7 +123,7 @@ class RecordingResiduals:
             yield each, kept, self._places[_key(taken, each)], columns[each.value.text]
 
     def columns(self, k: int, sampled: PredictedSamples) -> Iterator[tuple[Measured, str, Array, float]]:
-        """Of a recording what was measured, its unit, what is predicted, and the factor from measured to predicted."""
+        """Yield what was measured, its unit, what is predicted, and the factor from measured to predicted."""
         for each, _, place, columns in self._parts(k):
             yield each, self._units[place], sampled.values[:, columns], self._scale(place, sampled)
 
@@ -132,7 +132,7 @@ class RecordingResiduals:
 
 
 def residuals_of(problem: Problem, threads: int | None = None) -> RecordingResiduals:
-    """The residuals of all recordings of a problem; IdentificationError where there is nothing to identify."""
+    """Return the residuals of all recordings of a problem; IdentificationError where there is nothing to identify."""
     if not problem.recordings:
         raise IdentificationError("there is no [[recording]] to identify from; see docs/identification.md")
     if not problem.variables:
@@ -141,13 +141,13 @@ def residuals_of(problem: Problem, threads: int | None = None) -> RecordingResid
 
 
 def present(measured: Measured) -> Bools:
-    """(n, residuals of a sample): where there is a number."""
+    """Return (n, residuals of a sample) where there is a number."""
     finite: Bools = np.isfinite(measured.values)
     return np.repeat(np.all(finite, axis=1, keepdims=True), 3, axis=1) if measured.orientation else finite
 
 
 def difference(measured: Measured, predicted: Array) -> Array:
-    """(n, m) predicted less measured; of orientations (n, 3) the rotation vector [rad] from measured to predicted.
+    """Return (n, m) predicted less measured; of orientations the rotation vector (n, 3) [rad] to the predicted one.
 
     Angles of joints are known up to whole turns, see ``without_turns``.
     """
@@ -158,7 +158,7 @@ def difference(measured: Measured, predicted: Array) -> Array:
 
 
 def without_turns(off: Array) -> Array:
-    """(n,) [rad]: differences of angles from an encoder that counts from anywhere, is cut, or is set back on the way.
+    """Remove whole turns from differences (n,) [rad] of an encoder that counts from anywhere or is reset.
 
     The first is the nearest of those that differ by whole turns, and none jumps by more than half a turn to the next.
     """
@@ -170,17 +170,17 @@ def without_turns(off: Array) -> Array:
 
 
 def quantity_names(keys: Sequence[tuple[str, str]]) -> tuple[str, ...]:
-    """What is measured, by its name; with the table's where tables have the same name for different formulas."""
+    """Name the measured quantities; with the table's name where tables use one name for different formulas."""
     names = [name for name, _ in keys]
     return tuple(name if names.count(name) == 1 else f"{name}: {text}" for name, text in keys)
 
 
 def _key(recording: Recording, measured: Measured) -> tuple[str, str]:
-    """What makes a quantity: its name and formula."""
+    """Return what makes a quantity: its name and formula."""
     return measured.name, measured.value.text
 
 
 def _unit(measured: Measured, world: World) -> str:
-    """Of what was measured, as far as it is known."""
+    """Return the unit of what was measured, as far as it is known."""
     units = {name: unit for name in measured.value.names if (unit := quantity_unit(name, world)) is not None}
     return unit_of(measured.value, units)

@@ -6,7 +6,7 @@ import numpy as np
 
 from symphys.types import Array
 
-SMALL = 1e-4
+SMALL_ANGLE = 1e-4
 """Of the sine of half an angle: below it series stand for quotients."""
 
 
@@ -15,7 +15,7 @@ def turned(q: Array, v: Array) -> tuple[Array, Array]:
     half = float(np.linalg.norm(v)) / 2
     sinc = np.sinc(half / np.pi)
     turn = np.array([np.cos(half), *(sinc / 2 * v)])
-    slope = (np.cos(half) - sinc) / half**2 / 8 if half > SMALL else -1 / 24
+    slope = (np.cos(half) - sinc) / half**2 / 8 if half > SMALL_ANGLE else -1 / 24
     by = np.vstack([-sinc / 4 * v, sinc / 2 * np.eye(3) + slope * np.outer(v, v)])
     w, x, y, z = q
     left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
@@ -23,13 +23,13 @@ def turned(q: Array, v: Array) -> tuple[Array, Array]:
 
 
 def rotation_vectors(q: Array, p: Array) -> Array:
-    """(n, 3) [rad]: of conj(q) p, the rotation from q to p (n, 4) in the frame that q turns; at most half a turn."""
+    """Return (n, 3) [rad] the rotation vectors of conj(q) p, from q to p (n, 4), in the frame of q; at most pi long."""
     w, v, _ = _relative(q, p)
     return np.asarray(_factors(w, v)[0] * v)
 
 
 def rotation_slopes(q: Array, p: Array) -> Array:
-    """(n, 3, 4): how these change with p."""
+    """Return (n, 3, 4) the derivatives of ``rotation_vectors`` by p."""
     w, v, rows = _relative(q, p)
     factor, by_w, by_s = _factors(w, v)
     by_v = factor[:, :, None] * np.eye(3) + by_s[:, :, None] * v[:, :, None] * v[:, None, :]
@@ -47,9 +47,9 @@ def _relative(q: Array, p: Array) -> tuple[Array, Array, Array]:
 
 
 def _factors(w: Array, v: Array) -> tuple[Array, Array, Array]:
-    """The rotation vector is f v: f, its derivative by w, and that by |v| over |v|; each (n, 1)."""
+    """Return the rotation vector is f v: f, its derivative by w, and that by |v| over |v|; each (n, 1)."""
     s = np.linalg.norm(v, axis=1, keepdims=True)
-    size, small = w**2 + s**2, s < SMALL
+    size, small = w**2 + s**2, s < SMALL_ANGLE
     safe, whole = np.where(small, 1.0, s), np.where(small, w, 1.0)
     f = np.where(small, 2 / whole * (1 - s**2 / (3 * whole**2)), 2 * np.arctan2(safe, w) / safe)
     by_s = np.where(small, -4 / (3 * whole**3), (2 * w / size - f) / safe**2)

@@ -10,7 +10,7 @@ import numpy as np
 
 from symphys.errors import SymphysError
 from symphys.model.jointed import REST
-from symphys.model.joints import AffineMotor, Joint, Motor, Servo, VelocityMotor
+from symphys.model.joints import JOINTS, AffineMotor, Joint, Motor, Servo, VelocityMotor
 from symphys.model.joints.frames import MEET
 from symphys.model.joints.placing import PlacedJoint
 from symphys.model.joints.start import State, moved_to_zero, placed_frames, spanning_tree, unmoved
@@ -93,7 +93,7 @@ def axes_at_zero(joint: PlacedJoint, zero: State, bent: bool) -> Array:
     """(3, 3): the axes of both frames as columns, world frame; SymphysError unless the frames coincide."""
     placed, _ = placed_frames(joint, zero)
     apart = float(np.linalg.norm(placed.apart))
-    tilt = 0.0 if joint.kind.name == "ball" else float(np.linalg.norm(placed.a - placed.b)) / np.sqrt(2)
+    tilt = 0.0 if not joint.kind.turns else float(np.linalg.norm(placed.a - placed.b)) / np.sqrt(2)
     if not max(apart, tilt) <= MEET:
         cause = "; where joints close a loop, a problem file needs all of their coordinates 0 at the start" * bent
         raise SymphysError(
@@ -105,16 +105,10 @@ def axes_at_zero(joint: PlacedJoint, zero: State, bent: bool) -> Array:
 
 def joint_table(world: World, joint: Joint, named: PlacedJoint, axes: Array) -> dict[str, Any]:
     """A joint, by its anchors and by its axes (3, 3) where its coordinates are 0."""
-    x, y, _ = axes.T
-    kinds: dict[str, dict[str, Any]] = {
-        "hinge": {"axis": x.tolist()},
-        "slider": {"axis": x.tolist()},
-        "universal": {"axes": [y.tolist(), x.tolist()]},
-    }
     table: dict[str, Any] = {
         "name": joint.name,
         "between": [named.second or "world", named.first],
-        joint.kind.name: kinds.get(joint.kind.name, {}),
+        joint.kind.name: JOINTS[joint.kind.name].table(joint.kind, axes),
         "anchors": [floats(joint.frames[1].point), floats(joint.frames[0].point)],
         "collide": any({pair.first.body, pair.second.body} == set(joint.bodies) for pair in world.pairs),
         "frequency": named.frequency,

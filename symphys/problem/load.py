@@ -16,7 +16,7 @@ from symphys.model.state_layout import input_sizes
 from symphys.model.world import World
 from symphys.problem.checks.memory import check_rollout
 from symphys.problem.checks.pair_limit import check_pair_limit
-from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names, sensor_names
+from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names
 from symphys.problem.checks.start_values import StartValues
 from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
 from symphys.problem.guess.table import read_guess
@@ -151,7 +151,8 @@ def build(
     check_laws(parametric, nominal, faults)
     check_couplings(nominal, faults)
     known = quantities(initial, parametric.parameters(), input_sizes(nominal)) | duration_quantity(simulation.duration)
-    sensors, controllers = read_control(document, parametric, known, functions, starts, given, faults)
+    warm = simulation.warm_start
+    sensors, controllers = read_control(document, parametric, known, functions, starts, given, warm, faults)
     sets = read_sets(document.phase, parametric, faults)
     known |= named_quantities(document, controllers, sets) | delay_quantities(references) | start_quantities(parametric)
     variables = read_variables(document.variable, known, simulation, faults)
@@ -161,7 +162,7 @@ def build(
     faults.stop_if_any()
     values = at_guess(parametric, known, variables)
     start = checked_start(starts, parametric, values, faults)
-    named = {**formula_names(values, start, variables), **given}
+    named = {**formula_names(values, start, variables, warm), **given}
     forces, termination, objectives = read_laws(document, simulation, sets, nominal, known, named, variables, faults)
     measured = read_identification(document, parametric, nominal, initial, simulation, named, variables, faults)
     check_read_at_start(objectives.phases, sensors, (document.ending[0], termination), faults)
@@ -220,13 +221,14 @@ def read_control(
     functions: Mapping[str, ca.Function],
     starts: StartValues,
     given: Mapping[str, Any],
+    warm_start: bool,
     faults: Faults,
 ) -> tuple[tuple[Sensor, ...], tuple[FeedbackController, ...]]:
     """Sensors and controllers without fault."""
     sensors: tuple[Sensor, ...] = ()
     if document.sensor:
         values = at_guess(parametric, known, ())
-        read = {**sensor_names(values, starts.of(parametric, values)), **given}
+        read = {**formula_names(values, starts.of(parametric, values), (), warm_start), **given}
         sensors = read_sensors(document.sensor, read, faults)
         faults.stop_if_any()
     varied = {name.partition("[")[0].strip() for table in document.variable for name in table.sets}

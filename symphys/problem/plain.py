@@ -11,7 +11,7 @@ from symphys.errors import SymphysError
 
 
 def numbers(thing: Any) -> dict[str, float]:
-    """The fields of a law, a motor or a spring that are not None."""
+    """The fields of a motor or a spring that are not None."""
     return {key: floats(value) for key, value in vars(thing).items() if value is not None}
 
 

@@ -96,7 +96,8 @@ class Problem(ProblemData):
             SymphysError: names what cannot be, or what a problem file cannot say.
 
         Example:
-            >>> from symphys import Body, Plane, Problem, make_world, solve
+            >>> from symphys import Problem, solve
+            >>> from symphys.model import Body, Plane, make_world
             >>> ball = Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1))
             >>> world = make_world([ball], [Plane.ground()])
             >>> there = {"value": "ball.position - [3, 0, 1]", "tolerance": 0.01}
@@ -145,7 +146,8 @@ def load_problem(
 
     Example:
         >>> import symphys
-        >>> symphys.load_problem(symphys.new("mine.toml"), {"simulation.dt": 0.005}).simulation.dt
+        >>> from symphys.problem import load_problem
+        >>> load_problem(symphys.new("mine.toml"), {"simulation.dt": 0.005}).simulation.dt
         0.005
     """
     path = Path(path)

@@ -10,10 +10,11 @@ from math import inf, pi
 import numpy as np
 
 from symphys.model.state_layout import input_sizes
+from symphys.model.world import COMBINE
 from symphys.problem.feedback import FeedbackController
 from symphys.problem.model import DURATION, Kind, ProblemData, Variable, VariableSlot
 from symphys.problem.parametric.joints import OWN
-from symphys.problem.parametric.parts import COMBINE, STRUCTURAL, VARIABLE
+from symphys.problem.parametric.parts import STRUCTURAL, VARIABLE
 from symphys.problem.parametric.world import CONTACT, ParametricWorld
 from symphys.problem.references import DELAY, ReferenceTrajectory
 from symphys.suggest import hint, quote

@@ -16,7 +16,8 @@ from symphys.model.shapes import Fixture, Plane, Shape, Static, Terrain
 from symphys.model.shapes.inertia import inertia_of, off_centre, specific
 from symphys.model.world import Law, Side, World
 from symphys.problem.joint_tables import joint_tables
-from symphys.problem.plain import floats, numbers
+from symphys.problem.parametric.parts import LAW
+from symphys.problem.plain import floats
 
 LONGEST = 20_000
 """Characters; beyond that an expression repeats so much that a grid of heights serves better."""
@@ -196,7 +197,7 @@ def terrain_table(terrain: Terrain) -> dict[str, Any]:
         raise SymphysError(f"terrain {terrain.name!r}: {text}") from None
 
 
-def contact_tables(world: World) -> tuple[dict[str, float], list[dict[str, Any]]]:
+def contact_tables(world: World) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """The law of most pairs, and a [[pair]] table for each two surfaces with another law, or with none."""
     laws: dict[tuple[str, str], set[Law]] = {}
     for pair in world.pairs:
@@ -216,9 +217,12 @@ def contact_tables(world: World) -> tuple[dict[str, float], list[dict[str, Any]]
     return law_table(most), tables
 
 
-def law_table(law: Law) -> dict[str, float]:
+def law_table(law: Law) -> dict[str, Any]:
     """The keys of a law; rigid contacts have no frequency and damping."""
-    found = numbers(law)
+    values = {key: getattr(law, key) for key in LAW}
+    found = {
+        key: value if isinstance(value, str) else floats(value) for key, value in values.items() if value is not None
+    }
     return found if law.soft else {key: found[key] for key in found if key not in ("frequency", "damping")}
 
 

@@ -13,7 +13,7 @@ from symphys.results.text_files import ReportError, reason
 
 
 def read_archive(path: Path, only: Sequence[str] = ()) -> dict[str, Any]:
-    """Every array of an archive, or ``only`` those of these names that it has.
+    """Read every array of an archive, or ``only`` those of these names that it has.
 
     Raises:
         ReportError: no such file, not an archive of plain arrays, or arrays of more than MOST_BYTES.

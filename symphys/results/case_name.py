@@ -14,7 +14,7 @@ LONGEST = 80
 
 
 def case_name(problem: str, settings: Mapping[str, object], guess: str = "") -> str:
-    """``ball_throw``, or ``ball_throw@ground.friction=0.6`` under settings, whatever order they were given in.
+    """Return ``ball_throw``, or ``ball_throw@ground.friction=0.6`` under settings, whatever order they were given in.
 
     Settings that are too long for a name, or have characters that not every file system keeps apart, are shortened
     and end in a digest of the whole. ``guess`` is a last word for a guess from elsewhere, ``guess=1a2b3c4d``.
@@ -31,5 +31,5 @@ def case_name(problem: str, settings: Mapping[str, object], guess: str = "") -> 
 
 
 def settings_words(settings: Mapping[str, object], between: str = ", ") -> str:
-    """``ground.friction=0.6, simulation.dt=0.01``, in the order of the keys; empty without settings."""
+    """Write ``ground.friction=0.6, simulation.dt=0.01``, in the order of the keys; empty without settings."""
     return between.join(f"{key}={json.dumps(files.strict(settings[key]))}" for key in sorted(settings))

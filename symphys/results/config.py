@@ -16,7 +16,7 @@ from symphys.json_values import Text
 
 @dataclass(frozen=True)
 class Config:
-    """One solve.
+    """The settings of one solve.
 
     Attributes:
         problem: the stem of the problem's file.
@@ -39,17 +39,17 @@ class Config:
     key: str = ""
 
     def to_json(self) -> dict[str, Any]:
-        """The object of config.json."""
+        """Return the object of config.json."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> Config:
-        """The object of config.json; empty texts for what it does not have."""
+        """Read the object of config.json; empty texts for what it does not have."""
         return values.record(cls, value, text)
 
 
 def read_config(path: Path) -> Config:
-    """The configuration in a file of this program's own; FileError if there is none."""
+    """Read the configuration in a file of this program's own; FileError if there is none."""
     return Config.from_json(files.read_json(path), values.verbatim)
 
 
@@ -63,7 +63,7 @@ def make_config(
     backend: str,
     guess: Mapping[str, str] | None = None,
 ) -> Config:
-    """The configuration with its key; ``text`` is the problem's ``identity``."""
+    """Return the configuration with its key; ``text`` is the problem's ``identity``."""
     guess = guess or {}
     parts = [text, settings, solver, options, seed, backend, *([guess["digest"]] if guess else [])]
     canonical = json.dumps(files.strict(parts), sort_keys=True, allow_nan=False)

@@ -20,31 +20,31 @@ RANKS = {word: rank for rank, word in enumerate((SOLVED, BEST_FOUND, DOUBTED))}
 
 
 def middle(numbers: Sequence[float]) -> float:
-    """The median; the sum of two may be beyond the largest double, that of their halves is not."""
+    """Return the median; the sum of two may be beyond the largest double, that of their halves is not."""
     return 2 * float(np.median(np.asarray(numbers, float) / 2))
 
 
 @dataclass(frozen=True)
 class Entry:
-    """All runs of one solver on one problem, by seed."""
+    """The runs of one solver on one problem, by seed."""
 
     solver: str
     runs: tuple[Run, ...]
 
     @property
     def solved(self) -> int:
-        """How many runs are solved."""
+        """Return how many runs are solved."""
         return sum(run.solved for run in self.runs)
 
     def median(self, numbers: list[float]) -> float:
-        """The median of those that are finite; nan if none is."""
+        """Return the median of those that are finite; nan if none is."""
         finite = [number for number in numbers if np.isfinite(number)]
         return middle(finite) if finite else np.nan
 
 
 @dataclass(frozen=True)
 class Study:
-    """All runs of one problem in one place."""
+    """The runs of one problem in one place."""
 
     problem: str
     place: str
@@ -52,22 +52,22 @@ class Study:
 
     @property
     def runs(self) -> tuple[Run, ...]:
-        """Every run."""
+        """Return the runs of all solvers."""
         return tuple(run for entry in self.entries for run in entry.runs)
 
     @property
     def title(self) -> str:
-        """The problem's title."""
+        """Return the problem's title."""
         return self.runs[0].title
 
     @property
     def settings(self) -> str:
-        """What the command line changed in the problem's file; empty if nothing."""
+        """Write what the command line changed in the problem's file; empty if nothing."""
         return settings_words(self.runs[0].settings)
 
     @property
     def best(self) -> Run:
-        """The best by its verdict, then the lowest objective, then the lowest cost."""
+        """Return the best by its verdict, then the lowest objective, then the lowest cost."""
 
         def merit(run: Run) -> tuple[int, float, float]:
             known = [np.inf if np.isnan(number) else number for number in (run.objective, run.equivalents)]
@@ -77,7 +77,7 @@ class Study:
 
 
 def run_folders(root: Path) -> list[Path]:
-    """Every folder at or below ``root`` that looks like a run folder, in order of name. Raises ReportError."""
+    """List the folders at or below ``root`` that look like run folders, in order of name. Raises ReportError."""
     if not root.is_dir():
         raise ReportError(f"{root}: there is no such folder; give one that `symphys solve --out` has written")
     found = []
@@ -108,7 +108,7 @@ def studies(runs: Sequence[Run]) -> list[Study]:
 
 
 def make_study(problem: str, place: str, runs: Sequence[Run]) -> Study:
-    """The study of one problem in one place; its solvers in order of name, seeds in order."""
+    """Return the study of one problem in one place; its solvers in order of name, seeds in order."""
     solvers: dict[str, list[Run]] = {}
     for run in sorted(runs, key=lambda run: (run.solver, run.seed, run.place)):
         solvers.setdefault(run.solver, []).append(run)
@@ -116,7 +116,7 @@ def make_study(problem: str, place: str, runs: Sequence[Run]) -> Study:
 
 
 def sample(study: Study, most: int) -> Study:
-    """The study with at most so many runs of each solver, evenly among its seeds, the first and the last of them."""
+    """Keep at most so many runs of each solver, evenly among its seeds, the first and the last of them."""
 
     def some(runs: tuple[Run, ...]) -> tuple[Run, ...]:
         chosen = np.linspace(0, len(runs) - 1, min(len(runs), most)).round().astype(int)
@@ -126,5 +126,5 @@ def sample(study: Study, most: int) -> Study:
 
 
 def parent(run: Run) -> str:
-    """The folder that holds the run folder, below the report's folder."""
+    """Return the folder that holds the run folder, below the report's folder."""
     return run.place.rpartition("/")[0]

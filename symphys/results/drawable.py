@@ -23,13 +23,13 @@ def small(numbers: Any) -> bool:
 
 
 def largest(array: Any) -> float:
-    """The largest size of those that are finite; 0 without any."""
+    """Return the largest size of those that are finite; 0 without any."""
     sizes = np.abs(np.asarray(array, float))
     return float(np.max(sizes[np.isfinite(sizes)], initial=0.0))
 
 
 def drawable(value: T) -> T:
-    """A record, or a part of one, with nan for every number that is finite and cannot be drawn."""
+    """Return a record, or a part of one, with nan for every number that is finite and cannot be drawn."""
     found: Any = value
     if isinstance(value, np.ndarray) and value.dtype.kind == "f":
         found = np.where(np.isfinite(value) & (np.abs(value) > LARGEST), np.nan, value)

@@ -14,14 +14,14 @@ COLLINEAR = 1e-9
 """A corner counts where it makes a triangle with its neighbours of more than this area, by the square of the size."""
 COPLANAR = 1e-8
 """A point this near to the plane of a face belongs to it, by the size of the hull."""
-THIN = 1e-7
+FLAT_EXTENT = 1e-7
 """Corners whose extent in a direction is less, by the largest one, are in a plane or in a line."""
 SMOOTH = np.cos(np.deg2rad(35))
 """Faces whose normals are nearer to each other approximate a curved surface: pictures draw no edge between them."""
 
 
 def flat_hull(points: Array, size: float = 0.0) -> list[int]:
-    """The corners of the convex hull of (k, 2) points, counter-clockwise; two for a line.
+    """Return the corners of the convex hull of (k, 2) points, counter-clockwise; two for a line.
 
     Points are the same, or in a line, within a small share of their extent or of ``size``, whichever is larger. This is
     the monotone chain of Andrew, "Another efficient algorithm for convex hulls in two dimensions", 1979.
@@ -71,14 +71,14 @@ class Polytope:
 
     @property
     def sharp(self) -> NDArray[np.bool_]:
-        """(e,): whether an edge is one of the solid, and none that only approximates a curved surface."""
+        """Return (e,) whether an edge is one of the solid, and none that only approximates a curved surface."""
         left, right = self.normals[self.edges[:, 2]], self.normals[self.edges[:, 3]]
         return np.asarray((left * right).sum(axis=1) < SMOOTH)
 
 
 @lru_cache(maxsize=256)
 def make_polytope(corners: tuple[tuple[float, ...], ...]) -> Polytope:
-    """The convex hull of (k, 3) corners [m]."""
+    """Return the convex hull of (k, 3) corners [m]."""
     points = np.array(corners, float)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     size = float(np.abs(points - middle).max())
@@ -93,25 +93,25 @@ def make_polytope(corners: tuple[tuple[float, ...], ...]) -> Polytope:
 
 
 def steps(loop: list[int]) -> list[tuple[int, int]]:
-    """The pairs of neighbours in a closed loop."""
+    """Return the pairs of neighbours in a closed loop."""
     return list(zip(loop, loop[1:] + loop[:1], strict=True))
 
 
 def face_normal(corners: Array) -> Array:
-    """(3,): the unit normal of a polygon (k, 3), to the side from which it is counter-clockwise."""
+    """Return (3,) the unit normal of a polygon (k, 3), to the side from which it is counter-clockwise."""
     arms = corners - corners[0]
     area = np.cross(arms[1:-1], arms[2:]).sum(axis=0)
     return np.asarray(area / np.linalg.norm(area))
 
 
 def find_faces(points: Array) -> list[list[int]]:
-    """The faces of the hull of (k, 3) points within [-1, 1]."""
+    """Return the faces of the hull of (k, 3) points within [-1, 1]."""
     _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     if len(axes) == 3:
         axes[2] *= np.sign(np.linalg.det(axes))
     along = points @ axes.T
     extent = np.ptp(along, axis=0)
-    rank = int((extent > THIN * extent.max()).sum())
+    rank = int((extent > FLAT_EXTENT * extent.max()).sum())
     if rank < 2:
         return []
     if rank == 2:
@@ -121,7 +121,7 @@ def find_faces(points: Array) -> list[list[int]]:
 
 
 def merged(points: Array) -> list[list[int]]:
-    """The faces of the hull of (k, 3) points of extent 1: what Qhull finds, with one face for all in one plane."""
+    """Return the faces of the hull of (k, 3) points of extent 1, with one face for all in one plane."""
     from scipy.spatial import ConvexHull  # takes half a second: late, for those who draw polytopes
 
     planes = ConvexHull(points).equations
@@ -134,7 +134,7 @@ def merged(points: Array) -> list[list[int]]:
 
 
 def face_on(points: Array, on: Ints, normal: Array) -> list[int]:
-    """The corners of the face with these points, counter-clockwise about its normal."""
+    """Return the corners of the face with these points, counter-clockwise about its normal."""
     right = np.cross(np.eye(3)[np.abs(normal).argmin()], normal)
     right = right / np.linalg.norm(right)
     flat = np.stack([points[on] @ right, points[on] @ np.cross(normal, right)], axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 from symphys import files
 from symphys import json_values as values
 from symphys.findings.levels import Judged
-from symphys.findings.verdict import ACCEPTED, NOT_SOLVED, Ruling, rule
+from symphys.findings.verdict import ACCEPTED, NOT_SOLVED, Verdict, judge_run
 from symphys.json_values import Text
 from symphys.results.trace import renamed
 from symphys.types import Array
@@ -33,7 +33,7 @@ REACHED = frozenset(
 
 @dataclass(frozen=True)
 class CheckRecord:
-    """One target, constraint or goal: ``error`` and ``tolerance`` in its own unit; met where ``ratio`` <= 1.
+    """A target, constraint or goal: ``error`` and ``tolerance`` in its own unit; met where ``ratio`` <= 1.
 
     ``kind``: "target", "constraint" or "goal". ``name``: as in the problem file. ``unit``: empty where it is not known.
     """
@@ -48,7 +48,7 @@ class CheckRecord:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> CheckRecord:
-        """A check without a kind is a "check", one without a name has that of its kind."""
+        """Read a check; one without a kind is a "check", one without a name has that of its kind."""
         entry = value if isinstance(value, dict) else {}
         kind = text(entry.get("kind")) or "check"
         read = values.record(cls, value, text, kind=kind, name=text(entry.get("name")) or kind)
@@ -64,7 +64,7 @@ def _share(error: float, tolerance: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class VariableRecord:
-    """One variable; two are equal if the file has the same of them.
+    """A variable of a result; two are equal if the file has the same of them.
 
     Attributes:
         name: in the problem file; the key in the file.
@@ -82,7 +82,7 @@ class VariableRecord:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> VariableRecord:
-        """One without its name; a shape that does not fit the values is replaced by one knot."""
+        """Read a variable without its name; a shape that does not fit the values is replaced by one knot."""
         entry = values.table(value)
         size = values.numbers(entry.get("value")).size
         shape = [values.whole(number) for number in values.numbers(entry.get("shape"))[:2]]
@@ -103,7 +103,7 @@ class VariableRecord:
         return isinstance(other, VariableRecord) and files.strict(self.to_json()) == files.strict(other.to_json())
 
     def to_json(self) -> dict[str, Any]:
-        """The entry of the file."""
+        """Return the entry of the file."""
         flat = {key: getattr(self, key).T.ravel().tolist() for key in ("value", "guess", "lower", "upper")}
         for key in ("lower", "upper"):
             flat[key] = [number if math.isfinite(number) else None for number in flat[key]]
@@ -112,7 +112,7 @@ class VariableRecord:
 
 @dataclass(frozen=True)
 class StageRecord:
-    """One stage of continuation in the smoothing, and its best point.
+    """A stage of continuation in the smoothing, and its best point.
 
     Attributes:
         smoothing: of the contacts [m/s].
@@ -138,7 +138,7 @@ class StageRecord:
 
 @dataclass(frozen=True)
 class BackendRecord:
-    """What evaluated the functions.
+    """The backend that evaluated the functions.
 
     Attributes:
         name: of the backend.
@@ -158,7 +158,7 @@ class BackendRecord:
     compiled: str = ""
 
     def __str__(self) -> str:
-        """In a line."""
+        """Describe the backend in a line."""
         counts = [f"{n} {what}{'s' * (n > 1)}" for n, what in ((self.lanes, "lane"), (self.threads, "thread")) if n]
         start = {"cold": "compiled anew", "warm": "taken from the cache"}.get(self.compiled, "")
         parts = [self.name, *counts, self.precision and f"{self.precision} precision", self.compiler, start]
@@ -167,7 +167,7 @@ class BackendRecord:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """One solve, judged by the exact rollout at smoothing 0; nan or empty is what is not known.
+    """A solve, judged by the exact rollout at smoothing 0; nan or empty is what is not known.
 
     Two are equal if their files are. A number whose field has a ``label`` is shown under it at the top of the page,
     rounded to so many ``decimals`` if the field says so; a new one is named in ``ADDED_LATER``, so that
@@ -265,13 +265,13 @@ class Result:
         return math.inf if self.checks and math.isnan(worst) else worst
 
     def judge(self, met: bool) -> Judged:
-        """The judgement of the exact rollout; ``met``: whether nothing is missed."""
+        """Return the judgement of the exact rollout; ``met``: whether nothing is missed."""
         goal = any(check.kind == "goal" for check in self.checks)
         costs = np.nan if goal else sum(self.costs.values())
         return Judged(self.objective, self.worst_ratio, met, bool(self.checks), costs)
 
     def to_json(self) -> dict[str, Any]:
-        """The object of result.json."""
+        """Return the object of result.json."""
         found: dict[str, Any] = {"format": FORMAT}
         for each in dataclasses.fields(Result):
             found[each.name] = getattr(self, each.name)
@@ -285,9 +285,9 @@ class Result:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name, **given: Any) -> Self:
-        """The result in an object of result.json, as far as it can be read; ``given``: fields that are known already.
+        """Read the result in an object of result.json, as far as it can be read; ``given``: fields known already.
 
-        A file that is older than verdicts, whose ``solved`` means that everything is met, is ruled on anew.
+        A file that is older than verdicts, whose ``solved`` means that everything is met, is judged anew.
         """
         entry = value if isinstance(value, dict) else {}
         read = values.record(
@@ -303,7 +303,9 @@ class Result:
         if read.verdict:
             return read
         met = everything_met(entry, read)
-        return dataclasses.replace(read, **ruled(rule(read.status, read.judge(met), values.table(entry.get("trust")))))
+        return dataclasses.replace(
+            read, **verdict_fields(judge_run(read.status, read.judge(met), values.table(entry.get("trust"))))
+        )
 
 
 def everything_met(entry: Mapping[str, object], result: Result) -> bool:
@@ -311,13 +313,13 @@ def everything_met(entry: Mapping[str, object], result: Result) -> bool:
     return all(check.met for check in result.checks) and ("verdict" in entry or entry.get("solved") is True)
 
 
-def ruled(ruling: Ruling) -> dict[str, Any]:
-    """The fields of a result that hold a ruling."""
-    return {"solved": ruling.solved, "verdict": ruling.verdict, "doubts": ruling.doubts}
+def verdict_fields(verdict: Verdict) -> dict[str, Any]:
+    """Return the fields of a result that hold a verdict."""
+    return {"solved": verdict.solved, "verdict": verdict.word, "doubts": verdict.doubts}
 
 
 def read_result(path: Path) -> Result:
-    """The result in a file of this program's own; FileError, which names the file, if there is none."""
+    """Read the result in a file of this program's own; FileError, which names the file, if there is none."""
     try:
         value = files.read_json(path)
         if not isinstance(value, Mapping) or value.get("format") != FORMAT:

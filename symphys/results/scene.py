@@ -26,7 +26,7 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Solid:
-    """All points within ``radius`` of the convex hull of some corners; see ``RoundedHull``.
+    """The points within ``radius`` of the convex hull of some corners, as a ``RoundedHull``.
 
     Attributes:
         radius: [m].
@@ -46,29 +46,29 @@ class Solid:
 
     @classmethod
     def of(cls, kind: str, sizes: Mapping[str, Any], centre: Array, orientation: Array) -> Solid:
-        """The solid that a shape of this kind draws."""
+        """Return the solid that a shape of this kind draws."""
         whole = {key: tuple(size) if isinstance(size, np.ndarray) else size for key, size in sizes.items()}
         hull = SHAPES[kind].from_sizes(whole, tuple(centre), UPRIGHT).rounded_hull
         return cls(hull.radius, np.array(hull.corners, float), centre, orientation, kind, sizes)
 
     @property
     def polytope(self) -> Polytope:
-        """The faces and edges of the hull of its corners."""
+        """Return the faces and edges of the hull of its corners."""
         return make_polytope(tuple(map(tuple, self.corners.tolist())))
 
     @property
     def half(self) -> Array:
-        """(3,) [m]: half sizes of the box about its centre, along its own axes, that holds its corners."""
+        """Return the half sizes (3,) [m] of the box about its centre, along its own axes, that holds its corners."""
         return np.asarray(np.abs(self.corners).max(axis=0))
 
     @property
     def girth(self) -> float:
-        """From its centre to the nearest point of its surface [m]."""
+        """Return the distance [m] from its centre to the nearest point of its surface."""
         return self.radius + self.polytope.inradius
 
     @property
     def reach(self) -> float:
-        """From the origin to the farthest point, at most [m]."""
+        """Return the distance [m] from the origin to its farthest point, at most."""
         return float(np.linalg.norm(self.centre) + np.linalg.norm(self.corners, axis=1).max()) + self.radius
 
     @property
@@ -77,14 +77,14 @@ class Solid:
         return len(self.corners) == 1
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``shapes``: kind, sizes as in problem files, centre and, unless round, orientation."""
+        """Return an entry of ``shapes``: kind, sizes as in problem files, centre and, unless round, orientation."""
         sizes = {key: size.tolist() if isinstance(size, np.ndarray) else size for key, size in self.sizes.items()}
         turned = {"orientation": self.orientation.tolist()} if SHAPES[self.kind].turns else {}
         return {"kind": self.kind, **sizes, "centre": self.centre.tolist(), **turned}
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> Solid | None:
-        """One of the shapes; None if it has no size and place that can be drawn."""
+        """Read an entry of ``shapes``; None if it has no size and place that can be drawn."""
         entry = values.table(value)
         kind, centre = str(entry.get("kind", "sphere")), values.vector(entry.get("centre"))
         if kind not in SHAPES:
@@ -103,7 +103,7 @@ class Solid:
 
 
 def _points(value: object) -> Array:
-    """(n, 3): the points of a list of lists; nan for numbers that are missing."""
+    """Read a list of lists as points (n, 3); nan for numbers that are missing."""
     rows = [values.vector(row, np.nan) for row in value] if isinstance(value, list) else []
     return np.array(rows, float).reshape(-1, 3)
 
@@ -113,7 +113,7 @@ SIZES: dict[int, Callable[[object], Any]] = {0: _points, 1: values.number, 3: va
 
 
 def _orientation(value: object) -> Array:
-    """(4,): a unit quaternion; no rotation for anything that is none."""
+    """Read a unit quaternion (4,); no rotation for anything that is none."""
     read = values.numbers(value)
     length = float(np.linalg.norm(read)) if read.size == 4 else 0.0
     return read / length if 0 < length < np.inf else np.array(UPRIGHT)
@@ -128,7 +128,7 @@ class SceneBody:
     mass: float = np.nan
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``bodies``."""
+        """Return an entry of ``bodies``."""
         return {"name": self.name, "mass": self.mass, "shapes": [solid.to_json() for solid in self.solids]}
 
 
@@ -141,12 +141,12 @@ class ScenePlane:
     offset: float = 0.0
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``planes``."""
+        """Return an entry of ``planes``."""
         return {"name": self.name, "normal": self.normal.tolist(), "offset": self.offset}
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> ScenePlane | None:
-        """A plane; None if it has no direction."""
+        """Read a plane; None if it has no direction."""
         normal = values.vector(values.table(value).get("normal"))
         length = float(np.linalg.norm(normal))
         if not 0 < length < np.inf:
@@ -163,12 +163,12 @@ class SceneFixture:
     solid: Solid
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``fixtures``."""
+        """Return an entry of ``fixtures``."""
         return {"name": self.name, "shape": self.solid.to_json()}
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> SceneFixture | None:
-        """A fixture; None if its shape cannot be read."""
+        """Read a fixture; None if its shape cannot be read."""
         entry = values.table(value)
         solid = Solid.from_json(entry.get("shape"))
         return None if solid is None else cls(text(entry.get("name")), solid)
@@ -184,7 +184,7 @@ class SceneTerrain:
     z: Array
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``terrain``."""
+        """Return an entry of ``terrain``."""
         return {"name": self.name, "x": self.x.tolist(), "y": self.y.tolist(), "z": self.z.tolist()}
 
     @classmethod
@@ -203,7 +203,7 @@ class SceneTerrain:
 
 @dataclass(frozen=True)
 class Scene:
-    """What is drawn around and for the states of a trajectory; ``gravity`` (3) [m/s^2], empty if it is not known."""
+    """The surroundings of a trajectory, and its bodies; ``gravity`` (3) [m/s^2], empty if it is not known."""
 
     gravity: tuple[float, ...] = ()
     bodies: tuple[SceneBody, ...] = ()
@@ -214,15 +214,15 @@ class Scene:
 
     @property
     def weight_per_mass(self) -> float:
-        """The size of gravity [m/s^2]; nan if it is not known."""
+        """Return the size of gravity [m/s^2]; nan if it is not known."""
         return float(np.linalg.norm(self.gravity)) if self.gravity else np.nan
 
     def solids(self, name: str) -> tuple[Solid, ...]:
-        """The surface of the body called ``name``; none if the scene has no such body."""
+        """Return the surface of the body called ``name``; none if the scene has no such body."""
         return next((body.solids for body in self.bodies if body.name == name), ())
 
     def to_json(self) -> dict[str, Any]:
-        """The object of scene.json."""
+        """Return the object of scene.json."""
         kinds = {key: getattr(self, key) for key in ("bodies", "planes", "fixtures", "terrain", "joints")}
         return {
             "gravity": list(self.gravity),
@@ -231,11 +231,11 @@ class Scene:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> Scene:
-        """The scene, as far as it can be read."""
+        """Read the scene, as far as it can be read."""
         gravity = tuple(values.numbers(values.table(value).get("gravity")).tolist())
         return values.record(cls, value, text, gravity=gravity)
 
 
 def read_scene(path: Path) -> Scene:
-    """The scene in a file. Raises ReportError."""
+    """Read the scene in a file. Raises ReportError."""
     return Scene.from_json(read_table(path))

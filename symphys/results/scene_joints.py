@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,21 +12,24 @@ from symphys import json_values as values
 from symphys.json_values import Text
 from symphys.types import Array
 
+AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
+"""``SceneJoint.axes`` by the kind of joint, for files without them."""
+
 
 @dataclass(frozen=True)
 class SceneJointFrame:
-    """Where a joint is on one side, in the frame of the body or the world: ``point`` (3,) [m], ``orientation`` (4,)."""
+    """The frame of a joint on one side, in that of the body or the world: ``point`` (3,) [m], ``orientation`` (4,)."""
 
     point: Array = field(default_factory=lambda: np.zeros(3))
     orientation: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0, 0.0]))
 
     def to_json(self) -> dict[str, Any]:
-        """One of ``sockets``."""
+        """Return an entry of ``sockets``."""
         return {"point": self.point.tolist(), "orientation": self.orientation.tolist()}
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> SceneJointFrame | None:
-        """One side; None if its place is not finite or its orientation none."""
+        """Read one side; None if its place is not finite or its orientation none."""
         read = values.record(cls, {"point": None, "orientation": None, **values.table(value)}, text)
         length = float(np.linalg.norm(read.orientation))
         if read.point.size != 3 or not np.isfinite(read.point).all():
@@ -38,10 +41,18 @@ class SceneJointFrame:
 
 @dataclass(frozen=True)
 class SceneCoordinate:
-    """A coordinate of a joint: its name, and whether it is an angle [rad], else a displacement [m]."""
+    """A coordinate of a joint.
+
+    Attributes:
+        name: ``angle`` or ``position``; with a number where there are two.
+        turns: whether it is an angle [rad], else a displacement [m].
+        side, axis: which side's frame carries its axis, and which of that frame's axes it is; -1 in files without.
+    """
 
     name: str
     turns: bool
+    side: int = -1
+    axis: int = -1
 
 
 @dataclass(frozen=True)
@@ -75,7 +86,7 @@ class SceneMotor:
 
 @dataclass(frozen=True)
 class SceneJoint:
-    """What holds two bodies together, or a body to the world; coordinates are those of the first against the second.
+    """A joint between two bodies, or a body and the world; coordinates are those of the first against the second.
 
     Attributes:
         name, kind: as in the problem file.
@@ -105,18 +116,30 @@ class SceneJoint:
 
     @property
     def turns(self) -> tuple[bool, ...]:
-        """For each coordinate whether it is an angle."""
+        """Return for each coordinate whether it is an angle."""
         return tuple(coordinate.turns for coordinate in self.coordinates)
 
+    @property
+    def axes(self) -> tuple[tuple[int, int], ...]:
+        """Return for each coordinate the side whose frame carries its axis, and which axis of it that is."""
+        known = tuple((each.side, each.axis) for each in self.coordinates)
+        whole = all(0 <= side < 2 and 0 <= axis < 3 for side, axis in known)
+        return known if known and whole else AXES.get(self.kind, ())
+
+    @property
+    def rotates(self) -> bool:
+        """Whether it leaves a rotation free."""
+        return any(self.turns) or not (self.turns or self.kind == "fixed")
+
     def to_json(self) -> dict[str, Any]:
-        """One of ``joints``."""
+        """Return an entry of ``joints``."""
         return {
             "name": self.name,
             "kind": self.kind,
             "first": self.first,
             "second": self.second or None,
             "sockets": [frame.to_json() for frame in self.frames],
-            "coordinates": [{"name": each.name, "turns": each.turns} for each in self.coordinates],
+            "coordinates": [asdict(each) for each in self.coordinates],
             "limits": [bound if np.isfinite(bound) else None for bound in (self.lower, self.upper)],
             "motor": None if self.motor is None else self.motor.to_json(),
         }

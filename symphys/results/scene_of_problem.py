@@ -87,7 +87,10 @@ def make_joint(joint: Joint, bodies: Sequence[str]) -> SceneJoint:
         first=bodies[joint.first],
         second="" if joint.second is None else bodies[joint.second],
         frames=tuple(SceneJointFrame(plain(frame.point), plain(frame.orientation)) for frame in joint.frames),
-        coordinates=tuple(SceneCoordinate(each.name, each.turns) for each in joint.kind.coordinates),
+        coordinates=tuple(
+            SceneCoordinate(each.name, each.turns, 0 if each.fixed_in_first else 1, each.axis)
+            for each in joint.kind.coordinates
+        ),
         lower=bound(joint.limits.lower, -np.inf),
         upper=bound(joint.limits.upper, np.inf),
         motor=None if joint.motor is None else make_motor(joint.motor),
@@ -95,7 +98,7 @@ def make_joint(joint: Joint, bodies: Sequence[str]) -> SceneJoint:
 
 
 def bound(value: Scalar | None, missing: float) -> float:
-    """One end of limits."""
+    """Return one end of limits."""
     return missing if value is None else float(value)
 
 
@@ -112,9 +115,9 @@ def plain(vector: Any) -> Array:
     return np.array([float(component) for component in vector])
 
 
-MOST = 49
+MAX_HEIGHTS = 49
 """Heights along the longer side."""
-LEAST_SHARE = 0.3
+MIN_ASPECT = 0.3
 """Of the shorter side in the longer one."""
 MARGIN = 0.15
 """On each side, as a share of the longer one."""
@@ -129,27 +132,27 @@ class TerrainCrop:
 
 
 def crop(world: World, places: Array) -> TerrainCrop:
-    """Where bodies at (n, 3) places may touch the ground, with room around."""
+    """Return the rectangle where bodies at (n, 3) places may touch the ground, with room around."""
     flat = places[np.isfinite(places).all(axis=1), :2]
     flat = flat if len(flat) else np.zeros((1, 2))
     low, high = flat.min(axis=0), flat.max(axis=0)
     reach = max(size(body) for body in world.bodies)
     side = float((high - low).max()) + 2 * reach
     side = side if side > 0 else 1.0
-    room = np.maximum(high - low + 2 * reach, LEAST_SHARE * side) / 2 + MARGIN * side
+    room = np.maximum(high - low + 2 * reach, MIN_ASPECT * side) / 2 + MARGIN * side
     middle = (low + high) / 2
     return TerrainCrop(middle - room, middle + room)
 
 
 def size(body: Body) -> float:
-    """From a body's centre of mass to the farthest point of its surface, at most [m]."""
+    """Return the distance [m] from a body's centre of mass to the farthest point of its surface, at most."""
     return max((float(np.linalg.norm(shape.centre)) + shape.extent for shape in body.shapes), default=0.0)
 
 
 def sample(terrain: Terrain, near: TerrainCrop) -> SceneTerrain:
     """The heights there."""
     sides = near.high - near.low
-    columns, rows = (int(count) for count in np.maximum(np.round(MOST * sides / sides.max()), 2))
+    columns, rows = (int(count) for count in np.maximum(np.round(MAX_HEIGHTS * sides / sides.max()), 2))
     x, y = (np.linspace(near.low[k], near.high[k], count) for k, count in enumerate((columns, rows)))
     a, b = ca.SX.sym("x"), ca.SX.sym("y")
     height = ca.Function("height", [a, b], [terrain.height(a, b)])

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
+import stat
 from pathlib import Path
+from typing import Any
 
 from symphys.errors import SymphysError
-from symphys.files import check_regular
+from symphys.files import check_regular, emptied
 from symphys.json_values import name, table, words
+
+HEAVY = ("z", "trust")
+"""The objects of result.json that take most of it, and that no table shows."""
+READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+MOST_AT_ONCE = 2**20
 
 
 class ReportError(SymphysError):
@@ -15,7 +24,7 @@ class ReportError(SymphysError):
 
 
 def read_words(path: Path) -> str:
-    """The text of a file; bytes that are no UTF-8 are replaced. Raises ReportError."""
+    """Read the text of a file; bytes that are no UTF-8 are replaced. Raises ReportError."""
     try:
         check_regular(path)
         return words(path.read_text(encoding="utf-8", errors="replace"))
@@ -24,7 +33,7 @@ def read_words(path: Path) -> str:
 
 
 def read_table(path: Path) -> dict[str, object]:
-    """The JSON object in a file. Raises ReportError that names the file and the fault."""
+    """Read the JSON object in a file. Raises ReportError that names the file and the fault."""
     try:
         check_regular(path)
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -37,6 +46,36 @@ def read_table(path: Path) -> dict[str, object]:
     return table(content)
 
 
+def read_light_table(path: Path | str) -> dict[str, Any]:
+    """Read the JSON object in a file, with empty tables for what is ``HEAVY``, where this program has written it.
+
+    Such tables are cut out of the text before it is parsed. Raises ReportError, as ``read_table`` does.
+    """
+    try:
+        content = json.loads(emptied(_read_regular(path), HEAVY))
+    except (OSError, ValueError, RecursionError):
+        return read_table(Path(path))
+    return content if isinstance(content, dict) else read_table(Path(path))
+
+
+def _read_regular(path: Path | str) -> bytes:
+    """Read a regular file; OSError for anything else, which is not waited for.
+
+    Paths and files of the standard library's own classes take as long as all the rest of reading a run.
+    """
+    number = os.open(path, READ)
+    try:
+        about = os.fstat(number)
+        if not stat.S_ISREG(about.st_mode):
+            raise OSError(errno.EINVAL, "a regular file is needed", str(path))
+        parts = [os.read(number, about.st_size + 1)]
+        while parts[-1]:
+            parts.append(os.read(number, MOST_AT_ONCE))
+        return b"".join(parts)
+    finally:
+        os.close(number)
+
+
 def reason(error: OSError) -> str:
-    """Why a file could not be read, without its path."""
+    """Say why a file could not be read, without its path."""
     return "there is no such file" if isinstance(error, FileNotFoundError) else (error.strerror or "cannot be read")

@@ -24,7 +24,7 @@ OLD_NAMES = {"miss": "max_violation"}
 
 
 def renamed(column: str) -> str:
-    """The name that a column of an older file has now."""
+    """Return the name that a column of an older file has now."""
     if column.startswith(OLD_OUTPUT):
         return OUTPUT + column.removeprefix(OLD_OUTPUT)
     return OLD_NAMES.get(column, column)
@@ -55,17 +55,17 @@ class Trace:
     rows: int
 
     def __getitem__(self, name: str) -> Array:
-        """(rows,): the column called ``name``."""
+        """Return (rows,) the column called ``name``."""
         return self.columns.get(name, np.full(self.rows, np.nan))
 
     @property
     def outputs(self) -> list[str]:
-        """The names of the reported quantities."""
+        """Return the names of the reported quantities."""
         return [name.removeprefix(OUTPUT) for name in self.columns if name.startswith(OUTPUT)]
 
 
 def trace_text(rows: Iterable[Mapping[str, object]]) -> str:
-    """A line for each row under a header with the names of the columns; what a row lacks is nan."""
+    """Return a line for each row under a header with the names of the columns; what a row lacks is nan."""
     rows = [{renamed(key): value for key, value in row.items()} for row in rows]
     columns = list(dict.fromkeys(key for row in rows for key in row))
     buffer = io.StringIO()
@@ -76,7 +76,7 @@ def trace_text(rows: Iterable[Mapping[str, object]]) -> str:
 
 
 def read_trace(path: Path, faults: list[str]) -> Trace:
-    """The columns of trace.csv; rows that are cut short are left out, which ``faults`` then says."""
+    """Read the columns of trace.csv; rows that are cut short are left out, which ``faults`` then says."""
     try:
         check_regular(path)
         with path.open(encoding="utf-8", errors="replace", newline="") as file:

@@ -83,7 +83,7 @@ def shape_of(position: Array, times: int) -> tuple[int, int]:
 
 
 def names_of(arrays: Mapping[str, Array], key: str, count: int | None = None) -> tuple[str, ...]:
-    """Names as text; bodies without names are numbered."""
+    """Read names as text; bodies without names are numbered."""
     read = tuple(values.name(str(entry)) for entry in np.atleast_1d(arrays[key])) if key in arrays else ()
     if count is None or len(read) == count:
         return read

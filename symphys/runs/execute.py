@@ -15,7 +15,8 @@ from symphys import verification as trust
 from symphys.codegen.backends import PRECISIONS, require_kernels
 from symphys.errors import SymphysError, Unavailable
 from symphys.findings.examination import Examination
-from symphys.findings.obstacles import capital, obstacles
+from symphys.findings.obstacles import obstacles
+from symphys.findings.writing import capital
 from symphys.problem import Problem
 from symphys.results.file_names import CHECKPOINT, GAINS, GUESS, LOG, MULTIPLIERS, RESULT, SCENE, TRAJECTORY
 from symphys.results.result import Result

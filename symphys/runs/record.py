@@ -13,7 +13,7 @@ from symphys import files
 from symphys import json_values as values
 from symphys.codegen.backends import Description
 from symphys.findings.levels import Judged
-from symphys.findings.verdict import rule
+from symphys.findings.verdict import judge_run
 from symphys.problem import Problem
 from symphys.results.result import (
     REACHED,
@@ -22,7 +22,7 @@ from symphys.results.result import (
     Result,
     StageRecord,
     VariableRecord,
-    ruled,
+    verdict_fields,
 )
 from symphys.results.trace import OUTPUT
 from symphys.runs.job import Job
@@ -78,7 +78,7 @@ def make_result(
         **provenance(job, transcription.backend.flags),
         **found,
         backend=evaluated_by(transcription.backend),
-        **ruled(rule(outcome.status.value, judged(verdict), files.strict(judgement.trust))),
+        **verdict_fields(judge_run(outcome.status.value, judged(verdict), files.strict(judgement.trust))),
         status=outcome.status.value,
         advice=judgement.advice,
         z=variables(transcription.problem, transcription.shooting.blocks, outcome.z),
@@ -116,7 +116,7 @@ def interruption(job: Job, message: str, checkpoint: Mapping[str, object] | None
     status, unread = Status.INTERRUPTED.value, judged(None)
     return Result(
         **provenance(job),
-        **ruled(rule(status, unread, None)),
+        **verdict_fields(judge_run(status, unread, None)),
         **known,
         status=status,
         advice=message,

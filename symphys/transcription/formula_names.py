@@ -16,17 +16,9 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics.observation import (
-    accelerometers,
-    body_quantities,
-    body_quantity_names,
-    joint_quantities,
-    joint_quantity_names,
-    site_quantities,
-    site_quantity_names,
-)
+from symphys.dynamics.observation import SensedState, named_sensors, sensor_readings
 from symphys.expression import Formula
-from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, input_symbols
+from symphys.model.state_layout import input_columns, input_sizes, input_symbols
 from symphys.model.world import Scheme, World
 from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable, placing
 from symphys.problem.parametric.by_phase import lagged
@@ -254,13 +246,10 @@ def namespace(
     wanted: frozenset[str],
 ) -> dict[str, Expr]:
     """Map names, except those of variables, to expressions at an instant; expensive ones only if they are wanted."""
-    layout = Layout(world)
     dt = parameters.step_length(problem.simulation, at.p)
     names: dict[str, Expr] = {"time": at.time, "duration": ca.SX(dt * problem.simulation.steps)}
     if memory.terminates:
         names[ALIVE] = at.x[memory.columns[ALIVE]]
-    for body in world.bodies:
-        names.update({f"{body.name}.{field}": at.x[layout[f"{body.name}.{field}"]] for field in GIVEN})
     names.update({name: ca.SX.zeros(size) for name, size in input_sizes(world).items()})
     names.update({name: at.u[part] for name, part in input_columns(world, inputs).items()})
     names.update({name: ca.DM(value) for name, value in problem.parameters.items()})
@@ -268,21 +257,14 @@ def namespace(
     names.update(parameters.overrides())
     followed = [each for each in problem.references if not wanted.isdisjoint(each.names)]
     names.update(reference_values(followed, at.time, names))
-    if not wanted.isdisjoint(joint_quantity_names(world)):
-        names.update(joint_quantities(world, at.x))
-    if not wanted.isdisjoint(body_quantity_names(world)):
-        names.update(body_quantities(world, at.x))
-    if not wanted.isdisjoint(site_quantity_names(world)):
-        names.update(site_quantities(world, at.x))
-    names.update(accelerometers(world, at.x, memory.velocities(at.x), dt))
+    never = {name: ca.SX.zeros(size) for name, size in input_sizes(world).items() if name not in inputs}
+    names.update(sensor_readings(SensedState(world, at.x, never | memory.before(at.x), dt), wanted))
     return names
 
 
 def moving_names(world: World) -> frozenset[str]:
     """The names that change within a step."""
-    states = {f"{body.name}.{field}" for body in world.bodies for field in (*GIVEN, "accelerometer")}
-    felt = (*joint_quantity_names(world), *body_quantity_names(world), *site_quantity_names(world))
-    return frozenset({"time", ALIVE, *states, *felt})
+    return frozenset({"time", ALIVE, *named_sensors(world)})
 
 
 def spans(variables: Sequence[Variable]) -> list[tuple[int, int]]:

@@ -10,6 +10,7 @@ import numpy as np
 from symphys.codegen import Kernel, KernelUnavailable, processors
 from symphys.codegen.backends import PRECISIONS, build_kernel
 from symphys.codegen.backends.precision import warn
+from symphys.dynamics.observation import named_sensors
 from symphys.errors import SymphysError
 from symphys.expression import Formula, FormulaError, parse
 from symphys.problem import Problem
@@ -71,8 +72,10 @@ def record_rollout(
         ProblemError: the problem has a large net.
     """
     require_small_nets(problem, "a rollout of which quantities are asked for")
-    rollout = symbolic_rollout(problem)
-    formulas = {text: parsed(rollout, text) for text in quantities}
+    formulas = {text: parsed(text) for text in quantities}
+    rollout = symbolic_rollout(problem, asked=formulas.values())
+    for formula in formulas.values():
+        check_names(rollout, formula)
     program = rollout_program(rollout, smoothing == 0, formulas)
     if backend not in PRECISIONS:
         raise SymphysError(
@@ -87,17 +90,21 @@ def record_rollout(
     return RecordedRollout(problem.name, sizes, rollout.steps, smoothing, kernel)
 
 
-def parsed(rollout: Rollout, text: str) -> Formula:
-    """A formula whose names the problem has."""
+def parsed(text: str) -> Formula:
+    """The formula of a quantity."""
     try:
-        formula = parse(text)
+        return parse(text)
     except FormulaError as error:
         raise SymphysError(f"quantity {quote(text)}: {error}") from None
+
+
+def check_names(rollout: Rollout, formula: Formula) -> None:
+    """SymphysError for a name that the problem does not have."""
     at = instant(rollout.world, rollout.inputs, rollout.parameters, rollout.memory, 0)
     known = namespace(
         rollout.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.memory, at, formula.names
     )
     known |= {variable.name: at.z for variable in rollout.problem.variables}
     for name in sorted(formula.names - known.keys()):
-        raise SymphysError(f"quantity {quote(text)}: there is no {quote(name)}; {hint(name, known)}")
-    return formula
+        names = known | dict.fromkeys(named_sensors(rollout.world))
+        raise SymphysError(f"quantity {quote(formula.text)}: there is no {quote(name)}; {hint(name, names)}")

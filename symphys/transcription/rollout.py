@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
@@ -226,15 +226,18 @@ class Rollout:
         return moving_names(self.world).union(*(each.names for each in self.problem.references))
 
 
-def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None) -> Rollout:
-    """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of."""
+def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None, asked: Iterable[Formula] = ()) -> Rollout:
+    """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of.
+
+    ``asked``: formulas that will be evaluated along it beside those of the problem.
+    """
     parameters = varied_parameters(problem)
     scheduled = tuple((share.name, share.symbol) for share in parameters.phases.shares)
     inputs = (*(input_names(problem) if inputs is None else inputs), *(name for name, _ in scheduled))
     world = replace(problem.world(parameters.overrides()), scheduled=scheduled)
     z = ca.MX.sym("z", sum(v.guess.size for v in problem.variables))
     smoothing = ca.MX.sym("smoothing")
-    start, memory = start_of(problem, world, inputs, parameters, z), memory_of(problem, world)
+    start, memory = start_of(problem, world, inputs, parameters, z), memory_of(problem, world, inputs, asked)
     return Rollout(problem, world, inputs, parameters, memory, z, smoothing, memory.start(start.x0), start.u, start.p)
 
 

@@ -128,7 +128,7 @@ def _joints(rollout: Rollout, x: Array, u: Array, p: Array) -> dict[str, Any]:
 
 def _unit(joint: Joint) -> str:
     """Return the units of a joint's coordinates; none for a joint without coordinates."""
-    return "".join("rad" if coordinate.turns else "m" for coordinate in joint.kind.coordinates[:1])
+    return "".join(coordinate.unit for coordinate in joint.kind.coordinates[:1])
 
 
 def _commands(rollout: Rollout, u: Array, counts: list[int]) -> Array:

@@ -37,7 +37,8 @@ def transcribe(
 
     Example:
         >>> import symphys
-        >>> made = symphys.transcribe(symphys.load("ball_throw"), backend="casadi")
+        >>> from symphys.transcription import transcribe
+        >>> made = transcribe(symphys.load("ball_throw"), backend="casadi")
         >>> made.judge(made.shooting.start(0)).solved, made.shooting.n
         (False, 6)
     """
@@ -50,11 +51,11 @@ def transcribe(
         from symphys.transcription.network_rollout import transcribe_large
 
         return transcribe_large(problem, exact, backend, threads)
-    return _transcribed(problem, exact, backend, threads)
+    return transcribe_whole(problem, exact, backend, threads)
 
 
-def _transcribed(problem: Problem, exact: bool, backend: str, threads: int | None) -> Transcription:
-    """Transcribe a problem whose rollout is one expression."""
+def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int | None) -> Transcription:
+    """Transcribe a problem, without its scenarios, as one expression: nets of any size are part of the step."""
     began = perf_counter()
     rollout = symbolic_rollout(problem)
     functions = ExpressionFunctions(rollout)

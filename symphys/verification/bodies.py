@@ -89,7 +89,7 @@ def rotor_energy(world: World, x: Any) -> Any:
     found = readings(world, x) if any(not is_zero(joint.armature) for joint in world.joints) else {}
     for joint in world.joints if found else ():
         rate = found[joint.name].rate
-        if not joint.kind.coordinates and joint.kind.name == "ball":
+        if not joint.kind.coordinates and joint.kind.free:
             spins = [x[layout[f"{world.bodies[k].name}.angular_velocity"]] for k in joint.bodies]
             rate = spins[0] if len(spins) == 1 else spins[0] - spins[1]
         total += joint.armature / 2 * ca.sumsqr(rate)

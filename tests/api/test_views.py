@@ -6,8 +6,8 @@ import doctest
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -58,9 +58,10 @@ def test_a_second_start_loads_nothing_that_makes_kernels(tmp_path: Path) -> None
 
 
 EXAMPLES = (
-    "CompiledRollout", "Heightfield", "Problem", "Slider", "Solution", "Trajectory", "cache", "check",
-    "compile", "compile_step", "doctor", "export", "initial_state", "load", "load_problem", "new", "read",
-    "report", "roll_out", "schema", "show", "simulate", "solve", "solve_all", "step_function", "transcribe",
+    "CompiledRollout", "Problem", "Solution", "Trajectory", "cache", "check", "compile", "compile_step", "doctor",
+    "dynamics.horizon.roll_out", "export_problem", "load", "model.Heightfield", "model.Slider", "model.initial_state",
+    "new", "problem.load_problem", "read", "results.runs", "schema", "show", "simulate", "solve", "solve_all",
+    "step_function", "transcription.transcribe", "write_report",
 )  # fmt: skip
 
 
@@ -70,9 +71,8 @@ def test_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     if name == "CompiledRollout":  # its quantities need a kernel
         require("simd")
     monkeypatch.chdir(tmp_path)
-    public = getattr(symphys, name)
-    shown = public.__call__ if isinstance(public, ModuleType) else public
-    found = doctest.DocTestFinder(recurse=True).find(shown, name, globs={})
+    room, _, last = f"symphys.{name}".rpartition(".")
+    found = doctest.DocTestFinder(recurse=True).find(getattr(import_module(room), last), name, globs={})
     examples = [each for each in found if each.examples]
     assert examples
     runner = doctest.DocTestRunner()

@@ -10,8 +10,9 @@ import pytest
 from worlds.mixed import mixed
 
 import symphys
-from symphys import Body, Box, Capsule, Fixture, Law, Plane, Problem, Scheme, SymphysError, Terrain, World, make_world
+from symphys import Problem, SymphysError
 from symphys.dynamics.functions import step_function
+from symphys.model import Body, Box, Capsule, Fixture, Law, Plane, Scheme, Terrain, World, make_world
 from symphys.model.heightfield import Heightfield
 from symphys.model.joints import HINGE, Joint, JointFrame
 from symphys.model.state_layout import Layout, initial_state

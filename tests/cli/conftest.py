@@ -67,7 +67,7 @@ def _without_pages_of_runs(request: pytest.FixtureRequest, monkeypatch: pytest.M
     """Which have tests of their own, and take longer than the solves of this room."""
     if "whole_report" not in request.fixturenames:
         monkeypatch.setattr(
-            "symphys.report.making.page.write_run_report", lambda folder: (folder / PAGE).write_text("")
+            "symphys.report.making.run_pages.write_run_report", lambda folder: (folder / PAGE).write_text("")
         )
 
 

@@ -12,7 +12,7 @@ import pytest
 from fakes.compilers import fake
 from tools.repeats import few
 
-from symphys import doctor
+from symphys import machine
 from symphys.codegen import KernelUnavailable
 from symphys.codegen.toolchain.compiler import find_compiler
 
@@ -113,7 +113,7 @@ def test_what_is_needed_and_does_not_work_exits_1(
     run: Run, cache: Path, monkeypatch: Patch, what: str, line: str
 ) -> None:
     wrong = {"interpret": lambda *_: {"cost": np.array([3.0])}, "ca.has_nlpsol": lambda _: False}
-    monkeypatch.setattr(f"symphys.doctor.{what}", wrong[what])
+    monkeypatch.setattr(f"symphys.machine.{what}", wrong[what])
     code, out, _ = run("doctor")
     if line in lines(out):  # there may be no compiler
         assert code == 1
@@ -121,8 +121,8 @@ def test_what_is_needed_and_does_not_work_exits_1(
 
 
 def test_a_package_that_is_not_there(monkeypatch: Patch) -> None:
-    monkeypatch.setattr(doctor, "PACKAGES", ("numpy", "no-such-package"))
-    found = next(finding for finding in doctor.examine() if finding.name == "packages")
+    monkeypatch.setattr(machine, "PACKAGES", ("numpy", "no-such-package"))
+    found = next(finding for finding in machine.examine() if finding.name == "packages")
     assert (found.state, found.required) == ("missing", True)
     assert "pip install no-such-package" in found.text
 

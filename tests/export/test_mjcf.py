@@ -84,6 +84,23 @@ def test_surfaces_meet_as_their_pairs_say() -> None:
     assert pairs["a[1]", "wall"].attrib["condim"] == "6"
 
 
+def test_friction_along_and_across_a_direction_is_that_of_the_tangents_of_mujoco() -> None:
+    """These are y and x on the ground; another direction, and one that turns with a body, is refused."""
+    found = []
+    for direction in ((0, 1, 0), (3, 0, 0), (1, 1, 0)):
+        law = Law((0.5, 0.2), friction_direction=direction)
+        world = make_world([Body.ball("a", 0.1, 1.0)], [Plane.ground()], law)
+        if direction[0] * direction[1]:
+            with pytest.raises(ExportError, match=r"a-ground.*tangent"):
+                read(world)
+        else:
+            found.append(numbers(read(world).find(".//pair"), "friction")[:2])
+    assert found == [[0.5, 0.2], [0.2, 0.5]]
+    own = Law((0.5, 0.2), friction_direction=(0, 1, 0), friction_frame="a")
+    with pytest.raises(ExportError, match="tangent"):
+        read(make_world([Body.ball("a", 0.1, 1.0)], [Plane.ground()], laws={("a", "ground"): own}))
+
+
 def test_the_start_is_a_keyframe() -> None:
     """A rod that hangs at 0.3 rad from the first axis of its hinge, which is x, and turns at 2 rad/s."""
     half, down = np.array([np.cos(0.15), np.sin(0.15), 0, 0]), np.array([0, np.sin(0.3), -np.cos(0.3)]) / 2

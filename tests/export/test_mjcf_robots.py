@@ -18,6 +18,7 @@ from symphys.model.joints import BALL, FIXED, HINGE, AffineMotor, Joint, JointFr
 from symphys.model.shapes import Plane, Terrain
 from symphys.model.world import Body, Law, World, make_world
 from symphys.problem import Problem, problem_of_tables
+from symphys.transcription.rollout import symbolic_rollout
 
 LEG = {
     "simulation": {"duration": 0.1, "dt": 0.01},
@@ -187,6 +188,31 @@ def test_formulas_that_are_sensors_of_mujoco(formula: str, kind: str, place: Any
         assert [float(x) for x in site.attrib["quat"].split()] == turn
 
 
+def test_reactions_of_joints_are_force_and_torque_sensors() -> None:
+    """MuJoCo reads at the start what is read here; for a joint above a frame without mass it has no such sensor."""
+    mujoco = pytest.importorskip("mujoco")
+    still = {key: value for key, value in LEG.items() if key != "coupling"}
+    acting = ("motor", "spring", "friction", "limits")  # which a state at the start does not know yet
+    joints = [{k: v for k, v in joint.items() if k not in acting} for joint in LEG["joint"]]
+    joints.append({"name": "stand", "between": ["world", "torso"], "fixed": {}})
+    names = ("ankle.reaction_force", "rotate([0.6, 0.8, 0, 0], ankle.reaction_torque)", "z.reaction_force")
+    problem = problem_of_tables(
+        {**still, "joint": joints, "sensor": [{"name": "felt", "reads": [*names, "x.reaction_force"]}]}, "leg"
+    )
+    made = problem_model(problem)
+    assert [each.what for each in made.departures if each.kind == "left out"] == [("felt_3",)]
+    model = mujoco.MjModel.from_xml_string(made.text)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    rollout = symbolic_rollout(problem)
+    read = rollout.control.sensor(problem.sensors[0])
+    x0 = ca.Function("x0", [rollout.z, rollout.smoothing], [rollout.x0])(np.zeros(rollout.z.numel()), 0)
+    expected = np.array(read(x0, ca.DM(0, 1), 0.0)).ravel()[:9]
+    assert data.sensordata == pytest.approx(expected, abs=1e-9)
+    assert np.linalg.norm(expected[:3]) > 0.05  # it nearly falls
+
+
 def test_what_is_left_out_is_in_the_world_without_it() -> None:
     """Restitution and soft contacts go; the rest of the law stays."""
     world = make_world([Body.ball("ball", 0.1, 1.0)], [Plane.ground()], Law(0.7, 0.8))
@@ -297,9 +323,9 @@ def test_plain_motors_stay_readable() -> None:
 
 
 def test_shipped_problems_are_written_with_what_they_lose(tmp_path: Path) -> None:
-    from symphys.export import export
+    from symphys.export import export_problem
 
-    (path,) = export("ball_throw", mjcf=tmp_path, approximate=True)
+    (path,) = export_problem("ball_throw", mjcf=tmp_path, approximate=True)
     assert path.read_text(encoding="utf-8").count("<!-- ") >= 1
 
 

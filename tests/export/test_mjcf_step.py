@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from symphys.export import problem_model
+from symphys.export.mjcf_actuation import inertias
 from symphys.export.mjcf_bodies import StartState
-from symphys.export.moving.step import inertias
-from symphys.export.moving.trial import stiffer, tried_model
+from symphys.export.mjcf_trial import stiffer, tried_model
 from symphys.problem import Problem, problem_of_tables
 
 mujoco = pytest.importorskip("mujoco")
@@ -107,6 +107,17 @@ def test_a_box_on_soft_ground_is_held_by_friction() -> None:
     problem = on_soft_ground({"box": {"size": [0.2, 0.2, 0.1]}}, 0.05, 15.0, world=tilted)
     data, _ = run(problem_model(problem).text)
     assert abs(data.qpos[0]) < 1e-3 and 0.045 < data.qpos[2] < 0.05
+
+
+@pytest.mark.parametrize(("way", "mu"), [([1, 0, 0], 0.5), ([0, 1, 0], 0.2)])
+def test_friction_along_and_across_a_direction_brakes_there_as_here(way: list[int], mu: float) -> None:
+    """A box that slides along x, where mu is 0.5, or along y, where it is 0.2; MuJoCo's tangents are y and x."""
+    box = {"name": "b", "shape": {"box": {"size": [0.4, 0.4, 0.1]}}, "mass": 2.0, "position": [0, 0, 0.05]}
+    ground = {"friction": [0.5, 0.2], "friction_direction": [1, 0, 0]}
+    tables = {"simulation": SIMULATION, "ground": ground, "body": [{**box, "velocity": [2 * each for each in way]}]}
+    data, _ = run(problem_model(problem_of_tables(tables, "slide")).text, seconds=0.3)
+    pressed = 9.81 * data.time + data.qvel[2]  # what the ground has given, by mass: the box may hop
+    assert 2 - data.qvel[:3] @ way == pytest.approx(mu * pressed, rel=0.02)
 
 
 def test_a_soft_foot_has_its_own_mass_behind_it_whatever_hangs_on_it() -> None:

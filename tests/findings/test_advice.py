@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from symphys.findings.advice import advice, findings, slopes
-from symphys.findings.contacts import IN_TIME, impact_findings, miss_findings, residual_finding, sliding
-from symphys.findings.energy import balance_finding
 from symphys.findings.examination import Energy, Examination, GradientCheck, Growth, Miss, Refined, Slide, Smoothed
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged
 from symphys.findings.numerics import smoothed_findings
+from symphys.findings.physics import IN_TIME, balance_finding, impact_findings, miss_findings, residual_finding, sliding
 from symphys.findings.verdict import doubts
 
 MET = Judged(1.0, 0.5, True, True, 1.0)

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from symphys.findings.advice import advice, answers, findings, slopes
-from symphys.findings.contacts import depth_finding, residual_finding
 from symphys.findings.examination import Energy, Examination, Gain, GradientCheck, Growth, Refined, Smoothed
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Judged, graded
 from symphys.findings.numerics import slope_finding, smoothed_findings
+from symphys.findings.physics import depth_finding, residual_finding
 
 SOUND = Examination(
     gradient=(GradientCheck("throw", 1e-9, 1.0),),

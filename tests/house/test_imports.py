@@ -18,7 +18,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "errors": ("", "", "errors that a user may meet"),
     "suggest": ("", "", "hints for error messages"),
     "types": ("", "numpy", "what arrays and expressions are called"),
-    "verbs": ("", "", "rooms that can be called"),
+    "deprecated": ("", "", "public names of older versions"),
     "later": ("", "", "names imported when first used"),
     "interrupts": ("", "", "Ctrl-C"),
     "threads": ("", "", "one thread for linear algebra"),
@@ -28,7 +28,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "trajectory": ("errors suggest", "numpy", "a simulated motion as arrays"),
     "shooting": ("", "numpy", "what solvers see: the shooting problem, whole or step by step"),
     "maths": ("", "casadi", "rotations and smoothed primitives"),
-    "model": ("errors maths suggest", "casadi numpy scipy", "what a world is, as data"),
+    "model": ("errors later maths suggest", "casadi numpy scipy", "what a world is, as data"),
     "dynamics": ("maths model", "casadi numpy", "one time step"),
     "expression": ("errors maths suggest", "casadi", "the formula language"),
     "problems": ("errors suggest", "", "shipped problem files"),
@@ -54,14 +54,14 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "how far a solution can be trusted, as numbers",
     ),
     "export": (
-        "codegen dynamics errors files maths model problem trajectory transcription verbs version",
+        "codegen dynamics errors files maths model problem trajectory transcription version",
         "casadi mujoco numpy",
         "other programs' files",
     ),
     "solvers": ("errors shooting", "casadi cma numpy scipy", "optimisation methods"),
     "findings": ("json_values", "numpy", "what the numbers of an examination mean"),
     "results": (
-        "archives errors files findings json_values model problem suggest trajectory verbs",
+        "archives errors files findings json_values model problem suggest trajectory",
         "casadi numpy pandas pyarrow scipy",
         "what a run folder holds",
     ),
@@ -83,7 +83,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "many runs, in any number of processes and commands",
     ),
     "report": (
-        "files findings interrupts json_values results trajectory verbs",
+        "files findings interrupts json_values results trajectory",
         "matplotlib numpy",
         "pages and figures, made from run folders alone",
     ),
@@ -92,19 +92,20 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "casadi numpy",
         "model predictive control",
     ),
-    "doctor": ("codegen verbs", "casadi numpy", "what there is on this machine"),
+    "machine": ("codegen", "casadi numpy", "what there is on this machine"),
     "api": (
         "batches codegen errors files findings importing interrupts problem problems report results runs "
         "shooting solvers suggest threads trajectory transcription verification",
         "matplotlib numpy",
         "what Python calls",
     ),
-    "torch": ("api transcription", "numpy torch", "rollouts and steps for PyTorch"),
-    "jax": ("api errors transcription", "jax numpy", "rollouts and steps for JAX"),
-    "env": ("api errors", "gymnasium numpy", "environments for Gymnasium"),
+    "torch": ("api problem transcription", "numpy torch", "rollouts and steps for PyTorch"),
+    "jax": ("api errors problem transcription", "jax numpy", "rollouts and steps for JAX"),
+    "env": ("api errors problem", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (
-        "api batches codegen doctor errors export files findings identification importing interrupts mpc prediction "
-        "problem problems report results runs solvers suggest threads trajectory transcription verification version",
+        "api batches codegen errors export files findings identification importing interrupts machine mpc "
+        "prediction problem problems report results runs solvers suggest threads trajectory transcription "
+        "verification version",
         "click numpy rich",
         "the commands",
     ),

@@ -29,7 +29,13 @@ def blocks(language: str, document: str = "README.md") -> list[str]:
 
 def printed(code: str, folder: Path) -> list[str]:
     """The lines that a program prints when it runs in a folder of its own."""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=folder)
+    done = subprocess.run(
+        [sys.executable, "-W", "error:symphys:DeprecationWarning", "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=folder,
+    )
     return done.stdout.strip().splitlines()
 
 

@@ -15,7 +15,7 @@ import symphys
 ROOT = Path(__file__).parents[2]
 TEXTS = {".py", ".c", ".h", ".toml", ".cfg", ".md", ".css", ".js", ".html", ".json", ".txt", ".svg", ""}
 SKIPPED = {".git", ".venv", "build", "dist", "reports", "__pycache__"}
-MOST_NAMES = 62
+MOST_NAMES = 40
 MACHINE_PATH = re.compile(r"(?<![\w.<$/])/(?:home|root|work|tmp|Users|mnt)/\w")
 
 

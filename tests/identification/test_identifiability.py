@@ -10,8 +10,14 @@ from data.analytic_recordings import TRUTHS, Truth, recordings, slide
 from tools.repeats import few
 
 from symphys.identification import FitOptions, IdentificationOptions, fit_parameters, identify
-from symphys.identification.inference.advice import GENERAL, advice
-from symphys.identification.inference.identifiability import components, echelon, monomial, whole_powers
+from symphys.identification.inference.identifiability import (
+    GENERAL,
+    advice,
+    components,
+    echelon,
+    monomial,
+    whole_powers,
+)
 from symphys.results.identification import Identification
 from symphys.types import Array
 

@@ -76,12 +76,12 @@ def test_long_values_have_a_line_for_each_entry() -> None:
 
 
 def test_an_included_model_is_the_robot(folder: Path) -> None:
-    problem = symphys.load_problem(folder / "swing.toml")
+    problem = symphys.load(folder / "swing.toml")
     assert [body.name for body in problem.world().bodies] == ["rod"]
     (folder / "apart").mkdir()
     kept = folder / "apart" / "kept.toml"
     kept.write_text(problem.to_toml(), encoding="utf-8")  # run folders have this text, and no model beside it
-    again = symphys.load_problem(kept)
+    again = symphys.load(kept)
     assert again.parameters.keys() == problem.parameters.keys()
     assert all(np.array_equal(again.parameters[key], problem.parameters[key]) for key in problem.parameters)
 
@@ -89,7 +89,7 @@ def test_an_included_model_is_the_robot(folder: Path) -> None:
 def test_an_include_says_keyframe_and_prefix(folder: Path) -> None:
     keys = 'keyframe = "up"\nprefix = "my_"\nself_collision = false\n'
     (folder / "up.toml").write_text(PROBLEM + keys, encoding="utf-8")
-    problem = symphys.load_problem(folder / "up.toml")
+    problem = symphys.load(folder / "up.toml")
     assert [joint.start for joint in problem.parametric.joints] == [(1.5,)]
 
 
@@ -109,7 +109,7 @@ def test_what_cannot_be_included_is_said_with_its_place(folder: Path, include: s
     file = folder / "bad.toml"
     file.write_text(f"[simulation]\nduration = 0.1\ndt = 0.01\n[[include]]\n{include}\n", encoding="utf-8")
     with pytest.raises(ProblemError, match=why.replace("[", r"\[").replace("]", r"\]")):
-        symphys.load_problem(file)
+        symphys.load(file)
 
 
 def test_a_robot_in_python(folder: Path, tmp_path: Path) -> None:

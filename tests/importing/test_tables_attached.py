@@ -53,8 +53,42 @@ def test_sensors_read_what_mujoco_senses() -> None:
     sensed = np.concatenate([np.array(parse(table["reads"]).evaluate(named)).ravel() for table in tables["sensor"]])
     assert sensed == pytest.approx(data.sensordata, abs=1e-12)
     for name in ("mark", "nose", "top"):
-        assert np.array(named[f"{name}.position"]).ravel() == pytest.approx(data.site(name).xpos, abs=1e-12)
-    assert np.array(named["mast.position"]).ravel() == pytest.approx(data.body("mast").xpos, abs=1e-12)
+        assert np.array(named[f"{name}.position"]()).ravel() == pytest.approx(data.site(name).xpos, abs=1e-12)
+    assert np.array(named["mast.position"]()).ravel() == pytest.approx(data.body("mast").xpos, abs=1e-12)
+
+
+ARM = """<worldbody><body name="a" pos="0.3 -0.2 1" euler="0.4 0.2 0.1">
+<joint name="s" axis="0 1 0" pos="0 0 0.2" armature="0.05"/>
+<inertial pos="0.1 0.02 0" mass="2" diaginertia="0.02 0.03 0.04" euler="0.1 0.2 0.3"/>
+<site name="sa" pos="0.3 0 0.1" euler="0.3 0.2 0.1"/>
+<body name="b" pos="0 0.1 0.3" euler="0.5 0 0"><joint name="f" type="slide" axis="0 0.6 0.8"/><site name="sb"/>
+<inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.02 0.015"/>
+<body name="c" pos="0.1 0.1 0.3"><joint type="ball" name="g"/><site name="sc" euler="0 0 1"/>
+<inertial pos="0 0.05 0.1" mass="1" diaginertia="0.01 0.02 0.015"/>
+<body name="d" pos="0 0 0.2"><inertial pos="0 0 0" mass="0.1" diaginertia="0.01 0.01 0.01"/><site name="sd"/></body>
+</body></body></body></worldbody><sensor><force site="sa"/><torque site="sa"/><force site="sb"/><torque site="sb"/>
+<force site="sc"/><torque site="sc"/>%s</sensor>"""
+
+
+def test_force_and_torque_sensors_read_what_mujoco_senses() -> None:
+    """Between bodies that joints hold, in motion, with a rotor; between welded bodies there is no joint to read."""
+    tables, _ = read(ARM % "")
+    model = model_of(ARM % "")
+    data = mujoco.MjData(model)
+    data.qvel[:] = [0.7, -1.2, 0.5, 0.4, -0.8]
+    mujoco.mj_forward(model, data)
+    for body in tables["body"]:
+        velocity, at = np.zeros(6), np.array(body["position"])
+        index = model.body(body["name"]).id
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, index, velocity, 0)
+        body["velocity"] = (velocity[3:] + np.cross(velocity[:3], at - data.xpos[index])).tolist()
+        body["angular_velocity"] = velocity[:3].tolist()
+    named = names_at_start(problem_of(tables))
+    sensed = np.concatenate([np.array(parse(table["reads"]).evaluate(named)).ravel() for table in tables["sensor"]])
+    assert sensed == pytest.approx(data.sensordata, abs=1e-9)
+    assert np.abs(data.sensordata[:6]).min() > 0.1
+    _, findings = read(ARM % '<force site="sd"/>')
+    assert "1 force" in texts(findings, "left out")
 
 
 def names_at_start(problem: Any) -> dict[str, Any]:

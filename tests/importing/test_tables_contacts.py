@@ -117,6 +117,35 @@ def test_several_laws_of_one_body_are_told() -> None:
     assert "friction of 1 pairs of bodies" in texts(findings, "approximated")
 
 
+def pair_of(friction: str, plane: str = "", geom: str = 'size="0.1"') -> str:
+    """A geom on a plane, with an explicit pair."""
+    return f"""<worldbody><geom name="floor" type="plane" size="1 1 1" {plane}/>
+    <body name="b" pos="0 0 1"><freejoint/><geom name="g" {geom}/></body></worldbody>
+    <contact><pair geom1="floor" geom2="g" condim="4" friction="{friction}"/></contact>"""
+
+
+@pytest.mark.parametrize("plane", ["", 'zaxis="0 1 2"', 'zaxis="0.1 -3 1"'])
+def test_two_coefficients_of_a_pair_hold_along_and_across_the_tangent_of_its_contact(plane: str) -> None:
+    """As MuJoCo has it where the ball is pushed into the plane."""
+    xml = pair_of("0.8 0.2 0.01 0 0", plane)
+    model = model_of(xml)
+    data = mujoco.MjData(model)
+    data.qpos[:3] = 0
+    mujoco.mj_forward(model, data)
+    tangent = np.array(data.contact[0].frame).reshape(3, 3)[1]
+    tables, findings = read(xml)
+    (law,) = {pair.law for pair in problem_of(tables).world().pairs}
+    assert (law.friction, law.torsion) == ((0.8, 0.2), 0.01)
+    assert np.array(law.friction_direction) == pytest.approx(tangent, abs=1e-12)
+    assert "friction_direction" not in texts(findings, "approximated")
+
+
+def test_two_coefficients_whose_tangents_turn_with_a_body_become_the_larger() -> None:
+    tables, findings = read(pair_of("0.8 0.2 0.01 0 0", geom='type="capsule" size="0.1 0.2"'))
+    assert by_name(tables, "body")["b"]["friction"] == 0.8
+    assert "friction_direction" in texts(findings, "approximated")
+
+
 def test_shapes_without_a_rule_and_what_overlaps() -> None:
     xml = """<worldbody><geom type="plane" size="1 1 1"/>
     <body name="can" pos="0 0 2"><freejoint/><geom type="cylinder" size="0.1 0.2"/></body>

@@ -10,7 +10,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys import Body, Box, Capsule, Sphere, SymphysError
+from symphys import SymphysError
+from symphys.model import Body, Box, Capsule, Sphere
 from symphys.model.jointed import REST
 
 

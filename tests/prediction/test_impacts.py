@@ -9,7 +9,7 @@ import pytest
 
 import symphys
 from symphys.prediction import residuals_of
-from symphys.prediction.impacts import impact_times
+from symphys.prediction.predictor import impact_times
 from symphys.results.identification import Identification
 
 GRAVITY, NOISE = np.array([0.0, 0.0, -9.81]), 0.001

@@ -38,6 +38,9 @@ COST = 'at = "always"\nsquares = "marble.force"'
 OUTPUT = "[[output]]\nname = 'far'\nvalue = '"
 TARGET = 'value = "ball.position - [1, 0, 0.5]"'
 
+TWO = "friction = [0.5, 0.2]\nfriction_direction = [1, 0, 0]"
+SURFACES = TWO_BALLS[TWO_BALLS.index("friction = 0.5") : TWO_BALLS.index("restitution = 0.5")]
+
 WORLDS = [
     # keys and kinds
     (MASS, "mas = 2.0", 'body "ball".mas', '"mass"'),
@@ -132,6 +135,35 @@ WORLDS = [
     (GROUND, "[contact]\nfrequency = 5\n[ground]", "contact.frequency", "5 Hz"),
     (GROUND, "[contact]\nfrequency = 5\nrestitution = 0.5\n[ground]", "contact.frequency", "soft"),
     (GROUND, '[[pair]]\nbetween = ["ball", "ground"]\nfrequency = 5\n[ground]', "pair[0].frequency", "soft"),
+    # friction along and across a direction
+    ("friction = 0.5", "friction = [0.5, 0.2]", 'body "ball".friction', "friction_direction"),
+    ("friction = 0.5", "friction = [0.5, 0.2, 0.1]", 'body "ball".friction', "two"),
+    ("friction = 0.5", "friction = [0.5, -0.2]", 'body "ball".friction', "at least 0"),
+    (
+        "friction = 0.5",
+        "friction = 0.5\nfriction_direction = [1, 0, 0]",
+        'body "ball".friction_direction',
+        "[along, across]",
+    ),
+    (
+        "friction = 0.5",
+        "friction = [0.5, 0.2]\nfriction_direction = [0, 0, 0]",
+        'body "ball".friction_direction',
+        "[1, 0, 0]",
+    ),
+    (
+        SURFACES,
+        SURFACES.replace("friction = 0.5", TWO).replace("friction = 0.8", TWO),
+        'body "ball".friction_direction',
+        "[[pair]]",
+    ),
+    (
+        GROUND,
+        f'[[pair]]\nbetween = ["ball", "ground"]\n{TWO}\nfriction_frame = "marble"\n[ground]',
+        "pair[0].friction_frame",
+        "one of these two",
+    ),
+    (GROUND, '[contact]\nfriction_frame = "ball"\n[ground]', "contact.friction_frame", "friction_direction"),
     (GROUND, "[contact]\ndamping = 1\n[ground]", "contact.damping", "no effect"),
     (GROUND, '[[pair]]\nbetween = ["ball", "ground"]\ndamping = 5\n[ground]', "pair[0].damping", "no effect"),
     (GROUND, '[[pair]]\nbetween = ["ball", "grond"]\n[ground]', "pair[0].between", '"ground"'),

@@ -61,6 +61,7 @@ MOTOR = "motor = { servo = { gain = 20, torque = 30, velocity = 8 } }"
 LIMITS = "limits_deg = [-90, 45]"
 SPRING = "spring = { stiffness = 5, damping = 0.1, rest = 0.2 }"
 SETS = 'sets = "knee.command"\nknots = 4'
+SCREW = "helical = { axis = [1, 2, 3], pitch = -0.1 }"
 UNIVERSAL = "universal = { axes = [[0, 1, 0], [1, 0, 0]] }"
 BARE = ((MOTOR, ""), (LIMITS, ""), (SPRING, ""), (SETS, 'sets = "shin.velocity"'))
 """Leaves nothing that acts."""
@@ -89,6 +90,10 @@ CASES = [
     ),
     (HINGE, "universal = { axes = [[0, 1, 0], [0, 0, 0]] }", 'joint "knee".universal.axes', "must not be zero"),
     (HINGE, "universal = { axes = [[0, 1, 0]] }", 'joint "knee".universal.axes', "2 or more"),
+    (HINGE, "helical = { axis = [0, 0, 1], pitch = 0 }", 'joint "knee".helical.pitch', "a number but 0"),
+    (HINGE, "helical = { axis = [0, 0, 1], pitch = inf }", 'joint "knee".helical.pitch', "a number but 0"),
+    (HINGE, "helical = { axis = [0, 0, 1] }", 'joint "knee".helical.pitch', "required"),
+    (HINGE, "helical = { axis = [0, 0, 0], pitch = 0.1 }", 'joint "knee".helical.axis', "must not be zero"),
     (HINGE, "ball = {}", 'joint "knee".motor', "ball joint has no coordinate .* take a hinge"),
     (HINGE, "ball = {}", 'joint "knee".limits_deg', "no coordinate"),
     (HINGE, "fixed = {}", 'joint "knee".spring', "fixed joint has no coordinate"),
@@ -203,7 +208,12 @@ def test_limits_at_one_end(load: Load) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "x", "y"),
-    [(HINGE, [0, 1, 0], None), ("slider = { axis = [1, 0, 1] }", [1, 0, 1], None), (UNIVERSAL, [1, 0, 0], [0, 1, 0])],
+    [
+        (HINGE, [0, 1, 0], None),
+        ("slider = { axis = [1, 0, 1] }", [1, 0, 1], None),
+        (SCREW, [1, 2, 3], None),
+        (UNIVERSAL, [1, 0, 0], [0, 1, 0]),
+    ],
 )
 def test_frames_coincide_at_the_start_along_the_axes(load: Load, kind: str, x: list[float], y: object) -> None:
     problem = load((LIMITS, ""), (SETS, 'sets = "shin.velocity"'), (HINGE, kind), text=LEG)
@@ -265,7 +275,7 @@ def test_a_command_has_a_number_for_each_coordinate(load: Load) -> None:
 
 
 def test_coordinates_are_zero_at_the_start(load: Load) -> None:
-    for kind in (HINGE, UNIVERSAL, "slider = { axis = [1, 2, 3] }"):
+    for kind in (HINGE, UNIVERSAL, "slider = { axis = [1, 2, 3] }", SCREW):
         problem = load((HINGE, kind), (LIMITS, ""), text=LEG)
         world = problem.world()
         reading = readings(world, initial_state(world, problem.initial))["knee"]
@@ -279,6 +289,7 @@ def test_coordinates_are_zero_at_the_start(load: Load) -> None:
         (HINGE, "[knee.angle, knee.rate, knee.torque, knee.command, knee.gain, knee.stiffness]"),
         (UNIVERSAL, "knee.angle[1] + knee.rate[1] + knee.torque[1] + knee.command[1]"),
         ("slider = { axis = [1, 0, 0] }", "[knee.position, knee.rate, knee.torque]"),
+        (SCREW, "[knee.angle, knee.rate, knee.torque, knee.pitch]"),
     ],
 )
 def test_formulas_know_what_joints_do(load: Load, kind: str, formula: str) -> None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import symphys
-from symphys import (
+from symphys import Problem, SymphysError, step_function
+from symphys.model import (
     Body,
     Box,
     Capsule,
@@ -17,16 +18,13 @@ from symphys import (
     Hinge,
     Law,
     Plane,
-    Problem,
     Scheme,
     Servo,
     Sphere,
     Spring,
-    SymphysError,
     Terrain,
     initial_state,
     make_world,
-    step_function,
 )
 
 ROD = {"radius": 0.02, "length": 0.4}
@@ -56,14 +54,14 @@ TABLES = {
 }
 
 
-def double_pendulum() -> symphys.World:
+def double_pendulum() -> symphys.model.World:
     """The same from Python."""
     bodies = [
         Body.capsule("upper", **ROD, mass=0.5, position=(0, 0, 0.8)),
         Body.capsule("lower", **ROD, density=900, position=(0, 0, 0.4), velocity=(0, 0.3, 0)),
     ]
     joints = [
-        symphys.BallJoint("shoulder", ("world", "upper"), point=(0, 0, 1)),
+        symphys.model.BallJoint("shoulder", ("world", "upper"), point=(0, 0, 1)),
         Hinge(
             "elbow",
             ("upper", "lower"),

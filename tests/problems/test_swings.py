@@ -7,7 +7,7 @@ import pytest
 from data.shipped import shipped, solve
 from worlds import swings
 
-from symphys.findings.verdict import DOUBTED, rule
+from symphys.findings.verdict import DOUBTED, judge_run
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.runs.record import judged
@@ -53,6 +53,6 @@ def test_a_swing_that_half_the_step_refutes_is_not_solved() -> None:
     trust = refine(made, found.z)
     verdict = judged(made.judge(found.z))
     assert verdict.met and trust["refined"][0]["worst"] > 3
-    ruling = rule(found.status.value, verdict, trust)
-    assert ruling.verdict == DOUBTED
-    assert any("dt / 2" in doubt for doubt in ruling.doubts)
+    given = judge_run(found.status.value, verdict, trust)
+    assert given.word == DOUBTED
+    assert any("dt / 2" in doubt for doubt in given.doubts)

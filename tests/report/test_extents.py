@@ -10,7 +10,7 @@ import numpy as np
 from tools.repeats import few
 
 from symphys.report.figures import style
-from symphys.report.pages.motion import draw
+from symphys.report.pages.motion import motion_pictures
 from symphys.report.robots.strip import draw_strip
 from symphys.report.scene.animation import animation, light_animation
 from symphys.report.scene.motion import draw_motion
@@ -92,7 +92,7 @@ def test_whatever_its_extent_a_motion_is_drawn(tmp_path: Path, name: str) -> Non
 
 def test_a_motion_without_any_extent_has_all_its_figures(tmp_path: Path) -> None:
     with style.paper():
-        found = draw(motion(start=-0.5), scene(tmp_path, joint=True))
+        found = motion_pictures(motion(start=-0.5), scene(tmp_path, joint=True))
     assert {"motion", "strip", "states"} <= set(found)
 
 

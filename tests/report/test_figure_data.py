@@ -17,7 +17,9 @@ from data.walker import motion as walk
 from data.walker import write_walker
 
 from symphys.report import write_batch_report, write_motion, write_run_report
+from symphys.report.charts.drawing import draw_chart
 from symphys.report.figures.data import DataFigure, keep, table
+from symphys.report.robots.gait import gait_chart
 from symphys.results.run import read_run
 from symphys.results.scene import Scene
 from symphys.results.trajectories import read_trajectory
@@ -136,13 +138,12 @@ def test_knots_and_joints_have_their_columns(pages: Path) -> None:
 
 
 def test_a_gait_has_the_times_of_each_stance(load: Callable[..., tuple[Trajectory, Scene]]) -> None:
-    from symphys.report.robots.gait import draw_gait
-
     arrays = walk()
     arrays["contact_force"][10:20, 1, 2] = arrays["contact_force"][30:, 1, 2] = 50.0
     trajectory, scene = load(arrays)
-    figure = draw_gait(trajectory, scene)
-    assert figure is not None
+    chart = gait_chart(trajectory, scene)
+    assert chart is not None
+    figure = draw_chart(chart)
     time = trajectory.time
     starts, ends = figure.blocks[0].items()
     assert starts == ("fl_shin.stands from [s]", [time[10], time[30]])

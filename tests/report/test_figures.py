@@ -9,10 +9,11 @@ import matplotlib
 import numpy as np
 import pytest
 
+from symphys.report.charts.contacts import pair_normals, shown_pairs
+from symphys.report.charts.convergence import Curve, best_so_far, median_curve, violation_so_far
 from symphys.report.figures import style
-from symphys.report.figures.checks import limits, ratios
-from symphys.report.figures.contacts import pair_normals, shown_pairs
-from symphys.report.figures.convergence import Curve, best_so_far, median_curve, violation_so_far
+from symphys.report.figures.data import thin
+from symphys.report.pages.batch import limits, ratios
 from symphys.report.scene.motion import draw_motion
 from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, turn
 from symphys.results.discovery import read_all, studies
@@ -48,7 +49,7 @@ def test_best_and_miss_only_fall(made: Path) -> None:
 def test_thinning_keeps_spikes() -> None:
     values = np.zeros((20_000, 2))
     values[777, 0], values[15_001, 1] = 5.0, -3.0
-    time, thinned = style.thin(np.arange(20_000.0), values)
+    time, thinned = thin(np.arange(20_000.0), values)
     assert len(time) < 1500
     assert (thinned[:, 0].max(), thinned[:, 1].min()) == (5, -3)
     assert (time[0], time[-1]) == (0, 19_999)

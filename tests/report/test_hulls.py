@@ -22,8 +22,7 @@ from symphys.report.figures import style
 from symphys.report.robots.poses import RobotDrawing
 from symphys.report.scene.animation import motion_data, solid_data
 from symphys.report.scene.motion import draw_motion
-from symphys.report.scene.outlines import inner_edges, outline
-from symphys.report.scene.views import SIDE_XZ, TOP, choose_views
+from symphys.report.scene.views import SIDE_XZ, TOP, choose_views, inner_edges, outline
 from symphys.results.polytope import Polytope, make_polytope
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Trajectory

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from symphys.report.making import batch, pool
+from symphys.report.making import batch, run_pages
 from symphys.report.making.batch import WantedPages, make_pages
 
 
@@ -32,7 +32,7 @@ def test_ctrl_c_is_not_swallowed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         lose()
         return folder
 
-    monkeypatch.setattr(pool, "make_run_page", make_run_page)
+    monkeypatch.setattr(run_pages, "make_run_page", make_run_page)
     monkeypatch.setattr(batch, "write_batch_report", write_batch_report)
     folders = tuple(tmp_path / name for name in "ab")
     with pytest.raises(KeyboardInterrupt):

@@ -16,9 +16,10 @@ from matplotlib.colors import to_hex
 from tools.repeats import first
 
 from symphys.report import write_motion, write_run_report
+from symphys.report.charts.drawing import BEYOND, draw_chart
 from symphys.report.figures import style
-from symphys.report.pages.joints import limits_sentence, motors_sentence, separation_sentence
-from symphys.report.robots.joint_figures import BEYOND, FULL, TARGET, axis_range, draw_joints, make_grid, shown
+from symphys.report.pages.motion import limits_sentence, motors_sentence, separation_sentence
+from symphys.report.robots.joint_charts import COMMAND, SATURATED, axis_range, joint_charts, make_grid, shown
 from symphys.report.robots.joint_use import channels, separation
 from symphys.results.scene import Scene
 from symphys.trajectory import Trajectory
@@ -59,15 +60,16 @@ def test_saturation_is_the_share_of_the_time_at_the_bounds(load: Load) -> None:
 
 @pytest.mark.slow
 def test_saturation_is_marked_where_it_is(load: Load) -> None:
-    _, figure = draw_joints(*load(worked()))
-    assert figure is not None
+    _, chart = joint_charts(*load(worked()))
+    figure = draw_chart(chart)
     axes = panel(figure.axes, "fr_knee [N m]")
-    marks = [(line.get_xdata(), line.get_ydata()) for line in axes.lines if line.get_color() == FULL]
-    stretches = sorted((*np.round(x, 9).tolist(), float(y[0])) for x, y in marks)
+    (mark,) = [line.get_xydata() for line in axes.lines if line.get_color() == SATURATED]
+    stretches = sorted((*np.round(part[:2, 0], 9).tolist(), float(part[0, 1])) for part in mark.reshape(-1, 3, 2))
+    assert np.isnan(mark[2::3, 1]).all()
     assert stretches == [(5 * DT, 11 * DT, 30.0), (20 * DT, 26 * DT, -30.0)]
-    assert axes.get_title(loc="right") == "30 %"
+    assert axes.get_title(loc="right") == "saturated 30 %"
     other = panel(figure.axes, "fl_knee [N m]")
-    assert not [line for line in other.lines if line.get_color() == FULL]
+    assert not [line for line in other.lines if line.get_color() == SATURATED]
     assert other.get_title(loc="right") == ""
 
 
@@ -76,10 +78,9 @@ def test_targets_of_servos_are_dashed_and_limits_shaded(load: Load) -> None:
     arrays = motion()
     arrays["joint_command"][:, KNEE, 0] = np.linspace(0, 0.5, STEPS)
     trajectory, scene = load(arrays)
-    figure, _ = draw_joints(trajectory, scene)
-    assert figure is not None
+    figure = draw_chart(joint_charts(trajectory, scene)[0])
     axes = panel(figure.axes, "fr_knee [rad]")
-    (dashed,) = [line for line in axes.lines if line.get_color() == TARGET]
+    (dashed,) = [line for line in axes.lines if line.get_color() == COMMAND]
     assert dashed.get_linestyle() == "--"
     assert np.allclose(dashed.get_ydata()[:-1], arrays["joint_command"][:, KNEE, 0])
     shades = sorted(patch.get_y() for patch in axes.patches if to_hex(patch.get_facecolor()) == BEYOND)
@@ -92,7 +93,8 @@ def test_a_record_without_commands_has_no_targets(load: Load) -> None:
     arrays = motion()
     del arrays["joint_command"]
     assert [channel.target for channel in channels(*load(arrays))] == [None] * 8
-    assert "dashed" not in str(draw_joints(*load(arrays)))
+    lines = [line for chart in joint_charts(*load(arrays)) for panel in chart.panels if panel for line in panel.lines]
+    assert lines and not any(line.has("dashed") for line in lines)
     driven = {**SCENE, "joints": [{**j, "motor": {"kind": "torque", "torque": 3}} for j in SCENE["joints"]]}
     assert [channel.target for channel in channels(*load(motion(), driven))] == [None] * 8
 
@@ -113,10 +115,8 @@ def test_few_joints_have_a_row_each_with_the_torque_beside_it(load: Load) -> Non
     }
     arrays = {**motion(), "joint_names": np.array(["pivot", "fl_hip"])}
     keys = [key for key in arrays if key.startswith("joint_") and key != "joint_names"]
-    figure, more = draw_joints(*load({**arrays, **{key: arrays[key][:, :2] for key in keys}}, arm))
-    assert figure is not None
-    assert more is None
-    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    (chart,) = joint_charts(*load({**arrays, **{key: arrays[key][:, :2] for key in keys}}, arm))
+    titles = [axes.get_title(loc="left") for axes in draw_chart(chart).axes]
     assert titles == ["pivot: angle [rad]", "", "fl_hip: angle [rad]", "fl_hip: torque [N m]"]
 
 

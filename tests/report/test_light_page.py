@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 import shutil
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +16,8 @@ from data.walker import motion, write_walker
 from tools.page_scripts import NODE, run_script
 
 from symphys.report import write_light_report, write_run_report
-from symphys.report.charts.chart import STEPS, Chart, Panel, fine, lines
-from symphys.report.charts.packed import pack, unpack
+from symphys.report.charts.chart import RESOLUTION, Chart, Panel, differences, lines
+from symphys.report.pages.markup import pack
 from symphys.results.trajectories import read_trajectory
 
 LARGEST = 60_000
@@ -24,6 +26,11 @@ OPTIONAL = ("trajectory.npz", "guess.npz", "scene.json", "trace.csv", "config.js
 
 def read(run_dir: Path) -> str:
     return write_light_report(run_dir).read_text(encoding="utf-8")
+
+
+def unpack(text: str) -> str:
+    """The inverse of ``pack``."""
+    return zlib.decompress(base64.b64decode(text)).decode()
 
 
 def charts(text: str) -> dict[str, Any]:
@@ -65,12 +72,14 @@ def test_curves_are_the_recorded_numbers(shown: tuple[Path, str]) -> None:
     panel = found["states"]["panels"][0]
     assert panel["title"] == "Position [m]" and [line["n"] for line in panel["lines"]] == ["x", "y", "z"]
     times = numbers(panel["x"][0])
-    assert times[-1] == pytest.approx(recorded.time[-1], rel=2 / STEPS)
+    assert times[-1] == pytest.approx(recorded.time[-1], rel=2 / RESOLUTION)
     for axis, line in enumerate(panel["lines"]):
         place, found_places = recorded.position[:, 0, axis], numbers(line["y"])
         expected = np.interp(times, recorded.time, place)
         assert len(found_places) == len(times)
-        assert np.abs(found_places - expected).max() <= 2 * max(np.ptp(place), 1e-12) / STEPS + 0.01 * np.ptp(place)
+        assert np.abs(found_places - expected).max() <= 2 * max(np.ptp(place), 1e-12) / RESOLUTION + 0.01 * np.ptp(
+            place
+        )
     force = found["contacts"]["panels"][0]
     assert np.nanmax(numbers(force["lines"][0]["y"])) == pytest.approx(recorded.contact_force[..., 2].max(), rel=1e-3)
 
@@ -128,10 +137,10 @@ def test_the_script_draws_every_chart(shown: tuple[Path, str], batch: Path) -> N
 @NODE
 def test_script_unpacks_what_was_packed() -> None:
     values = np.cumsum(np.random.default_rng(1).standard_normal(200))
-    found = np.array(run_script(f"numbers({json.dumps(fine(values))})", "numbers.js", "charts.js"))
-    assert np.abs(found - values).max() <= np.ptp(values) / STEPS
-    assert fine(np.array([1.0, np.nan])) == [1.0, None]
-    assert fine(np.full(3, 7.25)) == [7.25] * 3
+    found = np.array(run_script(f"numbers({json.dumps(differences(values))})", "numbers.js", "charts.js"))
+    assert np.abs(found - values).max() <= np.ptp(values) / RESOLUTION
+    assert differences(np.array([1.0, np.nan])) == [1.0, None]
+    assert differences(np.full(3, 7.25)) == [7.25] * 3
     assert unpack(pack("any text: \N{ROCKET}")) == "any text: \N{ROCKET}"
 
 

@@ -16,11 +16,10 @@ from tools.page_scripts import NODE, run_script
 from symphys import files
 from symphys.report import write_batch_report
 from symphys.report.pages.batch import MOST_STUDIES
-from symphys.report.pages.brief import BriefReader, read_brief_table
-from symphys.report.pages.rows import NumberColumn, WordColumn, setting_columns
+from symphys.report.pages.comparison import NumberColumn, WordColumn, setting_columns
 from symphys.results.discovery import Entry, Study, read_all, run_folders, sample
 from symphys.results.result import Result
-from symphys.results.run import read_run
+from symphys.results.run import BriefReader, read_brief_table, read_run
 
 EMPTY = {"z", "trust", "price", "guess", "costs", "advice", "iterations", "absent"}
 

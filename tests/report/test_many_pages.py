@@ -16,9 +16,8 @@ import pytest
 import symphys.report
 from symphys.report import WantedPages, make_pages, outdated, wanted_below
 from symphys.report.making import batch as making
-from symphys.report.making import page as single
-from symphys.report.making import pool, stamps
-from symphys.report.making.page import MOST_FULL, PageFault, fitting_kinds, is_light
+from symphys.report.making import run_pages, stamps
+from symphys.report.making.run_pages import MOST_FULL, PageFault, fitting_kinds, is_light
 from symphys.report.making.stamps import read_stamp
 from symphys.results.text_files import ReportError
 
@@ -49,7 +48,7 @@ def is_whole(page: Path) -> bool:
 @pytest.fixture
 def two_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Start them however few pages there are."""
-    monkeypatch.setattr(pool, "WORTH", {False: 1, True: 1})
+    monkeypatch.setattr(run_pages, "MIN_PAGES_PER_WORKER", {False: 1, True: 1})
 
 
 @pytest.mark.slow
@@ -63,7 +62,7 @@ def test_a_page_that_cannot_be_made_is_named_and_the_others_are_made(runs: list[
     said = made.page.read_text(encoding="utf-8").partition("Pages that could not be made")[2]
     assert "throw/gradient-seed2" in said and "directory" in said
     with pytest.raises(ReportError, match="gradient-seed2"):
-        symphys.report(runs[0].parents[1], pages="light")
+        symphys.write_report(runs[0].parents[1], pages="light")
     (blocked / "inside").rmdir()
     blocked.rmdir()
     mended = make_pages(wanted_below(runs[0].parents[1], "light"), "light")
@@ -81,7 +80,7 @@ def test_a_motion_that_cannot_be_drawn_ends_no_page_of_others(
         raise ValueError("cannot convert float NaN to integer")
 
     monkeypatch.setattr("symphys.report.pages.batch.draw_motion", fails)
-    monkeypatch.setattr("symphys.report.pages.run.draw_motion", fails)
+    monkeypatch.setattr("symphys.report.pages.motion.draw_motion", fails)
     found = make_pages(wanted_below(tmp_path / "all", remake=True))
     assert [fault.page.name for fault in found.faults] == [PAGE]
     text = found.page.read_text(encoding="utf-8")
@@ -99,14 +98,14 @@ def test_pages_that_take_too_long_are_given_up(runs: list[Path]) -> None:
 
 
 def test_any_error_is_a_fault_with_its_kind(runs: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    draw = single.write_light_report
+    draw = run_pages.write_light_report
 
     def fails(folder: Path) -> Path:
         if folder == runs[0]:
             raise ZeroDivisionError("by nothing")
         return draw(folder)
 
-    monkeypatch.setattr(single, "write_light_report", fails)
+    monkeypatch.setattr(run_pages, "write_light_report", fails)
     monkeypatch.setattr(making, "write_batch_report", lambda root, unmade: 1 / 0)
     made = make_pages(wanted_below(runs[0].parents[1]), "light")
     assert [fault.reason for fault in made.faults] == [
@@ -121,7 +120,7 @@ def test_any_error_is_a_fault_with_its_kind(runs: list[Path], monkeypatch: pytes
 @pytest.mark.usefixtures("two_workers")
 def test_workers_change_no_byte_and_name_what_fails(runs: list[Path]) -> None:
     for folder in runs:
-        assert single.make_run_page(folder, light=True) is None
+        assert run_pages.make_run_page(folder, light=True) is None
     alone = {folder: (folder / PAGE).read_bytes() for folder in runs}
     for folder in runs:
         (folder / PAGE).unlink()
@@ -146,10 +145,10 @@ def test_a_worker_that_dies_fails_its_page_only(runs: list[Path]) -> None:
                 os.kill(child.pid, signal.SIGKILL)
         found[folder] = fault
 
-    pool.PagePool(deque(runs), light=True, done=done).run(1)
+    run_pages.PagePool(deque(runs), light=True, done=done).run(1)
     assert list(found) == runs
     faults = {folder: fault.reason for folder, fault in found.items() if fault is not None}
-    assert faults == {runs[1]: pool.DIED}
+    assert faults == {runs[1]: run_pages.DIED}
     assert all(is_whole(folder / PAGE) for folder in runs if folder not in faults)
 
 
@@ -161,9 +160,9 @@ def test_an_interruption_leaves_whole_pages_only(runs: list[Path], workers: int)
 
     with pytest.raises(KeyboardInterrupt):
         if workers:
-            pool.PagePool(deque(runs), light=True, done=interrupt).run(workers)
+            run_pages.PagePool(deque(runs), light=True, done=interrupt).run(workers)
         else:
-            pool.make_run_pages(runs, light=True, jobs=1, done=interrupt)
+            run_pages.make_run_pages(runs, light=True, jobs=1, done=interrupt)
     pages = [folder / PAGE for folder in runs if (folder / PAGE).exists()]
     assert 1 <= len(pages) < len(runs)
     assert all(map(is_whole, pages))

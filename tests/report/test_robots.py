@@ -11,10 +11,11 @@ import pytest
 from data.walker import DT, LEGS, NAMES, SCENE, STEPS, TURNED, hinge, motion
 from tools.page_scripts import NODE, plays_to_the_end, run_script
 
+from symphys.report.charts.drawing import draw_chart
 from symphys.report.figures import style
-from symphys.report.pages.joints import steps_sentence
+from symphys.report.pages.motion import steps_sentence
 from symphys.report.robots.branches import branches, colours, keys, traced
-from symphys.report.robots.gait import draw_gait, spans, stances, weight
+from symphys.report.robots.gait import gait_chart, spans, stances, weight
 from symphys.report.robots.joint_positions import axes_of, bones, on_side, position
 from symphys.report.robots.poses import extents, spaced
 from symphys.report.robots.strip import draw_strip, make_strip
@@ -58,8 +59,9 @@ def test_a_body_stands_while_it_carries_a_share_of_the_weight(load: Load) -> Non
 
 def test_bars_of_the_gait(load: Load) -> None:
     trajectory, scene = load(trotting())
-    figure = draw_gait(trajectory, scene)
-    assert figure is not None
+    chart = gait_chart(trajectory, scene)
+    assert chart is not None
+    figure = draw_chart(chart)
     (axes,) = figure.axes
     assert [label.get_text() for label in axes.get_yticklabels()] == ["fl_shin", "hl_shin", "hr_shin"]
     bars = [[np.array(path.vertices) for path in row.get_paths()] for row in axes.collections]
@@ -72,12 +74,12 @@ def test_bars_of_the_gait(load: Load) -> None:
 def test_no_gait_where_none_is(load: Load) -> None:
     standing = motion()
     standing["contact_force"][:, 1::2, 2] = 25.0
-    assert draw_gait(*load(standing)) is None
-    assert draw_gait(*load(motion())) is None
-    assert draw_gait(*load(trotting(), {**SCENE, "joints": []})) is None
-    assert draw_gait(*load(trotting(), {key: part for key, part in SCENE.items() if key != "gravity"})) is None
+    assert gait_chart(*load(standing)) is None
+    assert gait_chart(*load(motion())) is None
+    assert gait_chart(*load(trotting(), {**SCENE, "joints": []})) is None
+    assert gait_chart(*load(trotting(), {key: part for key, part in SCENE.items() if key != "gravity"})) is None
     light = [{key: part for key, part in body.items() if key != "mass"} for body in SCENE["bodies"]]
-    assert draw_gait(*load(trotting(), {**SCENE, "bodies": light})) is None
+    assert gait_chart(*load(trotting(), {**SCENE, "bodies": light})) is None
 
 
 def test_branches_are_what_joints_connect_to_the_base(load: Load) -> None:

@@ -15,7 +15,7 @@ import pytest
 from tools.repeats import few
 
 from symphys.report import write_run_report
-from symphys.report.pages.verification import NOT_EXAMINED
+from symphys.report.pages.sections import NOT_EXAMINED
 from symphys.results.text_files import ReportError
 
 LARGEST = 3_000_000

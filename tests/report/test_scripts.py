@@ -13,7 +13,7 @@ from tools.page_scripts import NODE, run_script
 from tools.repeats import few
 
 from symphys.report.scene.animation import solid_data
-from symphys.report.scene.outlines import outline
+from symphys.report.scene.views import outline
 from symphys.results.scene import Solid
 
 pytestmark = NODE

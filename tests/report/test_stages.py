@@ -14,8 +14,9 @@ import pytest
 from tools.repeats import few
 
 from symphys.report import write_batch_report, write_run_report
-from symphys.report.figures.convergence import Curve, best_so_far, curve, violation_so_far
-from symphys.report.figures.history import draw_run, exact_ends, segments
+from symphys.report.charts.convergence import Curve, best_so_far, curve, violation_so_far
+from symphys.report.charts.drawing import draw_chart
+from symphys.report.charts.run import convergence_chart, exact_ends, segments
 from symphys.results.run import Run, read_run
 
 Edit = Callable[..., None]
@@ -129,18 +130,17 @@ def test_boundaries_and_exact_ends_are_where_the_stages_change(staged: Path) -> 
 @pytest.mark.slow
 def test_the_figure_marks_them(staged: Path) -> None:
     run = run_of(staged)
-    figure = draw_run(run)
-    assert figure is not None
-    objective, errors = figure.axes[:2]
+    chart = convergence_chart(run)
+    assert chart is not None
+    objective, errors = draw_chart(chart).axes[:2]
     x = run.trace["equivalents"]
     borders = [line.get_xdata()[0] for line in objective.lines if line.get_color() == "#b4bec8"]
     assert borders == [(x[end] + x[end + 1]) / 2 for end in ENDS[:2]]
     for axes, name in ((objective, "exact_objective"), (errors, "exact_worst")):
         marks = [line for line in axes.lines if line.get_marker() == "D"]
-        assert [(line.get_xdata()[0], line.get_ydata()[0]) for line in marks] == [
-            (x[end], each[name]) for end, each in zip(ENDS, STAGES, strict=True)
-        ]
-        assert [line.get_markerfacecolor() == "white" for line in marks] == [True, True, False]
+        ends = [(x[end], each[name]) for end, each in zip(ENDS, STAGES, strict=True)]
+        places = {line.get_markerfacecolor() == "white": [*map(tuple, line.get_xydata())] for line in marks}
+        assert places == {True: ends[:2], False: ends[2:]}
     assert [text.get_text() for text in objective.texts] == ["smoothing 0.1", "smoothing 0.01", "exact"]
 
 

@@ -136,20 +136,19 @@ def test_without_pyarrow_there_is_csv_alone(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_the_table_as_a_data_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The room can be called, and stays a room."""
     pytest.importorskip("pandas")
     for seed in (0, 1, 2):
         record(tmp_path, recorded(seed=seed, objective=3.0 - seed), ground__friction=0.1 * seed)
     (record(tmp_path, recorded(seed=9)) / RESULT).write_text("{", encoding="utf-8")
-    table = symphys.results(tmp_path, where="verdict=solved", sort="objective")
+    table = symphys.results.runs(tmp_path, where="verdict=solved", sort="objective")
     assert list(table["seed"]) == [2, 1, 0] and table["objective"].dtype == float
     assert list(table.columns[:5]) == ["run", "problem", "case", "solver", "seed"]
-    assert list(symphys.results(tmp_path)["verdict"]).count("unreadable") == 1
+    assert list(symphys.results.runs(tmp_path)["verdict"]).count("unreadable") == 1
     assert list(symphys.results.best(tmp_path, overall=True)["seed"]) == [2]
-    assert symphys.results.diff is not None and symphys.results.result.FORMAT == 1
+    assert symphys.results.diff is not None
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(SymphysError, match="pip install pandas"):
-        symphys.results(tmp_path)
+        symphys.results.runs(tmp_path)
 
 
 def test_json_is_strict() -> None:

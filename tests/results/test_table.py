@@ -25,8 +25,9 @@ from symphys.results.result import Result
 from symphys.results.table import Journal, best, columns, ordered, read_rows
 from symphys.results.table import rows as table_rows
 from symphys.results.table.journal import BODY, MARK, Kept, entry, stamp_of
-from symphys.results.table.row import HEAVY, read_row
+from symphys.results.table.row import read_row
 from symphys.results.table.writing import csv_text, json_lines
+from symphys.results.text_files import HEAVY
 
 
 def test_a_row_has_what_the_files_say(tmp_path: Path) -> None:
@@ -228,13 +229,13 @@ def test_a_journal_is_begun_where_many_folders_were_read(tmp_path: Path, monkeyp
     record(tmp_path)
     assert read_rows(tmp_path).read == read_rows(tmp_path).read == 1
     assert not Journal(tmp_path).path.exists()
-    monkeypatch.setattr(table_rows, "WORTH", 1)
+    monkeypatch.setattr(table_rows, "MIN_UNKEPT", 1)
     assert (read_rows(tmp_path).read, read_rows(tmp_path).read) == (1, 0)
 
 
 def test_without_a_place_for_the_journal_all_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a folder that is read-only: what is kept cannot be written, or read."""
-    monkeypatch.setattr(table_rows, "WORTH", 1)
+    monkeypatch.setattr(table_rows, "MIN_UNKEPT", 1)
     folder = record(tmp_path)
     Journal(tmp_path).path.mkdir()
     Journal(tmp_path).add(folder)
@@ -244,7 +245,7 @@ def test_without_a_place_for_the_journal_all_is_read(tmp_path: Path, monkeypatch
 
 
 def test_a_journal_full_of_old_lines_is_written_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table_rows, "WORTH", 1)
+    monkeypatch.setattr(table_rows, "MIN_UNKEPT", 1)
     folder = record(tmp_path)
     for _ in range(5):
         Journal(tmp_path).add(folder)

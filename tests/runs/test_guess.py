@@ -17,6 +17,7 @@ from symphys.results.file_names import LOG, MULTIPLIERS, TRAJECTORY
 from symphys.runs import make_jobs, read_guess_run
 from symphys.runs.guess import resampled, with_guess
 from symphys.solvers import SOLVERS
+from symphys.transcription import transcribe
 
 CART = """
 [simulation]
@@ -64,7 +65,7 @@ stop = "converged"
 def cart(tmp_path_factory: pytest.TempPathFactory) -> Problem:
     path = tmp_path_factory.mktemp("cart") / "cart.toml"
     path.write_text(CART, encoding="utf-8")
-    return symphys.load_problem(path)
+    return symphys.load(path)
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +139,7 @@ def test_the_motion_is_the_guess_of_the_states(cart: Problem, found: Solution) -
     for settings, share in (({"simulation.dt": 0.025}, 1.0), ({"simulation.duration": 2.0}, 0.5)):
         problem = cart.set(settings)
         made, _ = taken(problem, found)
-        shooting = symphys.transcribe(made, backend="casadi").shooting
+        shooting = transcribe(made, backend="casadi").shooting
         assert shooting.guessed_states is not None and shooting.staged is not None
         half = problem.simulation.steps // 2
         x = shooting.guessed_states(shooting.start(0), np.array([half]), 0.0)

@@ -1,4 +1,4 @@
-"""A result survives its file, and a file older than verdicts is ruled on as a new one is."""
+"""A result survives its file, and a file older than verdicts is judged as a new one is."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from symphys.problem import Problem, load_problem
 from symphys.results.scene import Solid
+from symphys.results.scene_joints import SceneJoint
 from symphys.results.scene_of_problem import make_scene
 from symphys.transcription import transcribe
 
@@ -205,7 +207,7 @@ def test_joints_are_told_with_all_that_a_report_needs(tmp_path: Path) -> None:
     assert (elbow["name"], elbow["kind"], elbow["first"], elbow["second"]) == ("elbow", "hinge", "lower", "upper")
     assert elbow["motor"] == {"kind": "servo", "gain": 20, "torque": 12, "velocity": 8}
     assert elbow["limits"] == [None, 2]
-    assert elbow["coordinates"] == [{"name": "angle", "turns": True}]
+    assert elbow["coordinates"] == [{"name": "angle", "turns": True, "side": 1, "axis": 0}]
     assert [frame["point"] for frame in elbow["sockets"]] == [[0, 0, 0.5], [0, 0, -0.5]]
     turned = Rotation.from_quat(np.roll(elbow["sockets"][0]["orientation"], -1))
     np.testing.assert_allclose(turned.apply([1, 0, 0]), [0, 1, 0], atol=1e-12)
@@ -214,3 +216,13 @@ def test_joints_are_told_with_all_that_a_report_needs(tmp_path: Path) -> None:
     assert [each["name"] for each in shoulder["coordinates"]] == ["angle1", "angle2"]
     assert (strut["motor"], strut["coordinates"], strut["limits"]) == (None, [], [None, None])
     json.dumps(found, allow_nan=False)
+    (read,) = [SceneJoint.from_json(elbow)]
+    assert read is not None and (read.axes, read.rotates) == (((1, 0),), True)
+
+
+@pytest.mark.parametrize("more", [{}, {"side": 2, "axis": 0}], ids=["old", "damaged"])
+def test_axes_of_files_without_them_are_those_of_the_kind(more: dict[str, Any]) -> None:
+    side = {"point": [0, 0, 0], "orientation": [1, 0, 0, 0]}
+    rail = {"name": "rail", "kind": "slider", "first": "cart", "second": None, "sockets": [side, side]}
+    read = SceneJoint.from_json({**rail, "coordinates": [{"name": "position", "turns": False, **more}]})
+    assert read is not None and (read.axes, read.rotates) == (((1, 0),), False)

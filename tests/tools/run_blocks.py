@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import json
 import sys
+import warnings
 
 END = "\x1e"
 
 
 def main() -> None:
-    """Run what standard input has."""
+    """Run what standard input has; deprecated names of symphys are errors."""
+    warnings.filterwarnings("error", message="symphys", category=DeprecationWarning)
     namespace: dict[str, object] = {"__name__": "__main__"}
     for page, line, text in json.load(sys.stdin):
         exec(compile("\n" * (line - 1) + text, page, "exec"), namespace)

@@ -9,8 +9,9 @@ import pytest
 from tools.parameter_slopes import slopes
 from tools.repeats import few
 
-from symphys import Body, Plane, Problem, SymphysError, make_world
+from symphys import Problem, SymphysError
 from symphys.errors import ProblemError
+from symphys.model import Body, Plane, make_world
 from symphys.problem import load_problem
 from symphys.transcription import transcribe
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 from fakes.emulated import Remote, needs_compiler
@@ -14,6 +15,7 @@ from tools.repeats import thorough
 from worlds.monopod import MONOPOD
 
 from symphys.errors import ProblemError
+from symphys.export.writing import export
 from symphys.problem import load_problem
 from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.texts import read_axes
@@ -22,6 +24,7 @@ from symphys.transcription import Transcription, transcribe
 from symphys.transcription.network_rollout import LargeEvaluator, LargeTranscription, layers, require_small_nets
 from symphys.transcription.network_rollout import evaluator as evaluators
 from symphys.transcription.network_rollout import partition as split
+from symphys.transcription.recorded_rollout import record_rollout
 from symphys.types import Array
 from symphys.verification import examine
 from symphys.verification.gradient import compare_gradient
@@ -422,7 +425,7 @@ def test_a_device_that_cannot_multiply(
 
 
 def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Formulas that look at their weights, and ``export``: refused by name, before anything is built."""
+    """Formulas that look at their weights, and huge ones in exported code: refused before anything is built."""
     path = tmp_path / "hopping.toml"
     path.write_text(
         HOPPING.replace("ACTIVATION", "skip = true").replace('"[leg.torque, start]"', '"[leg.torque, weights]"')
@@ -431,8 +434,31 @@ def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
     with pytest.raises(ProblemError, match=r'cost "effort": .*weights'):
         transcribe(problem)
-    with pytest.raises(ProblemError, match=r'controller "brain"\.net: .*10'):
+    monkeypatch.setattr(split, "MOST_WITHIN", 20)
+    with pytest.raises(ProblemError, match=r'controller "brain"\.net: .*20'):
         require_small_nets(problem, "export")
+
+
+def test_quantities_and_exported_functions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a large net: the step itself has it there, with the same objective and gradient."""
+    path = tmp_path / "large.toml"
+    path.write_text(LIFTS[1])
+    problem = load_problem(path)
+    monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
+    beside = transcribe(problem, threads=1)
+    assert isinstance(beside, LargeTranscription)
+    Z = points(beside)
+    known = beside.shooting.evaluator.gradient(Z, 0.0)
+    assert known.gradient is not None
+    recorded = record_rollout(problem, ["bob.position"], 0.0, "simd", 1)
+    value, quantities = recorded.forward(Z)
+    slopes = recorded.pull(Z, np.ones(2), {"bob.position": np.zeros_like(quantities["bob.position"])})
+    assert np.allclose(value, known.merit, rtol=1e-12)
+    assert np.allclose(slopes, known.gradient, rtol=1e-7, atol=1e-8 * np.abs(known.gradient).max())
+    export(problem, casadi=tmp_path / "exported")
+    gradient = ca.Function.load(str(tmp_path / "exported" / "gradient.casadi"))
+    found = gradient(z=Z[0], smoothing=0.0)
+    assert np.allclose(np.array(found["gradient"]).ravel(), known.gradient[0], rtol=1e-7, atol=1e-7)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import symphys
-from symphys import AffineMotor, Body, Hinge, Problem, Slider, Spring, SymphysError, make_world, simulate
+from symphys import Problem, SymphysError, simulate
+from symphys.model import AffineMotor, Body, Hinge, Slider, Spring, make_world
 from symphys.trajectory import Trajectory
 
 FINE = 2e-4
@@ -123,7 +124,7 @@ def test_an_impact_on_a_lever_turns_its_rotor() -> None:
     arm = Body.box("arm", size=(1.0, 0.1, 0.1), mass=1.2, position=(0.5, 0, 0))
     ball = Body.ball("ball", radius=0.05, mass=0.5, position=(0.9, 0, 0.15), velocity=(0, 0, -2))
     pivot = Hinge("pivot", ("world", "arm"), axis=(0, 1, 0), point=(0, 0, 0), armature=0.7)
-    laws = {("arm", "ball"): symphys.Law(friction=0.0, restitution=1.0)}
+    laws = {("arm", "ball"): symphys.model.Law(friction=0.0, restitution=1.0)}
     world = make_world([arm, ball], gravity=(0, 0, 0), joints=[pivot], laws=laws)
     motion = simulate(Problem.from_world(world, duration=0.1))
     inertia = 1.2 * (1 + 0.01) / 12 + 1.2 * 0.25 + 0.7
@@ -174,7 +175,7 @@ def coupled(tmp_path: object, text: str = COUPLED) -> Problem:
     """The problem of a file."""
     file = tmp_path / "coupled.toml"  # type: ignore[operator]
     file.write_text(text)
-    return symphys.load_problem(file)
+    return symphys.load(file)
 
 
 def test_a_coupled_joint_follows_and_keeps_the_energy(tmp_path: object) -> None:

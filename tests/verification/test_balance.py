@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from tools.repeats import few, thorough
 
-from symphys.findings.energy import balance_finding, gains_finding, stop_findings
 from symphys.findings.examination import Energy, Examination, Gain
 from symphys.findings.levels import BAD, FAIR, GOOD
+from symphys.findings.physics import balance_finding, gains_finding, stop_findings
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import transcribe

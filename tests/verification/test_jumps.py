@@ -11,9 +11,9 @@ import pytest
 from tools.repeats import few
 
 import symphys
-from symphys.findings.energy import jump_findings
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD
+from symphys.findings.physics import jump_findings
 from symphys.transcription import Record, Transcription, transcribe
 from symphys.verification.balance import jumps
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from symphys.findings.contacts import RESIDUAL_LIMITS
+from symphys.findings.physics import RESIDUAL_LIMITS
 from symphys.transcription import Transcription
 from symphys.verification import survey
 from symphys.verification.gradient import compare_gradient

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from symphys.findings.levels import Judged
-from symphys.findings.verdict import DOUBTED, SOLVED, rule
+from symphys.findings.verdict import DOUBTED, SOLVED, judge_run
 from symphys.transcription import Transcription, transcribe
 from symphys.verification import survey
 from symphys.verification.bodies import bodies
@@ -73,8 +73,8 @@ def test_what_is_left_is_what_settled_sweeps_find_and_is_not_solved(make, text, 
     assert found["residual"] < 0.05 * found["impulse"]
     assert found["left_at"]["speed"] == pytest.approx(missed(few), rel=0.3)
     assert found["left"] > 0.01
-    ruling = rule("met", MET, found)
-    assert ruling.verdict == DOUBTED and "more `sweeps` find its velocity" in " ".join(ruling.doubts)
+    found_verdict = judge_run("met", MET, found)
+    assert found_verdict.word == DOUBTED and "more `sweeps` find its velocity" in " ".join(found_verdict.doubts)
 
 
 @pytest.mark.slow
@@ -83,4 +83,4 @@ def test_what_has_settled_is_solved(make):
     crate = make(CRATE, simulation__newton_start=True)
     found = survey(crate, crate.record(crate.shooting.start(0)))
     assert found.get("left", 0.0) < 1e-3
-    assert rule("met", MET, found).verdict == SOLVED
+    assert judge_run("met", MET, found).word == SOLVED

@@ -15,6 +15,7 @@ from symphys.dynamics.contact.effective_mass import (
     inverse_masses,
     symmetric_mobilities,
 )
+from symphys.dynamics.contact.friction import friction_at
 from symphys.dynamics.unknowns import Momentum
 from symphys.model.world import Law
 from symphys.types import Array
@@ -44,7 +45,14 @@ def contact_of(terms: tuple[BodyTerm, ...], law: Law, **changes: Any) -> Contact
         ("softness", "target", "delay", "leaving", "lasts", "load", "slack", "struck", "width", "smoothing"), zero
     )
     fields |= effective_masses(*inverse_masses(terms, normal, push, twist))
-    fields |= {"law": law, "terms": terms, "normal": normal, "impulse_normal": normal, "same": False}
+    fields |= {
+        "law": law,
+        "friction": friction_at(law, normal, (), zero),
+        "terms": terms,
+        "normal": normal,
+        "impulse_normal": normal,
+        "same": False,
+    }
     fields |= {"delassus_column": delassus_column(terms, normal, False), "separates": ca.SX(1)}
     return ContactConstraint(**(fields | {"slip_target": ca.SX.zeros(3)} | changes))
 

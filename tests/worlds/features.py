@@ -238,6 +238,25 @@ FEATURES: dict[str, Tables] = {
         coupling=[{"name": "thread", "joints": ["screw", "hinge"], "polynomial": [0, 0.05, 0.01]}],
         more=[{"name": "lifted", "value": "sumsqr(nut.position[2] - 1.5)"}],
     ),
+    "screw": swung(
+        varied("screw.pitch"),
+        {"name": "drive", "sets": "screw.command", "knots": 2, "guess": [0.3, -0.2]},
+        body=[ARM, {**ARM, "name": "nut", "position": [0.1, 2, 0.8]}],
+        joint=[
+            {**HINGE, "motor": SERVO},
+            {
+                "name": "screw",
+                "between": ["arm", "nut"],
+                "helical": {"axis": [0.2, 0.1, 1], "pitch": 0.3},
+                "point": [0.05, 2, 0.9],
+                "start": 0.4,
+                "motor": {"torque": {"torque": 2}},
+                "spring": {"stiffness": 0.5, "damping": 0.01},
+                "limits": [-9, 9],
+            },
+        ],
+        more=[{"name": "lifted", "value": "sumsqr(nut.position - [0, 2, 1.5]) + 0.01 * sumsqr(nut.velocity)"}],
+    ),
     "anchor and start of a joint": swung(varied("hinge.anchor[2]", 0.3), varied("hinge.start", 0.4)),
     "orientation": thrown(
         body=[{**DUMBBELL, "position": [0, 0, 0.22]}],
@@ -268,6 +287,12 @@ FEATURES: dict[str, Tables] = {
         ],
         constraint=[{"name": "cone", "at": "always", "value": "ground.friction * ball.position[2]", "upper": 0.03}],
     ),
+    "friction along and across a direction": thrown(
+        varied("ball.friction", [0.7, 0.2]),
+        body=[
+            {**BALL, "friction": [0.6, 0.3], "friction_direction": [1, 0.5, 0.2], "orientation": [0.9, 0.2, -0.3, 0.1]}
+        ],
+    ),
     "free duration": thrown({"name": "T", "sets": "simulation.duration", "guess": 0.15}),
     "force laws": thrown(
         varied("drag.c"),
@@ -290,6 +315,20 @@ FEATURES: dict[str, Tables] = {
         more=[{"name": "off", "at": "always", "squares": "ball.position[0] - path.x"}],
     ),
     "sensors and controllers": swung(*map(varied, ("hold.gains", "brain.weights", "shake.frequency")), **FEEDBACK),
+    "reactions of joints": {
+        **LEG,
+        "sensor": [{"name": "strain", "reads": ["knee.reaction_force", "hip.reaction_torque"]}],
+        "controller": [
+            {
+                "name": "comply",
+                "drives": "knee.command",
+                "senses": ["strain"],
+                "linear": {"gains": [[1e-3, 2e-3, -3e-3, 0.01, 0.02, -0.01]]},
+            }
+        ],
+        "variable": [*LEG["variable"], {"name": "shove", "sets": "thigh.force", "guess": [2, -1, 3]}],
+        "cost": [*LEG["cost"], {"name": "load", "at": "always", "squares": "0.01 * rail.reaction_force"}],
+    },
     "start, end and integrals": thrown(
         PUSH,
         cost=[

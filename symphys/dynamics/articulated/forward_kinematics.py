@@ -12,7 +12,7 @@ import casadi as ca
 
 from symphys.dynamics.articulated import spatial
 from symphys.dynamics.collision.predicted_path import PredictedPath
-from symphys.dynamics.joints.joint_frames import errors, joint_frames_on, locked
+from symphys.dynamics.joints.joint_frames import joint_frames_on, locked
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.model.joints import Joint, KinematicTree
@@ -34,7 +34,7 @@ class JointStart:
     Attributes:
         arms: (3,) from the centres of mass of the parent, or the world's origin, and of the link's body.
         apart: (3,) from the second frame to the first, as far as it is free.
-        axes: (3, count) about or along which coordinates move the first side.
+        axes: (3, count) about or along which free motions move the first side.
         righting: (4,) the rotation of the first side that brings back what is locked, to second order in its error.
     """
 
@@ -81,20 +81,12 @@ def final_poses(
 def _joint_start(joint: Joint, sign: int, body_paths: tuple[PredictedPath, ...]) -> JointStart:
     now, frames = ca.SX(0), joint_frames_on(joint, body_paths if sign > 0 else body_paths[::-1])
     placed, arms = frames.placed(now), tuple(arm.at(now) for arm in frames.arms)
-    directions, slides = locked(joint, placed), joint.kind.slides
-    held = 3 if slides is None else len(slides)
-    wrong: Expr = errors(joint, placed)
+    directions, held = locked(joint, placed), joint.kind.held
+    wrong: Expr = joint.kind.errors(placed)
     back = -ca.mtimes(directions.turns.T, wrong[held:, 0]) if joint.kind.turns else ca.SX(3, 1)
     apart = ca.SX(3, 1) if directions.slides is None else placed.apart - ca.mtimes(directions.slides.T, wrong[:held, 0])
-    free = spatial.free_motions_of(joint, placed)
-    axes = ca.horzcat(ca.SX(3, 0), *(turn if _turns(joint, k) else slide for k, (slide, turn) in enumerate(free)))
     first = rotation.unit(ca.vertcat(1, back / 2)) if joint.kind.turns else HERE.turn
-    return JointStart((arms[1], arms[0]) if sign > 0 else (arms[0], arms[1]), apart, axes, first)
-
-
-def _turns(joint: Joint, k: int) -> bool:
-    """Whether free motion ``k`` of a joint is a rotation."""
-    return not joint.kind.coordinates or joint.kind.coordinates[k].turns
+    return JointStart((arms[1], arms[0]) if sign > 0 else (arms[0], arms[1]), apart, joint.kind.axes(placed), first)
 
 
 @traced
@@ -104,31 +96,11 @@ def _floated(position: Expr, moved: Expr) -> FinalPose:
 
 @traced
 def _carried(joint: Joint, sign: int, start: JointStart, parent: FinalPose, moved: Expr) -> FinalPose:
-    apart, turned = start.apart, _turned(joint, start, moved)
-    for k, coordinate in enumerate(joint.kind.coordinates):
-        if not coordinate.turns:
-            apart = apart + moved[k] * start.axes[:, k]
+    turned, shift = joint.kind.transform(start.axes, moved)
+    apart, turned = start.apart + shift, rotation.multiply(turned, start.righting)
     relative = turned if sign > 0 else ca.vertcat(turned[0], -turned[1:])
     turn = rotation.multiply(parent.turn, relative)
     above, own = start.arms
     # what slides goes along axes of the second side
     above, own = (above + apart, own) if sign > 0 else (above, own + apart)
     return FinalPose(parent.position + rotation.rotate(parent.turn, above) - rotation.rotate(turn, own), turn)
-
-
-def _turned(joint: Joint, start: JointStart, moved: Expr) -> Expr:
-    """(4,): of the first side against the second, since the start."""
-    if not joint.kind.coordinates:
-        free = rotation.exponential(ca.mtimes(start.axes, moved)) if start.axes.size2() else HERE.turn
-        return rotation.multiply(free, start.righting)
-    order = sorted(range(len(joint.kind.coordinates)), key=lambda k: joint.kind.coordinates[k].fixed_in_first)
-    found = HERE.turn
-    for k in order:
-        if joint.kind.coordinates[k].turns:
-            found = rotation.multiply(found, _about(start.axes[:, k], moved[k]))
-    return rotation.multiply(found, start.righting)
-
-
-def _about(axis: Expr, angle: Expr) -> Expr:
-    """(4,): the rotation about a unit axis."""
-    return ca.vertcat(ca.cos(angle / 2), ca.sin(angle / 2) * axis)

@@ -45,13 +45,8 @@ def joint_rates(tree: Tree, joints: Joints, motions: Sequence[PredictedMotion]) 
             continue
         parent = None if link.parent is None else motions[place[link.parent]]
         against = None if parent is None else _moving(parent)
-        found.append(_rate(turns(joint), tree.impulses[k], _moving(motions[k]), against))
+        found.append(_rate(joint.kind.turning, tree.impulses[k], _moving(motions[k]), against))
     return tuple(found)
-
-
-def turns(joint: Joint) -> bool:
-    """Whether a joint turns, else it slides."""
-    return not joint.kind.coordinates or joint.kind.coordinates[0].turns
 
 
 def _moving(motion: PredictedMotion) -> tuple[Expr, Expr, Expr]:

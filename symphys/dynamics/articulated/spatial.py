@@ -16,7 +16,7 @@ from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames_on
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.rotation import cross_matrix
-from symphys.model.joints import Joint, PlacedFrames
+from symphys.model.joints import Joint
 from symphys.types import Expr
 
 Joints = Sequence[Joint | None]
@@ -30,7 +30,7 @@ def axes_of(joint: Joint | None, sign: int, body_paths: tuple[PredictedPath, ...
         return floating(body_paths[0].centre().at(t) - origin)
     frames = joint_frames_on(joint, body_paths if sign > 0 else body_paths[::-1])
     point = joint_point(frames, t) - origin
-    motions = free_motions_of(joint, frames.placed(t))
+    motions = joint.kind.motions(frames.placed(t))
     return ca.horzcat(ca.SX(6, 0), *(sign * ca.vertcat(turn, slide + ca.cross(point, turn)) for slide, turn in motions))
 
 
@@ -43,18 +43,9 @@ def floating(place: Expr) -> Expr:
 def joint_point(frames: JointFrames, t: Expr) -> Expr:
     """(3,): midway between both frames; at the first one's for what slides."""
     first, second = (c + a for c, a in zip(frames.centres, frames.arms, strict=True))
-    if frames.joint.kind.slides is not None:
+    if frames.joint.kind.travels:
         return first.at(t)
     return (first.at(t) + second.at(t)) / 2
-
-
-def free_motions_of(joint: Joint, placed: PlacedFrames) -> list[tuple[Expr, Expr]]:
-    """(displacement, rotation) (3,) each of the first side against the second, that a joint leaves free."""
-    zero = ca.SX.zeros(3)
-    if joint.kind.coordinates:
-        axes = [(c.turns, c.axis(placed)) for c in joint.kind.coordinates]
-        return [(zero, axis) if turns else (axis, zero) for turns, axis in axes]
-    return [(zero, placed.b[:, k]) for k in range(6 - joint.locked)]
 
 
 def inertia_of(mass: Expr, inertia: Expr, counted: Expr, seen: Expr) -> Expr:

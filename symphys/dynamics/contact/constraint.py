@@ -21,10 +21,11 @@ import casadi as ca
 from symphys.dynamics.contact import body_term
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.coupling import Coupling
+from symphys.dynamics.contact.friction import Disc, Friction, FrictionStep
 from symphys.dynamics.contact.soft import SoftImpulse
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Linearisation
-from symphys.maths.smoothing import length, onto_disc, positive, positive_slope
+from symphys.maths.smoothing import positive, positive_slope
 from symphys.model.world import Law
 from symphys.types import Expr
 
@@ -113,6 +114,7 @@ class ContactConstraint:
 
     Attributes:
         law: of the pair.
+        friction: its law of friction at this contact.
         terms: one or two bodies.
         normal: (3,) at the constraint's instant; the impulse's normal is ``impulse_normal``.
         impulse_normal: (3,).
@@ -141,6 +143,7 @@ class ContactConstraint:
     """
 
     law: Law
+    friction: Friction
     terms: tuple[BodyTerm, ...]
     normal: Expr
     impulse_normal: Expr
@@ -224,7 +227,7 @@ def _in_turn(contact: ContactConstraint, before: KnownBefore, slip: Expr, old: C
     wanted = old.tangent + before.slip_asked - contact.tangent_mass * _across(slip, n)
     wanted = wanted - before.against * (normal - old.normal)
     width = contact.tangent_mass * contact.smoothing
-    return normal, onto_disc(wanted, contact.law.friction * normal, width, contact.smoothing)
+    return normal, contact.friction.nearest(wanted, normal, width, contact.smoothing)
 
 
 def _normal(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> Expr:
@@ -234,10 +237,10 @@ def _normal(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> Expr
 
 
 def _tangent(contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal: Expr) -> Expr:
-    """The friction impulse, onto the disc of radius mu ln."""
+    """The friction impulse that is nearest to what would stop the slip."""
     kept = old.tangent + contact.tangent_mass * _across(contact.slip_target, contact.normal)
     wanted = kept - contact.tangent_mass * _across(slip, contact.normal)  # what is known last comes in last
-    return onto_disc(wanted, contact.law.friction * normal, contact.tangent_mass * contact.smoothing, contact.smoothing)
+    return contact.friction.nearest(wanted, normal, contact.tangent_mass * contact.smoothing, contact.smoothing)
 
 
 def linearised(contact: ContactConstraint, slip: Expr, old: ContactImpulse, by: Linearisation) -> tuple[Expr, Expr]:
@@ -255,7 +258,7 @@ def linearised(contact: ContactConstraint, slip: Expr, old: ContactImpulse, by: 
     gives = 1 - rise + rise * mass * (contact.softness + by.softness)
     press = (normal - old.normal - rise * mass * by.softness * by.centre * old.normal) / gives
     by_slip = rise * mass / gives * contact.normal.T
-    # a change of load that its own projection does not make widens the disc of friction
+    # a change of load that its own projection does not make widens the cone of friction
     friction, widens, sliding = _friction(contact, slip, old, normal, by)
     friction += widens * (press - (normal - old.normal))
     sliding += ca.mtimes(widens, by_slip)
@@ -270,28 +273,21 @@ def _slope(x: Expr, width: Expr, mass: Expr, by: Linearisation) -> Expr:
 def _friction(
     contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal: Expr, by: Linearisation
 ) -> tuple[Expr, Expr, Expr]:
-    """(a (3,), its slope (3,) by the load, B (3, 3)) of friction alone, with the disc of a load ``normal``.
-
-    What points along the friction that is wanted is stretched or cut by ``onto_disc``, what lies across it is turned.
-    """
-    n, mass, smooth = contact.normal, contact.tangent_mass, contact.smoothing > 0
-    wanted = old.tangent + mass * _across(contact.slip_target - slip, n)
-    radius, size, width = contact.law.friction * normal, length(wanted), mass * contact.smoothing
-    reach = ca.if_else(smooth, radius + positive(size - radius, width) + 1e-30, ca.fmax(size, radius))
-    falls = _slope(size - radius, width, mass, by)
-    share, along = radius / reach, wanted / size
-    stretch = share * (1 - size * falls / reach)
-    grows = contact.law.friction * size / reach * (1 - radius * (1 - falls) / reach)
-    gives = mass * by.softness
-    counted = gives * by.centre
-    change = share * wanted - old.tangent
-    ahead = along * ca.dot(along, change - counted * stretch * old.tangent) / (1 - stretch + gives)
-    beside = change - counted * share * old.tangent
-    beside = (beside - along * ca.dot(along, beside)) / (1 - share + gives)
-    line = ca.mtimes(along, along.T)
-    plane = ca.SX.eye(3) - ca.mtimes(n, n.T) - line
-    sliding = mass * (stretch / (1 - stretch + gives) * line + share / (1 - share + gives) * plane)
-    return ahead + beside, grows / (1 - stretch + gives) * along, sliding
+    """(a (3,), its slope (3,) by the load, B (3, 3)) of friction alone, with the cone of a load ``normal``."""
+    n, mass = contact.normal, contact.tangent_mass
+    return contact.friction.linearised(
+        FrictionStep(
+            normal=n,
+            old=old.tangent,
+            wanted=old.tangent + mass * _across(contact.slip_target - slip, n),
+            load=normal,
+            mass=mass,
+            smoothing=contact.smoothing,
+            softness=mass * by.softness,
+            centre=by.centre,
+            slope=lambda x, width: _slope(x, width, mass, by),
+        )
+    )
 
 
 def _torques(
@@ -302,9 +298,9 @@ def _torques(
     spin_width, roll_width = contact.smoothing * contact.spin_mass, contact.smoothing * contact.roll_mass
     rate = sum(term.sign * term.spin(m) for term, m in zip(contact.terms, momenta, strict=True))
     twist = n * (old.spin - contact.spin_mass * ca.dot(n, rate))
-    spin = ca.dot(n, onto_disc(twist, contact.law.torsion * normal, spin_width, contact.smoothing))
+    spin = ca.dot(n, Disc(contact.law.torsion).nearest(twist, normal, spin_width, contact.smoothing))
     wanted = old.roll - contact.roll_mass * _across(rate, n)
-    roll = onto_disc(wanted, contact.law.rolling * normal, roll_width, contact.smoothing)
+    roll = Disc(contact.law.rolling).nearest(wanted, normal, roll_width, contact.smoothing)
     return spin, roll
 
 
@@ -317,7 +313,7 @@ def _solve(contact: ContactConstraint, coupling: Coupling, slip: Expr, old: Cont
         slip: (3,) velocity of the touching points against each other [m/s].
         old: what it has given so far, with which ``slip`` came about.
     """
-    n, mu, w = contact.normal, contact.law.friction, coupling.mobility
+    n, friction, w = contact.normal, contact.friction, coupling.mobility
     given = n * old.normal + old.tangent
     error = slip - n * (contact.target - contact.softness * old.normal) - contact.slip_target
     stopping = given - ca.mtimes(coupling.inverse, error)
@@ -325,31 +321,34 @@ def _solve(contact: ContactConstraint, coupling: Coupling, slip: Expr, old: Cont
     hold = stopping - n * press
     free = error - ca.mtimes(w, given)
     closes = ca.dot(n, free) < 0
-    sticks = ca.logic_and(ca.logic_and(closes, press > 0), ca.dot(hold, hold) <= (mu * press) ** 2)
+    sticks = ca.logic_and(ca.logic_and(closes, press > 0), friction.admits(hold, press))
 
     wanted = old.tangent - contact.tangent_mass * _across(error, n)
-    direction = _turned(wanted / length(wanted), free, w, n, mu)
-    load, _ = _load(direction, free, w, n, mu)
-    return ca.if_else(sticks, press, load), ca.if_else(sticks, hold, mu * load * direction)
+    heading = _turned(friction.heading(wanted, old.normal), free, w, n, friction)
+    load, _ = _load(heading, free, w, n, friction)
+    slides = friction.largest * load * friction.shaped(heading)
+    return ca.if_else(sticks, press, load), ca.if_else(sticks, hold, slides)
 
 
-def _load(direction: Expr, free: Expr, w: Expr, n: Expr, mu: Expr) -> tuple[Expr, Expr]:
-    """The normal impulse of a contact that slides against ``direction``, and the velocity (3,) for a unit of it."""
-    response = ca.mtimes(w, n + mu * direction)
+def _load(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Friction) -> tuple[Expr, Expr]:
+    """The normal impulse of a contact that slides against ``heading``, and the velocity (3,) for a unit of it."""
+    response = ca.mtimes(w, n + friction.largest * friction.shaped(heading))
     least = LEAST * ca.dot(n, ca.mtimes(w, n))
     return ca.fmax(-ca.dot(n, free), 0) / ca.fmax(ca.dot(n, response), least), response
 
 
-def _turned(direction: Expr, free: Expr, w: Expr, n: Expr, mu: Expr) -> Expr:
-    """The direction after a step of Newton's method towards one that is opposite to the slip."""
-    load, response = _load(direction, free, w, n, mu)
-    aside, slip = ca.cross(n, direction), free + load * response
-    turning = ca.mtimes(w, aside)
+def _turned(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Friction) -> Expr:
+    """The heading after a step of Newton's method towards one that is opposite to the slip, as friction sees it."""
+    load, response = _load(heading, free, w, n, friction)
+    aside, slip = ca.cross(n, heading), free + load * response
+    seen = friction.shaped(aside)
+    turning = ca.mtimes(w, seen)
     lost = ca.dot(n, turning) / ca.fmax(ca.dot(n, response), LEAST * ca.dot(n, ca.mtimes(w, n)))
-    slope = mu * load * (ca.dot(aside, turning) - lost * ca.dot(aside, response)) - ca.dot(direction, slip)
-    step = ca.if_else(slope > FLAT, -ca.dot(aside, slip) / ca.fmax(slope, FLAT), 0)
+    slope = friction.largest * load * (ca.dot(seen, turning) - lost * ca.dot(seen, response))
+    slope = slope - ca.dot(friction.shaped(heading), slip)
+    step = ca.if_else(slope > FLAT, -ca.dot(seen, slip) / ca.fmax(slope, FLAT), 0)
     step = ca.fmin(ca.fmax(step, -FAR), FAR)
-    found = direction + step * aside
+    found = heading + step * aside
     return found / ca.sqrt(1 + step * step)
 
 
@@ -364,10 +363,9 @@ def _solve_smoothed(
     wanted = ca.dot(n, slip) - contact.target + contact.softness * old.normal
     normal = positive(old.normal - mass * wanted, ca.sqrt(mass * contact.normal_mass) * contact.width)
     slip = slip + contact.delassus_column * (normal - old.normal)
-    friction = old.tangent - contact.tangent_mass * _across(slip - contact.slip_target, n)
-    return normal, onto_disc(
-        friction, contact.law.friction * normal, contact.tangent_mass * contact.smoothing, contact.smoothing
-    )
+    wanted = old.tangent - contact.tangent_mass * _across(slip - contact.slip_target, n)
+    width = contact.tangent_mass * contact.smoothing
+    return normal, contact.friction.nearest(wanted, normal, width, contact.smoothing)
 
 
 def _across(a: Expr, n: Expr) -> Expr:

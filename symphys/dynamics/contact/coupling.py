@@ -8,11 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.dynamics.contact.friction import Friction
 from symphys.dynamics.motion import inertia_matrix
 from symphys.maths.smoothing import length
 from symphys.model.body import Body
-from symphys.model.scalar import is_zero
-from symphys.model.world import Law, Pair, World
+from symphys.model.world import Pair, World
 from symphys.types import Expr
 
 STRONG = 2.0
@@ -36,18 +36,17 @@ class Coupling:
     sliding_mass: Expr
 
 
-def coupling_of(mobility: Expr, n: Expr, law: Law, softness: Expr) -> Coupling:
+def coupling_of(mobility: Expr, n: Expr, friction: Friction, softness: Expr) -> Coupling:
     """The coupling of a contact with normal n (3,)."""
     w = mobility + softness * ca.mtimes(n, n.T)
     along = ca.mtimes(w, n)
     across = along - n * ca.dot(n, along)
-    return Coupling(w, ca.inv_minor(w), 1 / (ca.dot(n, along) + law.friction * length(across)))
+    return Coupling(w, ca.inv_minor(w), 1 / (ca.dot(n, along) + friction.largest * length(across)))
 
 
-def pulls_together(mobility: Expr, n: Expr, law: Law, slip: Expr) -> Expr:
+def pulls_together(mobility: Expr, n: Expr, friction: Friction, slip: Expr) -> Expr:
     """1 if an impulse on the edge of the cone, against the ``slip`` (3,), brings the surfaces together (Painleve)."""
-    across = _across(slip, n)
-    return ca.dot(n, ca.mtimes(mobility, n - law.friction * across / length(across))) <= 0
+    return ca.dot(n, ca.mtimes(mobility, n - friction.against(_across(slip, n)))) <= 0
 
 
 def _across(a: Expr, n: Expr) -> Expr:
@@ -78,9 +77,9 @@ def may_couple(world: World, pair: Pair) -> bool:
     """
     sides = [(side.body, side.shape) for side in (pair.first, pair.second) if side.body is not None]
     held = {index for joint in world.joints for index in joint.bodies}
-    if is_zero(pair.law.friction) or pair.law.soft or any(body in held for body, _ in sides):
+    if not pair.law.rubs or pair.law.soft or any(body in held for body, _ in sides):
         return False
-    return max(_ratio(world.bodies[body], shape, pair.law.friction) for body, shape in sides) > STRONG
+    return max(_ratio(world.bodies[body], shape, pair.law.largest_friction) for body, shape in sides) > STRONG
 
 
 def _ratio(body: Body, shape: int, friction: Any) -> float:

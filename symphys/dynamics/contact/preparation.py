@@ -24,6 +24,7 @@ from symphys.dynamics.contact.effective_mass import (
     separates,
     symmetric_mobilities,
 )
+from symphys.dynamics.contact.friction import friction_at
 from symphys.dynamics.contact.soft import SoftApproach, SoftImpulse, soft_impulse
 from symphys.dynamics.context import NEAR, StepSettings
 from symphys.dynamics.motion import apply
@@ -81,7 +82,7 @@ def prepare(
     instant = half + touch.leaving * (touch.time - half)
     acting = touch.hit * contact.time if law.soft else touch.leaving * touch.time
     frame, applied = contact.geometry.frame(instant), contact.geometry.frame(acting)
-    terms = body_terms(motions, instant, frame, applied)
+    terms, friction = body_terms(motions, instant, frame, applied), friction_at(law, frame.normal, motions, instant)
     push, twist = symmetric_mobilities(terms, same)
     k_normal, k_tangent, k_spin, k_roll = inverse_masses(terms, frame.normal, push, twist)
     slack = ca.if_else(suppressed, ANY, _slack(settings, contact, touch, duration))
@@ -101,6 +102,7 @@ def prepare(
     target = ca.if_else(lasts, -_parting(settings, contact, k_normal, ca.fmax(load, weight), duration), target)
     return ContactConstraint(
         law=law,
+        friction=friction,
         terms=terms,
         normal=frame.normal,
         impulse_normal=applied.normal,
@@ -119,8 +121,8 @@ def prepare(
         width=width_of(settings, contact),
         smoothing=smoothing,
         same=same,
-        coupling=coupling_of(push, frame.normal, law, softness) if coupled else None,
-        paradox=pulls_together(push, frame.normal, law, slip) if coupled else ca.SX(0),
+        coupling=coupling_of(push, frame.normal, friction, softness) if coupled else None,
+        paradox=pulls_together(push, frame.normal, friction, slip) if coupled else ca.SX(0),
         near=conditions.near,
         soft=soft,
     )

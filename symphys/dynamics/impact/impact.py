@@ -17,6 +17,7 @@ from symphys.dynamics.contact.effective_mass import (
     inverse_masses,
     symmetric_mobilities,
 )
+from symphys.dynamics.contact.friction import friction_at
 from symphys.dynamics.contact.preparation import SHORTEST, closes_fast, width_of
 from symphys.dynamics.context import State, StepContext, StepSettings
 from symphys.dynamics.impact.restitution import rebound
@@ -167,12 +168,13 @@ def _constraint(
     velocity, _, normal = at_touch(contact, motions, now)
     speed = law.restitution * positive(-ca.dot(normal, velocity), settings.smoothing)
     frame = contact.geometry.frame(now)
-    terms = body_terms(motions, now, frame, frame)
+    terms, friction = body_terms(motions, now, frame, frame), friction_at(law, frame.normal, motions, now)
     resting = ca.if_else(touching, 0, UNREACHED)
     push, twist = symmetric_mobilities(terms, same)
     masses = inverse_masses(terms, frame.normal, push, twist)
     return ContactConstraint(
         law,
+        friction,
         terms,
         frame.normal,
         frame.normal,
@@ -191,7 +193,7 @@ def _constraint(
         width=struck * width_of(settings, contact),
         smoothing=settings.smoothing,
         same=same,
-        coupling=coupling_of(push, frame.normal, law, ca.SX(0)) if coupled else None,
+        coupling=coupling_of(push, frame.normal, friction, ca.SX(0)) if coupled else None,
         near=near,
     )
 

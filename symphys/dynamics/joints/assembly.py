@@ -156,7 +156,8 @@ def joint_constraints(
         moving = tuple(trees.motions[i] for i in joint.bodies)
         frames, same = along[index].frames, trees.same(joint.bodies)
         if index not in places:
-            lock = trees.placed(joint.bodies, lock_constraint(frames, moving, substep, same))
+            near = _stacked(along[index].values) if joint.kind.screws else None
+            lock = trees.placed(joint.bodies, lock_constraint(frames, moving, substep, same, near))
             projected.append(JointConstraint(lock, f"{joint.name}.lock"))
             fitted += [] if joint.soft else [lock]
         for k in range(len(joint.kind.coordinates)) if joint.acting else ():
@@ -173,6 +174,11 @@ def joint_constraints(
         projected.append(JointConstraint(constraint, f"{coupling.name}.{COUPLED}", 0))
         fitted.append(constraint)
     return along, projected, fitted
+
+
+@traced
+def _stacked(values: tuple[Expr, ...]) -> Expr:
+    return ca.vertcat(*values)
 
 
 def _command(context: StepContext, joint: Joint, k: int, x: State) -> Command:
@@ -225,7 +231,7 @@ def locks_at(context: StepContext, trees: KinematicTrees) -> list[tuple[PlacedCo
         states = tuple(trees.states[trees.carriers[i]] for i in joint.bodies)
         frames = joint_frames(joint, moving)
         constraint = lock_at_impact(frames, moving, states, trees.same(joint.bodies))
-        found.append((trees.placed(joint.bodies, constraint), JointImpulse(ca.SX(joint.locked, 1))))
+        found.append((trees.placed(joint.bodies, constraint), JointImpulse(ca.SX(joint.kind.locked, 1))))
     return found
 
 

@@ -19,7 +19,7 @@ from symphys.dynamics.contact.oscillator import SpringLaw, response, spring_law
 from symphys.dynamics.contact.preparation import TIE
 from symphys.dynamics.context import StepSettings
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint, TreeCoordinate, by_law, towards
-from symphys.dynamics.joints.joint_frames import JointFrames, errors, free, locked
+from symphys.dynamics.joints.joint_frames import JointFrames, free, locked
 from symphys.dynamics.joints.joint_impulse import Directions, mobility, speeds
 from symphys.dynamics.joints.locked_directions import LastingForce, LockConstraint, inverse
 from symphys.dynamics.tracing.decorator import traced
@@ -89,12 +89,17 @@ class CoordinateTerms:
 
 
 @traced
-def lock_constraint(frames: JointFrames, motions: Motions, substep: SubstepTimes, same: bool) -> LockConstraint:
-    """The locked directions of a joint; of a soft one each is a spring and damper on its own effective mass."""
+def lock_constraint(
+    frames: JointFrames, motions: Motions, substep: SubstepTimes, same: bool, near: Expr | None
+) -> LockConstraint:
+    """The locked directions of a joint; of a soft one each is a spring and damper on its own effective mass.
+
+    ``near``: (k,) the coordinates of one that holds screws, at the start.
+    """
     joint, start, middle = frames.joint, ca.SX(0), substep.duration / 2
     now = frames.placed(start)
     terms, seen, given = frames.terms(motions, middle, start), locked(joint, frames.placed(middle)), locked(joint, now)
-    k, error = regular_mobility(terms, seen, same), errors(joint, now)
+    k, error = regular_mobility(terms, seen, same), joint.kind.errors(now, near)
     softness, target, lasting = ca.SX(k.size1(), 1), ca.SX(k.size1(), 1), None
     if joint.soft:
         law = _spring_law(joint, substep)
@@ -303,7 +308,7 @@ def upper_limit(
 
 
 def _room(left: Expr, strikes: Expr) -> Expr:
-    """How far a limit may go within the substep; by rounding more where it strikes, see ``constraints.TIE``."""
+    """How far a limit may go within the substep; by rounding more where it strikes, see ``TIE``."""
     return ca.if_else(left < -TIE, 0, left) + TIE * strikes
 
 

@@ -34,14 +34,14 @@ class JointFrames:
     def lever_arms(self, t: Expr) -> tuple[Expr, Expr]:
         """(3,) each: from the centres of mass to the frames; to the first one's for what slides."""
         first, second = self.arms[0].at(t), self.arms[1].at(t)
-        if self.joint.kind.slides is not None:
+        if self.joint.kind.travels:
             second += self.placed(t).apart
         return first, second
 
     def common_arms(self, t: Expr) -> tuple[Expr, Expr]:
         """(3,) each: to one point for both, midway between the frames, so that impulses make no spin."""
         first, second = self.lever_arms(t)
-        if self.joint.kind.slides is not None:
+        if self.joint.kind.travels:
             return first, second
         half = self.placed(t).apart / 2
         return first - half, second + half
@@ -90,21 +90,9 @@ def joint_frames_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> Joint
 
 def locked(joint: Joint, placed: PlacedFrames) -> Directions:
     """The directions that a joint locks."""
-    slides, turns = joint.kind.slides, joint.kind.turns
-    return Directions(
-        None if slides is None else ca.vertcat(*(placed.b[:, j].T for j in slides)),
-        ca.vertcat(ca.SX(0, 3), *(ca.cross(placed.a[:, i], placed.b[:, j]).T for i, j in turns)),
-    )
-
-
-def errors(joint: Joint, placed: PlacedFrames) -> Expr:
-    """(n,): how far the joint is from what it locks [m], [rad]."""
-    slides, turns = joint.kind.slides, joint.kind.turns
-    off = placed.apart if slides is None else ca.vertcat(*(ca.dot(placed.b[:, j], placed.apart) for j in slides))
-    return ca.vertcat(off, *(ca.dot(placed.a[:, i], placed.b[:, j]) for i, j in turns))
+    return Directions(*joint.kind.locks(placed))
 
 
 def free(coordinate: Coordinate, placed: PlacedFrames) -> Directions:
     """The direction of a coordinate."""
-    axis = coordinate.axis(placed).T
-    return Directions(ca.SX(0, 3), axis) if coordinate.turns else Directions(axis, ca.SX(0, 3))
+    return Directions(*coordinate.along(placed))

@@ -47,14 +47,17 @@ class Directions:
     Attributes:
         slides: (m, 3) unit vectors of impulses through the common point; None: the world's three.
         turns: (k, 3) unit vectors of torque impulses.
+        leads: (m, 3) torque impulses that go with those of ``slides``, as in a screw; None: none.
     """
 
     slides: Expr | None
     turns: Expr
+    leads: Expr | None = None
 
     def forwards(self, linear: Expr, angular: Expr) -> Expr:
         """(n,): the parts of a velocity along the directions."""
-        return ca.vertcat(linear if self.slides is None else ca.mtimes(self.slides, linear), self.of(angular))
+        along = linear if self.slides is None else ca.mtimes(self.slides, linear)
+        return ca.vertcat(along if self.leads is None else along + ca.mtimes(self.leads, angular), self.of(angular))
 
     def of(self, angular: Expr) -> Expr:
         """(k,): the parts of an angular velocity."""
@@ -64,7 +67,8 @@ class Directions:
         """(3,), (3,): the linear and the angular impulse that numbers (n,) stand for."""
         m = 3 if self.slides is None else self.slides.size1()
         linear = numbers[:m, 0] if self.slides is None else ca.mtimes(self.slides.T, numbers[:m, 0])
-        return linear, ca.mtimes(self.turns.T, numbers[m:, 0])
+        angular = ca.mtimes(self.turns.T, numbers[m:, 0])
+        return linear, angular if self.leads is None else angular + ca.mtimes(self.leads.T, numbers[:m, 0])
 
 
 def speeds(terms: tuple[BodyTerm, ...], directions: Directions, momenta: tuple[Any, ...]) -> Expr:

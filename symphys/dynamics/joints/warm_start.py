@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import casadi as ca
 
 from symphys.dynamics.articulated.configuration_update import JointCorrection, RotorCorrection
-from symphys.dynamics.articulated.forward_dynamics import consistent
+from symphys.dynamics.articulated.forward_dynamics import Wrench, consistent
 from symphys.dynamics.articulated.generalized_coordinates import GeneralizedCoordinates, rotor_rates
 from symphys.dynamics.articulated.rotors import Rates
 from symphys.dynamics.contact.constraint import ContactConstraint
@@ -27,7 +27,7 @@ from symphys.types import Expr
 
 Struck = Mapping[frozenset[int], Expr]
 """Of bodies that hang together: 1 if one of their contacts is an impact."""
-Total = list[tuple[Expr, Expr]]
+Total = list[Wrench]
 """Force and torque on each body."""
 Rotors = dict[int, Rates]
 """Of each tree, by its root, the rates of its rotors."""
@@ -163,36 +163,40 @@ def _stacked(parts: tuple[Expr, ...]) -> Expr:
 
 
 def add_joint_forces(context: StepContext, forces: State, poses: Poses, total: Total) -> None:
-    """Adds to ``total`` what joint forces do to bodies at these poses: those at which the next step begins.
+    """Add to ``total`` what joint forces do to bodies; see ``joint_wrenches``."""
+    for joint, wrenches in joint_wrenches(context, forces, poses):
+        for body, wrench in zip(joint.bodies, wrenches, strict=True):
+            total[body] = _added(total[body], wrench)
 
-    ``forces`` has the entries of joints in a state, their ``unwrapped`` angles too.
+
+def joint_wrenches(context: StepContext, forces: State, poses: Poses) -> Iterator[tuple[Joint, tuple[Wrench, ...]]]:
+    """Yield joints, with a force and a torque on each of their bodies at these poses; one joint may come repeatedly.
+
+    ``forces`` has the entries of joints in a state, their ``unwrapped`` angles too. The wrenches are those of motors,
+    limits, springs, friction and couplings, and of the locks of joints that close loops or are soft.
     What the joints of trees lock is left out: it does nothing along the free motions of the tree.
     """
     exact = tree_joints(context.world.joints)
     for index, joint in enumerate(context.world.joints):
-        held = tuple(poses[i] for i in joint.bodies)
         names = joint.acting if index in exact else ("lock", *joint.acting)
-        if not names:
-            continue
-        parts = tuple((part, forces[f"{joint.name}.{part}"]) for part in names)
-        found = on_bodies(joint, held, parts)
-        for body, wrench in zip(joint.bodies, found, strict=True):
-            total[body] = _added(total[body], wrench)
-
+        if names:
+            parts = tuple((part, forces[f"{joint.name}.{part}"]) for part in names)
+            yield joint, on_bodies(joint, tuple(poses[i] for i in joint.bodies), parts)
     for coupling in context.world.couplings:
-        _add_coupling(context, coupling, forces, poses, total)
+        yield from _coupling_wrenches(context, coupling, forces, poses)
 
 
-def _add_coupling(context: StepContext, coupling: JointCoupling, forces: State, poses: Poses, total: Total) -> None:
-    """Adds what a coupling does: its force along the coordinate that follows, and against it along the other."""
+def _coupling_wrenches(
+    context: StepContext, coupling: JointCoupling, forces: State, poses: Poses
+) -> Iterator[tuple[Joint, tuple[Wrench, ...]]]:
+    """Yield what a coupling does: its force along the coordinate that follows, and against it along the other."""
     force = forces[f"{coupling.name}.{COUPLED}"]
     joints = [context.world.joints[k] for k in (coupling.first, coupling.second) if k is not None]
     held = [tuple(poses[i] for i in joint.bodies) for joint in joints]
     near = [ca.SX(0, 1) if joint.unwrapped is None else forces[joint.unwrapped] for joint in joints]
     along = [force] if len(joints) == 1 else [force, _against(coupling, joints[1], held[1], near[1], force)]
     for joint, sides, numbers in zip(joints, held, along, strict=True):
-        for body, wrench in zip(joint.bodies, on_bodies(joint, sides, (("motor", numbers),)), strict=True):
-            total[body] = _added(total[body], wrench)
+        yield joint, on_bodies(joint, sides, (("motor", numbers),))
 
 
 @traced
@@ -212,7 +216,7 @@ def on_bodies(
     placed, arms = frames.placed(now), frames.common_arms(now)
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for part, numbers in parts:
-        if part == "lock" and joint.kind.slides is None:
+        if part == "lock" and not joint.kind.travels:
             numbers = in_world(placed.a, numbers)
         along = [locked(joint, placed)] if part == "lock" else [free(c, placed) for c in joint.kind.coordinates]
         columns = [numbers] if part == "lock" else ca.vertsplit(numbers)

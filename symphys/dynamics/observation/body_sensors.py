@@ -1,63 +1,116 @@
-"""What can be felt on a body: how it turns, how it is accelerated, what presses against it."""
+"""Sensors of bodies: where they are, how they move, how they are accelerated, what presses against them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable
 
 import casadi as ca
 
+from symphys.dynamics.observation.sensor_kind import MjcfSensor, SensedState, SensorKind
 from symphys.maths.rotation import matrix
-from symphys.model.state_layout import Layout
-from symphys.model.world import World
+from symphys.model.body import Body
 from symphys.types import Expr
 
-BODY_QUANTITIES = ("gyro", "contact_force")
+
+def _part(field: str) -> Callable[[SensedState, Body], Expr]:
+    """Return a function that reads a field of a body off the state."""
+
+    def read(at: SensedState, body: Body) -> Expr:
+        return at.part(f"{body.name}.{field}")
+
+    return read
 
 
-def body_quantities(world: World, x: Expr) -> dict[str, Expr]:
-    """What formulas call them, each (3,).
+def _gyro(at: SensedState, body: Body) -> Expr:
+    """The angular velocity in the body's frame (3,) [rad/s]."""
+    return ca.mtimes(_to_body(at, body), at.part(f"{body.name}.angular_velocity"))
 
-    ``torso.gyro``: angular velocity in the body's frame [rad/s]. ``foot.contact_force``: the sum of the contact forces
-    on the body that last, world frame [N]; impacts, which take no time, are not among them.
-    """
-    layout, zero = Layout(world), type(x).zeros(3)
-    named: dict[str, Expr] = {f"{body.name}.contact_force": zero for body in world.bodies}
-    for body in world.bodies:
-        turned = matrix(x[layout[f"{body.name}.orientation"]]).T
-        named[f"{body.name}.gyro"] = ca.mtimes(turned, x[layout[f"{body.name}.angular_velocity"]])
-    for pair in world.pairs:
-        force = x[layout[f"{pair.name}.force"]]
+
+def _to_body(at: SensedState, body: Body) -> Expr:
+    """(3, 3): from the world's frame to the body's."""
+    return matrix(at.part(f"{body.name}.orientation")).T
+
+
+def _accelerometer(at: SensedState, body: Body) -> Expr:
+    """The mean acceleration over the last step less gravity, in the body's frame (3,) [m/s^2]."""
+    rate = (at.part(f"{body.name}.velocity") - at.before[f"{body.name}.velocity"]) / at.dt
+    return ca.mtimes(_to_body(at, body), rate - ca.vertcat(*at.world.gravity))
+
+
+def _contact_force(at: SensedState, body: Body) -> Expr:
+    """The sum of the contact forces that last, world frame (3,) [N]; impacts, which take no time, are left out."""
+    total = type(at.x).zeros(3)
+    for pair in at.world.pairs:
         for side, sign in ((pair.first, 1), (pair.second, -1)):
-            if side.body is not None:
-                named[f"{world.bodies[side.body].name}.contact_force"] += sign * force
-    return named
+            if side.body is not None and at.world.bodies[side.body].name == body.name:
+                total += sign * at.part(f"{pair.name}.force")
+    return total
 
 
-def accelerometers(world: World, x: Expr, before: Mapping[str, Expr], dt: Expr) -> dict[str, Expr]:
-    """``torso.accelerometer`` (3,): what a sensor at the centre of mass reads, in the body's frame [m/s^2].
-
-    The mean acceleration over the last step less gravity: at rest it reads 9.81 upwards, in free fall nothing.
-
-    Args:
-        world: what is simulated.
-        x: the state.
-        before: by body, its velocity one step before (3,).
-        dt: [s].
-    """
-    layout, gravity = Layout(world), ca.vertcat(*world.gravity)
-    named = {}
-    for body, velocity in before.items():
-        turned = matrix(x[layout[f"{body}.orientation"]]).T
-        rate = (x[layout[f"{body}.velocity"]] - velocity) / dt
-        named[f"{body}.accelerometer"] = ca.mtimes(turned, rate - gravity)
-    return named
-
-
-def body_quantity_names(world: World) -> list[str]:
-    """The names of ``body_quantities``."""
-    return [f"{body.name}.{field}" for body in world.bodies for field in BODY_QUANTITIES]
-
-
-def accelerometer_bodies(world: World, names: Sequence[str] | frozenset[str]) -> tuple[str, ...]:
-    """The bodies whose accelerometer is among these names."""
-    return tuple(body.name for body in world.bodies if f"{body.name}.accelerometer" in names)
+BODY_SENSORS = (
+    SensorKind(
+        "position",
+        "body",
+        "of the centre of mass, world frame",
+        _part("position"),
+        unit="m",
+        axes="world",
+        mjcf=MjcfSensor("framepos", "body"),
+    ),
+    SensorKind(
+        "orientation",
+        "body",
+        "unit quaternion w, x, y, z: from the body's frame into the world's",
+        _part("orientation"),
+        size=4,
+        mjcf=MjcfSensor("framequat", "xbody"),
+    ),
+    SensorKind(
+        "velocity",
+        "body",
+        "of the centre of mass, world frame",
+        _part("velocity"),
+        unit="m/s",
+        axes="world",
+        mjcf=MjcfSensor("framelinvel", "body"),
+    ),
+    SensorKind(
+        "angular_velocity",
+        "body",
+        "world frame",
+        _part("angular_velocity"),
+        unit="rad/s",
+        axes="world",
+        mjcf=MjcfSensor("frameangvel", "xbody"),
+    ),
+    SensorKind(
+        "gyro",
+        "body",
+        "the angular velocity in the body's frame",
+        _gyro,
+        unit="rad/s",
+        axes="own",
+        mjcf=MjcfSensor("gyro", "axes"),
+    ),
+    SensorKind(
+        "accelerometer",
+        "body",
+        "in the body's frame: 9.81 upwards at rest, nothing in free fall",
+        _accelerometer,
+        unit="m/s^2",
+        axes="own",
+        before=lambda world, body: (f"{body.name}.velocity",),
+        parameters=frozenset({"gravity"}),
+        ahead=False,
+        mjcf=MjcfSensor("accelerometer", "frame"),
+    ),
+    SensorKind(
+        "contact_force",
+        "body",
+        "the sum of all contact forces on the body, world frame; impacts are left out",
+        _contact_force,
+        unit="N",
+        axes="world",
+    ),
+)
+"""Every kind of sensor of a body."""

@@ -1,16 +1,26 @@
-"""What can be read off a joint in a state: its coordinates, their rates, what its motor gives, how far it is apart."""
+"""Sensors of joints: their coordinates and rates, and what their motors give; also how far joints are apart."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.joints.joint_frames import JointFrames, errors, free, joint_frames_at
-from symphys.model.joints import Coordinate, Joint, PlacedFrames
-from symphys.model.state_layout import Layout
+from symphys.dynamics.arguments import parts_of
+from symphys.dynamics.articulated.forward_dynamics import Wrench
+from symphys.dynamics.context import State, StepContext, make_context
+from symphys.dynamics.joints.joint_frames import JointFrames, free, joint_frames_at
+from symphys.dynamics.joints.warm_start import joint_wrenches
+from symphys.dynamics.motion import PredictedMotion
+from symphys.dynamics.observation.sensor_kind import MjcfSensor, SensedState, SensorKind
+from symphys.dynamics.prediction import predicted_motions
+from symphys.dynamics.tracing.decorator import traced, tracing
+from symphys.dynamics.tracing.trace import InlineTracer
+from symphys.maths.rotation import matrix, rotate
+from symphys.model.joints import Coordinate, Joint, JointFrame, PlacedFrames, kinematic_trees
+from symphys.model.state_layout import INPUT_FIELDS, Layout, input_sizes
 from symphys.model.world import World
 from symphys.types import Expr
 
@@ -51,43 +61,16 @@ def reading_function(world: World, parameters: Sequence[Any] = ()) -> ca.Functio
     return ca.Function("joints", [x, ca.vertcat(ca.SX(0, 1), *parameters)], results)
 
 
-def joint_quantities(world: World, x: Expr) -> dict[str, Expr]:
-    """What formulas call them: ``knee.angle`` or ``rail.position``, ``.rate``, and ``.torque`` if there is a motor."""
-    return named_readings(world, readings(world, x))
-
-
-def named_readings(world: World, found: Mapping[str, Reading]) -> dict[str, Expr]:
-    """See ``joint_quantities``, of joints that have been read; ``found``: all of them."""
-    named: dict[str, Expr] = {}
-    for joint, reading in zip(world.joints, found.values(), strict=True):
-        parts = (reading.value, reading.rate, reading.torque)
-        named.update(zip(_names(joint), parts, strict=False))
-    return named
-
-
-def joint_quantity_names(world: World) -> list[str]:
-    """The names of ``joint_quantities``."""
-    return [name for joint in world.joints for name in _names(joint)]
-
-
-def _names(joint: Joint) -> list[str]:
-    """In the order value, rate, torque; none without coordinates."""
-    if not joint.kind.coordinates:
-        return []
-    value = "angle" if joint.kind.coordinates[0].turns else "position"
-    return [f"{joint.name}.{field}" for field in (value, "rate", *(("torque",) if joint.motor is not None else ()))]
-
-
 def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
     names, coordinates = [world.bodies[i].name for i in joint.bodies], joint.kind.coordinates
     poses = tuple((x[layout[f"{name}.position"]], x[layout[f"{name}.orientation"]]) for name in names)
     motions = [(x[layout[f"{name}.velocity"]], x[layout[f"{name}.angular_velocity"]]) for name in names]
     frames = joint_frames_at(joint, poses)
-    placed, held = frames.placed(ca.SX(0)), 3 if joint.kind.slides is None else len(joint.kind.slides)
-    off = errors(joint, placed)
+    placed, held = frames.placed(ca.SX(0)), joint.kind.held
     rates = [_rate(frames, placed, coordinate, motions) for coordinate in coordinates]
     torque = x[layout[f"{joint.name}.motor"]] if joint.driven else ca.SX.zeros(len(coordinates))
     near = ca.SX(0, 1) if joint.unwrapped is None else x[layout[joint.unwrapped]]
+    off = joint.kind.errors(placed, near)
     return Reading(
         value=ca.vertcat(ca.SX(0, 1), *(joint.value(k, placed, near) for k in range(len(coordinates)))),
         rate=ca.vertcat(ca.SX(0, 1), *rates),
@@ -104,3 +87,182 @@ def _rate(frames: JointFrames, placed: PlacedFrames, coordinate: Coordinate, mot
         linear += sign * (velocity + ca.cross(spin, arm))
         angular += sign * spin
     return free(coordinate, placed).forwards(linear, angular)
+
+
+def joint_readings(at: SensedState) -> dict[str, Reading]:
+    """Return the readings of every joint, by name; see ``SensedState.shared``."""
+    return readings(at.world, at.x)
+
+
+def _reads(field: str) -> Callable[[SensedState, Joint], Expr]:
+    """Return a function that reads a field of a joint's ``Reading``."""
+
+    def read(at: SensedState, joint: Joint) -> Expr:
+        return getattr(at.shared(joint_readings)[joint.name], field)
+
+    return read
+
+
+def _turns(joint: Joint) -> bool:
+    return bool(joint.kind.coordinates) and joint.kind.coordinates[0].turns
+
+
+def _slides(joint: Joint) -> bool:
+    return bool(joint.kind.coordinates) and not joint.kind.coordinates[0].turns
+
+
+def _reactions(at: SensedState) -> dict[str, Wrench]:
+    """Return by joint what its second side exerts on its first through it: force, and torque about the first's point.
+
+    World frame, under the forces that last. Joints of trees carry what the accelerations of all bodies beyond them ask
+    for beside the other forces on these (Newton-Euler), other joints what the sweeps found; see docs/joints.md.
+    """
+    world, zero, tracer = at.world, ca.SX.zeros(3), InlineTracer(reduces=False)
+    x = parts_of(at.layout, at.x)
+    acted = tuple(name for name in input_sizes(world) if name in at.before)
+    context = make_context(world, None, acted, ca.vertcat(ca.SX(0, 1), *(at.before[n] for n in acted)), ca.SX(0))
+    for column in (*x.values(), context.u):
+        tracer.take(column)
+    with tracing(tracer):
+        poses = [(x[f"{body.name}.position"], x[f"{body.name}.orientation"]) for body in world.bodies]
+        points = {joint.name: _point(joint.frames[0], poses[joint.first]) for joint in world.joints}
+        found = {joint.name: (zero, zero) for joint in world.joints}
+
+        # what joints of trees lock: from the leaves to the root, what all bodies beyond a joint lack
+        motions = predicted_motions(context, x, ca.SX(at.dt))
+        for tree in kinematic_trees(world.joints):
+            lacking = {i: _lacking(motions[i], context.settings.gravity, *_known(context, x, i)) for i in tree.bodies}
+            for link in reversed(tree.links):
+                place = poses[link.body][0]
+                if link.parent is not None:
+                    above = lacking[link.parent], poses[link.parent][0]
+                    lacking[link.parent] = _with_wrench(*above, lacking[link.body], place)
+                if link.joint is not None:
+                    joint = world.joints[link.joint]
+                    total = found[joint.name], points[joint.name]
+                    found[joint.name] = _with_wrench(*total, _signed(lacking[link.body], link.sign), place)
+
+        # what acts along coordinates, and the locks of other joints
+        for joint, wrenches in joint_wrenches(context, x, poses):
+            total = found[joint.name], points[joint.name]
+            found[joint.name] = _with_wrench(*total, wrenches[0], poses[joint.first][0])
+    return {name: (tracer.value(force), tracer.value(torque)) for name, (force, torque) in found.items()}
+
+
+def _known(context: StepContext, x: State, index: int) -> tuple[Wrench, Wrench]:
+    """What acted from outside on a body in the step before, and its persistent forces."""
+    name, zero = context.world.bodies[index].name, ca.SX.zeros(3)
+    force, torque = (context.input(f"{name}.{field}") for field in INPUT_FIELDS)
+    given = zero if force is None else force, zero if torque is None else torque
+    return given, (x[f"{name}.reaction_force"], x[f"{name}.reaction_torque"])
+
+
+@traced
+def _point(frame: JointFrame, pose: tuple[Expr, Expr]) -> Expr:
+    return pose[0] + rotate(pose[1], ca.vertcat(*frame.point))
+
+
+@traced
+def _lacking(motion: PredictedMotion, gravity: Expr, given: Wrench, lasting: Wrench) -> Wrench:
+    """The rates of a body's momenta less all forces on it but those that its tree locks; a frame has no momenta."""
+    counted = 0 if motion.massless else 1
+    force = counted * motion.mass * (motion.acceleration - gravity) - given[0] - lasting[0]
+    return force, counted * motion.torque - given[1] - lasting[1]
+
+
+@traced
+def _signed(wrench: Wrench, sign: int) -> Wrench:
+    return sign * wrench[0], sign * wrench[1]
+
+
+@traced
+def _with_wrench(total: Wrench, about: Expr, more: Wrench, place: Expr) -> Wrench:
+    """A force, and a torque about a point, with others that are given about another place."""
+    return total[0] + more[0], total[1] + more[1] + ca.cross(place - about, more[0])
+
+
+def _reaction(part: int) -> Callable[[SensedState, Joint], Expr]:
+    """Return a function that reads the force (0) or the torque (1) of a joint in the axes of its first side."""
+
+    def read(at: SensedState, joint: Joint) -> Expr:
+        turned = matrix(at.part(f"{at.world.bodies[joint.first].name}.orientation"))
+        return ca.mtimes(turned.T, at.shared(_reactions)[joint.name][part])
+
+    return read
+
+
+def _all_inputs(world: World, joint: Joint) -> tuple[str, ...]:
+    return tuple(f"{body.name}.{field}" for body in world.bodies for field in INPUT_FIELDS)
+
+
+JOINT_SENSORS = (
+    SensorKind(
+        "angle",
+        "joint",
+        "the coordinate of a joint that turns, 0 as the bodies lie in the file",
+        _reads("value"),
+        unit="rad",
+        size=None,
+        has=_turns,
+        mjcf=MjcfSensor("jointpos", "joint"),
+    ),
+    SensorKind(
+        "position",
+        "joint",
+        "the coordinate of a slider, 0 as the bodies lie in the file",
+        _reads("value"),
+        unit="m",
+        size=None,
+        has=_slides,
+        mjcf=MjcfSensor("jointpos", "joint"),
+    ),
+    SensorKind(
+        "rate",
+        "joint",
+        "the derivative of the coordinate in time",
+        _reads("rate"),
+        unit="rad/s",
+        sliding_unit="m/s",
+        size=None,
+        has=lambda joint: bool(joint.kind.coordinates),
+        mjcf=MjcfSensor("jointvel", "joint"),
+    ),
+    SensorKind(
+        "torque",
+        "joint",
+        "what the motor gave in the last step; of a servo its mean over a step until half a step ago",
+        _reads("torque"),
+        unit="N m",
+        sliding_unit="N",
+        size=None,
+        has=lambda joint: joint.driven,
+        mjcf=MjcfSensor("jointactuatorfrc", "joint"),
+    ),
+    SensorKind(
+        "reaction_force",
+        "joint",
+        "the force that the first body of `between` exerts on the second through the joint, in the second's axes",
+        _reaction(0),
+        unit="N",
+        axes="own",
+        before=_all_inputs,
+        parameters=frozenset({"gravity"}),
+        ahead=False,
+        kept=True,
+        mjcf=MjcfSensor("force", "frame"),
+    ),
+    SensorKind(
+        "reaction_torque",
+        "joint",
+        "the torque about the joint's point on the second body that goes with it, in the second's axes",
+        _reaction(1),
+        unit="N m",
+        axes="own",
+        before=_all_inputs,
+        parameters=frozenset({"gravity"}),
+        ahead=False,
+        kept=True,
+        mjcf=MjcfSensor("torque", "frame"),
+    ),
+)
+"""Every kind of sensor of a joint."""

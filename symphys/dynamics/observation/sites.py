@@ -1,38 +1,72 @@
-"""What can be read off a site in a state: where it is, how it is turned, how it moves."""
+"""Sensors of sites: where a site is, how it is turned, how it moves."""
 
 from __future__ import annotations
 
 import casadi as ca
 
+from symphys.dynamics.observation.sensor_kind import MjcfSensor, SensedState, SensorKind
 from symphys.maths import rotation
-from symphys.model.state_layout import Layout
-from symphys.model.world import World
+from symphys.model.site import Site
 from symphys.types import Expr
 
-FIELDS = ("position", "orientation", "velocity")
+
+def _of_body(at: SensedState, site: Site, field: str) -> Expr:
+    """A field of the body that carries the site."""
+    assert site.body is not None
+    return at.part(f"{at.world.bodies[site.body].name}.{field}")
 
 
-def site_quantities(world: World, x: Expr) -> dict[str, Expr]:
-    """What formulas call them: ``tip.position`` (3,) [m], ``.orientation`` (4,) and ``.velocity`` (3,) [m/s].
-
-    World frame; the quaternion w x y z goes from the site's axes to the world's.
-    """
-    layout, named = Layout(world), dict[str, Expr]()
-    for site in world.sites:
-        place, turned = type(x)(ca.vertcat(*site.position)), type(x)(ca.vertcat(*site.orientation))
-        if site.body is None:
-            values = (place, turned, type(x).zeros(3))
-        else:
-            body = world.bodies[site.body].name
-            p, q, v, w = (
-                x[layout[f"{body}.{key}"]] for key in ("position", "orientation", "velocity", "angular_velocity")
-            )
-            arm = rotation.rotate(q, place)
-            values = (p + arm, rotation.multiply(q, turned), v + ca.cross(w, arm))
-        named |= {f"{site.name}.{key}": value for key, value in zip(FIELDS, values, strict=True)}
-    return named
+def _place(at: SensedState, site: Site) -> Expr:
+    """The site's position in the frame of what carries it (3,) [m]."""
+    return type(at.x)(ca.vertcat(*site.position))
 
 
-def site_quantity_names(world: World) -> list[str]:
-    """The names of ``site_quantities``."""
-    return [f"{site.name}.{key}" for site in world.sites for key in FIELDS]
+def _arm(at: SensedState, site: Site) -> Expr:
+    """From the centre of mass to the site, world frame (3,) [m]."""
+    return rotation.rotate(_of_body(at, site, "orientation"), _place(at, site))
+
+
+def _position(at: SensedState, site: Site) -> Expr:
+    return _place(at, site) if site.body is None else _of_body(at, site, "position") + _arm(at, site)
+
+
+def _orientation(at: SensedState, site: Site) -> Expr:
+    turned = type(at.x)(ca.vertcat(*site.orientation))
+    return turned if site.body is None else rotation.multiply(_of_body(at, site, "orientation"), turned)
+
+
+def _velocity(at: SensedState, site: Site) -> Expr:
+    if site.body is None:
+        return type(at.x).zeros(3)
+    return _of_body(at, site, "velocity") + ca.cross(_of_body(at, site, "angular_velocity"), _arm(at, site))
+
+
+SITE_SENSORS = (
+    SensorKind(
+        "position",
+        "site",
+        "of the site, world frame",
+        _position,
+        unit="m",
+        axes="world",
+        mjcf=MjcfSensor("framepos", "site"),
+    ),
+    SensorKind(
+        "orientation",
+        "site",
+        "unit quaternion w, x, y, z: from the site's axes into the world's",
+        _orientation,
+        size=4,
+        mjcf=MjcfSensor("framequat", "site"),
+    ),
+    SensorKind(
+        "velocity",
+        "site",
+        "of the site, world frame",
+        _velocity,
+        unit="m/s",
+        axes="world",
+        mjcf=MjcfSensor("framelinvel", "site"),
+    ),
+)
+"""Every kind of sensor of a site."""

@@ -48,32 +48,32 @@ class ArrowSystem:
 
     @property
     def s(self) -> int:
-        """The number of shared numbers."""
+        """Return the number of shared numbers."""
         return len(self.prior_block)
 
     @property
     def cost(self) -> float:
-        """Of all recordings and priors."""
+        """Return the cost of all recordings and priors."""
         return float(self.costs.sum()) + self.prior_cost
 
     @property
     def finite(self) -> bool:
-        """Whether every number is."""
+        """Whether every number of the system is finite."""
         return all(bool(np.isfinite(each).all()) for each in (self.costs, self.blocks, self.gradients))
 
     @property
     def reference(self) -> Array:
-        """(s,) diagonal of A: what rounding in the Schur complement S is small against."""
+        """Return (s,) the diagonal of A: what rounding in the Schur complement S is small against."""
         return np.asarray(np.einsum("kii->i", self.blocks[:, : self.s, : self.s]) + self.prior_block)
 
     @property
     def shared_gradient(self) -> Array:
-        """(s,) half the derivative of the cost by the shared numbers."""
+        """Return (s,) half the derivative of the cost by the shared numbers."""
         return np.asarray(self.gradients[:, : self.s].sum(axis=0) + self.prior_gradient)
 
     @property
     def own_gradient(self) -> Array:
-        """(K, o) half the derivative by the own numbers."""
+        """Return (K, o) half the derivative of the cost by the own numbers."""
         return self.gradients[:, self.s :]
 
     def step(self, damping: float, free_shared: Bools, free_own: Bools) -> tuple[Array, Array]:
@@ -95,7 +95,7 @@ class ArrowSystem:
         return shared, own * free_own
 
     def own_step(self, shared: Array, damping: Array, free_own: Bools) -> Array:
-        """(K, o): the step of the own numbers beside a step (s,) of the shared ones, with a damping (K,) of each."""
+        """Compute (K, o) the step of the own numbers beside a shared step (s,), with a damping (K,) of each."""
         s, mask = self.s, free_own.astype(float)
         square = self.blocks[:, s:, s:] * mask[:, :, None] * mask[:, None, :]
         side = (self.own_gradient + np.einsum("ksi,s->ki", self.blocks[:, :s, s:], shared)) * mask
@@ -104,13 +104,13 @@ class ArrowSystem:
         return -np.asarray(np.linalg.solve(square, side[:, :, None])[:, :, 0])
 
     def expected_falls(self, shared: Array, own: Array) -> Array:
-        """(K,): by how much the quadratic models lower the costs of recordings with a step (s,), (K, o)."""
+        """Return (K,) by how much the quadratic models lower the costs of recordings with a step (s,), (K, o)."""
         both = np.concatenate([np.broadcast_to(shared, (len(own), self.s)), own], axis=1)
         bent = np.einsum("ki,kij,kj->k", both, self.blocks, both)
         return np.asarray(-2 * np.sum(both * self.gradients, axis=1) - bent)
 
     def expected_fall(self, shared: Array, own: Array) -> float:
-        """By how much the quadratic model lowers the cost with a step (s,), (K, o)."""
+        """Return by how much the quadratic model lowers the cost with a step (s,), (K, o)."""
         priors = 2 * float(shared @ self.prior_gradient) + float(shared**2 @ self.prior_block)
         return float(self.expected_falls(shared, own).sum()) - priors
 
@@ -125,7 +125,7 @@ def assemble(
     weights: Array,
     curvature: Weighting | None = None,
 ) -> ArrowSystem:
-    """The system at shared (s,), own (K, o) of the recordings in ``which``, whose costs count ``weights`` times.
+    """Return the system at shared (s,), own (K, o) of the recordings in ``which``, whose costs count ``weights`` times.
 
     ``evaluated`` is their Jacobian there, ``curvature`` the weights C of its rows in the blocks, by default the loss's.
     """
@@ -153,7 +153,7 @@ def assemble(
 
 
 def prior_terms(parameters: FitParameters, values: Array) -> tuple[Array, Array, Array]:
-    """Of scaled numbers, elementwise: the square, the half derivative and the value of ((x - mean) / deviation)^2."""
+    """Return square, half derivative and value of ((x - mean) / deviation)^2, elementwise, in scaled numbers."""
     missed = (values - parameters.prior_mean) / parameters.prior_deviation
     slope = parameters.scale / parameters.prior_deviation
     return slope**2, slope * missed, missed**2
@@ -162,7 +162,7 @@ def prior_terms(parameters: FitParameters, values: Array) -> tuple[Array, Array,
 def costs(
     problem: RecordedResiduals, shared: Array, own: Array, which: Ints, loss: RobustLoss, weights: Array
 ) -> tuple[Array, float]:
-    """(K,) costs of recordings with the priors of their own numbers, inf where not finite; cost of shared priors."""
+    """Compute (K,) costs of recordings with own priors, inf where not finite; and the cost of the shared priors."""
     evaluated = problem.residuals(shared, own, which)
     found = np.array([loss.value(r) if np.isfinite(r).all() else np.inf for r in evaluated])
     own_priors = prior_terms(problem.own, own)[2][which].sum(axis=1)

@@ -113,7 +113,7 @@ def fit_part(
 def own_numbers(
     problem: RecordedResiduals, shared: Array, own: Array, which: Ints, options: FitOptions, early: bool
 ) -> Array:
-    """(K, o) own numbers, those of the recordings in ``which`` fitted to them; ``early``: before their first impact.
+    """Fit (K, o) own numbers to the recordings in ``which``; ``early``: to what is before their first impact.
 
     Shared numbers stay. A recording whose simulation is not finite there keeps its own numbers.
     """
@@ -126,7 +126,7 @@ def own_numbers(
 
 
 def described(problem: RecordedResiduals, outcome: FitOutcome, which: Ints, loss: RobustLoss) -> FittedRecordings:
-    """With the uncertainty where a fit ended."""
+    """Add the uncertainty where a fit ended."""
     shared, own = outcome.state.shared, outcome.state.own
     evaluated = problem.jacobian(shared, own, which)
     if not outcome.system.finite:

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from symphys.identification.interface import RecordedResiduals, ResidualRows, Rows
+from symphys.identification.interface import DerivedResiduals, RecordedResiduals, ResidualRows, Rows
 from symphys.types import Array, Bools, Ints
 
 Selection = Callable[[ResidualRows], Bools]
@@ -20,46 +20,44 @@ Selection = Callable[[ResidualRows], Bools]
 
 
 def first_share(share: float) -> Selection:
-    """What was measured in the first ``share`` of the time of a recording, above 0 and at most 1."""
+    """Select what was measured in the first ``share`` of the time of a recording, above 0 and at most 1."""
     return lambda rows: rows.time <= share * rows.time.max(initial=0.0)
 
 
 def before_impact(rows: ResidualRows) -> Bools:
-    """What was measured before the first impact."""
+    """Select what was measured before the first impact."""
     after = rows.time[~np.isnan(rows.impact)]
     return np.asarray(rows.time < after.min(initial=np.inf))
 
 
-class PartialRecordings:
+class PartialRecordings(DerivedResiduals):
     """A problem of which only some rows of each recording count."""
 
     def __init__(self, problem: RecordedResiduals, selection: Selection) -> None:
-        """``selection`` is asked once for each recording."""
-        self.problem, self.selection = problem, selection
-        self.recordings, self.held_back = problem.recordings, problem.held_back
-        self.shared, self.own = problem.shared, problem.own
-        self.quantities, self.units, self.noise_known = problem.quantities, problem.units, problem.noise_known
+        """Take the rows that ``selection`` chooses, which is called once for each recording."""
+        super().__init__(problem)
+        self.selection = selection
         self._kept: dict[int, Bools] = {}
 
     def kept(self, recording: int) -> Bools:
-        """(m,) which residuals of the problem are kept."""
+        """Return (m,) which residuals of the problem are kept."""
         if recording not in self._kept:
             self._kept[recording] = self.selection(self.problem.rows(recording))
         return self._kept[recording]
 
     def rows(self, recording: int) -> ResidualRows:
-        """See ``RecordedResiduals``."""
+        """Describe the residuals that are kept."""
         rows, kept = self.problem.rows(recording), self.kept(recording)
         columns = ("quantity", "component", "time", "noise", "impact")
         return replace(rows, **{name: getattr(rows, name)[kept] for name in columns})
 
     def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
-        """See ``RecordedResiduals``."""
+        """Return the residuals that are kept."""
         found = self.problem.residuals(shared, own, which)
         return [r[self.kept(int(k))] for k, r in zip(which, found, strict=True)]
 
     def jacobian(self, shared: Array, own: Array, which: Ints) -> Rows:
-        """See ``RecordedResiduals``."""
+        """Return the residuals that are kept, and their derivatives."""
         found = []
         for k, parts in zip(which, self.problem.jacobian(shared, own, which), strict=True):
             r, by_shared, by_own = (part[self.kept(int(k))] for part in parts)

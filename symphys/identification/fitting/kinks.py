@@ -40,17 +40,17 @@ class KinkedModel:
     """
 
     def __init__(self, system: ArrowSystem, unit: float) -> None:
-        """Of one side."""
+        """Begin with the side of the arrow."""
         self.system, self.unit = system, unit
         self.gradients, self.gaps = system.gradients[None], np.zeros((1, len(system.costs)))
 
     @property
     def sides(self) -> int:
-        """How many are known."""
+        """Return how many sides are known."""
         return len(self.gaps)
 
     def add(self, there: ArrowSystem, shared: Array, own: Array) -> None:
-        """The side of a point at the step (s,), (K, o) from here."""
+        """Add the side of a point at the step (s,), (K, o) from here."""
         step = np.concatenate([np.broadcast_to(shared, (len(own), len(shared))), own], axis=1)
         bent = np.einsum("kij,kj->ki", there.blocks, step)
         costs = there.costs - 2 * np.sum(there.gradients * step, axis=1) + np.sum(bent * step, axis=1)
@@ -58,13 +58,13 @@ class KinkedModel:
         self.gaps = np.concatenate([self.gaps, np.abs(self.system.costs - costs)[None]])
 
     def expected_fall(self, shared: Array, own: Array) -> float:
-        """By how much the model lowers the merit with a step (s,), (K, o)."""
+        """Return by how much the model lowers the merit with a step (s,), (K, o)."""
         step = np.concatenate([np.broadcast_to(shared, (len(own), len(shared))), own], axis=1)
         more = 2 * np.sum((self.gradients - self.gradients[0]) * step, axis=2) - self.gaps
         return self.system.expected_fall(shared, own) - float(np.sum(np.max(more, axis=0)))
 
     def step(self, arrow: DeterminedArrow) -> tuple[Array, Array, float]:
-        """(s,) and (K, o) in scales, and the fall that it promises."""
+        """Compute the step (s,), (K, o) in scales, and the fall that it promises."""
         s, base = self.system.s, self.system.gradients
         taken, sides = self._taken(arrow)
         prior = self.system.prior_gradient * arrow.units[0, :s]
@@ -83,7 +83,7 @@ class KinkedModel:
         return *arrow.step(combined), fall + gap
 
     def _taken(self, arrow: DeterminedArrow) -> tuple[Ints, Array]:
-        """(N, 2) recordings and sides that have a part, and (P, K, s) the right sides of all."""
+        """Return (N, 2) recordings and sides that have a part, and (P, K, s) the right sides of all."""
         s, sides = self.system.s, arrow.sides(self.gradients)
         off, own = sides - sides[0], (self.gradients - self.gradients[0])[..., s:] * arrow.units[:, s:]
         apart = np.einsum("pks,st,pkt->pk", off, arrow.shared_inverse, off)
@@ -95,7 +95,7 @@ class KinkedModel:
         return np.stack([k, p], axis=1), sides
 
     def _shares(self, arrow: DeterminedArrow, taken: Ints, sides: Array, own: Array, prior: Array) -> Array:
-        """(N,) shares of the sides ``taken``, at least 0, that add up to 1 for each recording."""
+        """Return (N,) shares of the sides ``taken``, at least 0, that add up to 1 for each recording."""
         k, p = taken.T
         mine, same = sides[p, k], k[:, None] == k
         alone = np.setdiff1d(np.arange(len(self.system.costs)), k)

@@ -19,10 +19,10 @@ import numpy as np
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.state import FitOptions, FitOutcome, begin
 from symphys.identification.interface import FitParameters, IdentificationError, RecordedResiduals
-from symphys.results.identification.parts import GlobalSearch
+from symphys.results.identification.record import GlobalSearch
 from symphys.types import Array, Ints
 
-FAR = 0.5
+MIN_START_DISTANCE = 0.5
 """Candidates are other starts if they are farther than this, in scales."""
 
 
@@ -65,7 +65,7 @@ def search(
     settings: SearchOptions,
     stop: Callable[[], bool] | None = None,
 ) -> tuple[GlobalSearch, FitOutcome]:
-    """What the search found, and the outcome with the lowest merit: ``fitted`` itself where nothing is lower."""
+    """Search for a lower minimum; return the search, and the outcome with the lowest merit, which may be ``fitted``."""
     candidates = strategy(problem, fitted, which, options, settings, stop)
     best = fitted
     for shared in far_apart(candidates, fitted.state.shared, problem.shared.scale)[: settings.starts]:
@@ -80,7 +80,7 @@ def search(
 
 
 def words(fitted: FitOutcome, best: FitOutcome, lower: bool) -> str:
-    """What the search means."""
+    """Say what the search means."""
     if not lower:
         return "CMA-ES, and fits from what it found, came to nothing lower than the fit"
     share = fitted.merit / best.merit if best.merit > 0 else math.inf
@@ -95,7 +95,7 @@ def strategy(
     settings: SearchOptions,
     stop: Callable[[], bool] | None,
 ) -> list[tuple[float, Array]]:
-    """(merit, shared (s,)) of each candidate whose simulations are finite."""
+    """Return (merit, shared (s,)) of each candidate whose simulations are finite."""
     import cma  # late: it takes a second to import
 
     parameters = problem.shared
@@ -132,7 +132,7 @@ def strategy(
 
 
 def elsewhere(parameters: FitParameters, at: Array, free: Ints, away: float, stream: np.random.Generator) -> Array:
-    """(n,) a start of the free numbers, in scales: anywhere between two bounds, else about ``at`` (n,), so far away."""
+    """Draw a start (n,) of the free numbers, in scales: between two bounds, else about ``at`` (n,), so far away."""
     lower, upper = (bound[free] / parameters.scale[free] for bound in (parameters.lower, parameters.upper))
     bounded = np.isfinite(lower) & np.isfinite(upper)
     low, high = np.where(bounded, lower, 0.0), np.where(bounded, upper, 1.0)
@@ -141,22 +141,22 @@ def elsewhere(parameters: FitParameters, at: Array, free: Ints, away: float, str
 
 
 def rated(problem: RecordedResiduals, shared: Array, own: Array, which: Ints, options: FitOptions, steps: int) -> float:
-    """The merit after so many steps of the own numbers; inf where a simulation is not finite."""
+    """Return the merit after so many steps of the own numbers; inf where a simulation is not finite."""
     iterations = steps if own.shape[1] else 0
     fit = RecordingFit(problem, replace(options, iterations=iterations), which, hold_shared=True)
     return fit.run(begin(shared, own)).merit
 
 
 def sides(bound: Array) -> list[float | None]:
-    """One side of the bounds as pycma takes it: None where there is none."""
+    """Return one side of the bounds as pycma takes it: None where there is none."""
     return [float(value) if math.isfinite(value) else None for value in bound]
 
 
 def far_apart(candidates: list[tuple[float, Array]], start: Array, scale: Array) -> list[Array]:
-    """The best candidate, then the best of those that are far from the start and from all before, and so on."""
+    """Return the best candidate, then the best of those that are far from the start and from all before, and so on."""
     ordered = [shared for _, shared in sorted(candidates, key=lambda each: each[0])]
     chosen = ordered[:1]
     for shared in ordered[1:]:
-        if all(np.linalg.norm((shared - other) / scale) > FAR for other in (start, *chosen)):
+        if all(np.linalg.norm((shared - other) / scale) > MIN_START_DISTANCE for other in (start, *chosen)):
             chosen.append(shared)
     return chosen

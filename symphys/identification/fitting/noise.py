@@ -13,30 +13,28 @@ import numpy as np
 
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.inference.uncertainty import Information
-from symphys.identification.interface import RecordedResiduals, ResidualRows, Rows
+from symphys.identification.interface import DerivedResiduals, RecordedResiduals, ResidualRows, Rows
 from symphys.types import Array, Ints
 
 LEAST = 1e-12
 """A factor on the guess of a noise is at least so large: recordings that are met exactly have none."""
-ENOUGH = 0.5
+MIN_FREEDOM = 0.5
 """Residuals less their leverage that an estimate needs."""
-TURNS, LEAST_CHANGE = 50, 1e-4
+MAX_ITERATIONS, MIN_CHANGE = 50, 1e-4
 """Turns of Huber's proposal 2 on the same residuals, at most, and the change at which they end."""
 
 
-class RescaledResiduals:
+class RescaledResiduals(DerivedResiduals):
     """A problem whose residuals of each quantity are divided by a factor more."""
 
     def __init__(self, problem: RecordedResiduals, factors: Array) -> None:
-        """``factors`` (q,) by quantity, on the noise that the problem divides by."""
-        self.problem, self.factors = problem, factors
-        self.recordings, self.held_back = problem.recordings, problem.held_back
-        self.shared, self.own = problem.shared, problem.own
-        self.quantities, self.units, self.noise_known = problem.quantities, problem.units, problem.noise_known
+        """Multiply the noise that the problem divides by with ``factors`` (q,) by quantity."""
+        super().__init__(problem)
+        self.factors = factors
         self._divisors: dict[int, Array] = {}
 
     def rows(self, recording: int) -> ResidualRows:
-        """See ``RecordedResiduals``; the noise is the estimated one."""
+        """Describe the residuals of a recording, with the estimated noise."""
         rows = self.problem.rows(recording)
         return replace(rows, noise=rows.noise * self.factors[rows.quantity])
 
@@ -46,12 +44,12 @@ class RescaledResiduals:
         return self._divisors[recording]
 
     def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
-        """See ``RecordedResiduals``."""
+        """Return the rescaled residuals."""
         found = self.problem.residuals(shared, own, which)
         return [r / self._divisor(int(k)) for k, r in zip(which, found, strict=True)]
 
     def jacobian(self, shared: Array, own: Array, which: Ints) -> Rows:
-        """See ``RecordedResiduals``."""
+        """Return the rescaled residuals and derivatives."""
         found = []
         for k, (r, by_shared, by_own) in zip(which, self.problem.jacobian(shared, own, which), strict=True):
             divisor = self._divisor(int(k))
@@ -62,7 +60,7 @@ class RescaledResiduals:
 def noise_factors(
     problem: RecordedResiduals, evaluated: Rows, which: Ints, loss: RobustLoss, information: Information
 ) -> Array:
-    """(q,) noise of each quantity by what its residuals are divided by; 1 where it is given."""
+    """Estimate (q,) the noise of each quantity by what its residuals are divided by; 1 where it is given."""
     count = len(problem.quantities)
     quantities, leverages = [], []
     for at, (k, (_, by_shared, by_own)) in enumerate(zip(which, evaluated, strict=True)):
@@ -73,14 +71,14 @@ def noise_factors(
         leverages.append(np.sum((ahead @ information.shared.whitener) ** 2, axis=1) + np.sum(alone**2, axis=1))
     r, quantity, leverage = (np.concatenate(each) for each in ([r for r, _, _ in evaluated], quantities, leverages))
     factors = np.ones(count)
-    for _ in range(TURNS):
+    for _ in range(MAX_ITERATIONS):
         scaled = r / factors[quantity]
         squares = np.bincount(quantity, loss.influence(scaled) ** 2, minlength=count)
         freedom = np.bincount(quantity, 1 - leverage * loss.inside(scaled), minlength=count)
-        enough = (freedom > ENOUGH) & ~problem.noise_known
+        enough = (freedom > MIN_FREEDOM) & ~problem.noise_known
         change = np.sqrt(squares / (loss.normal_square * np.where(enough, freedom, 1.0)))
         change = np.where(enough, np.maximum(change, LEAST), 1.0)
         factors = np.maximum(factors * change, LEAST)
-        if np.all(np.abs(change - 1) < LEAST_CHANGE):
+        if np.all(np.abs(change - 1) < MIN_CHANGE):
             break
     return factors

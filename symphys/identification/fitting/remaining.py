@@ -37,7 +37,7 @@ class DeterminedArrow:
     """
 
     def __init__(self, system: ArrowSystem, units: Array, damping: float = 0.0) -> None:
-        """``damping`` is added to the squares, as in a step of Levenberg-Marquardt."""
+        """Invert the blocks, with ``damping`` added to the squares, as in a step of Levenberg-Marquardt."""
         s = system.s
         self.system, self.units = system, units
         rows, shared = system.roots * units[:, None, :], units[0, :s]
@@ -59,13 +59,13 @@ class DeterminedArrow:
         return not (self.vague_shared.any() or self.vague_own.any())
 
     def sides(self, gradients: Array) -> Array:
-        """(..., s) the right side of the shared numbers, of gradients (..., K, n) in scales, recording by recording."""
+        """Return (..., s) the right side of the shared numbers, by recording, of gradients (..., K, n) in scales."""
         s = self.system.s
         scaled = gradients * self.units
         return np.asarray(scaled[..., :s] + np.einsum("kas,...ka->...ks", self.gain, scaled[..., s:]))
 
     def step(self, gradients: Array | None = None) -> tuple[Array, Array]:
-        """(s,) and (K, o), in scales: where the gradients (K, n), by default the arrow's, lead."""
+        """Compute the step (s,), (K, o), in scales, to which gradients (K, n), by default the arrow's, lead."""
         s = self.system.s
         gradients = self.system.gradients if gradients is None else gradients
         side = self.sides(gradients).sum(axis=0) + self.system.prior_gradient * self.units[0, :s]
@@ -92,7 +92,7 @@ def determined_root(rows: Array, damping: float) -> tuple[Array, Bools]:
 def number_units(
     parameters: Sequence[FitParameters], values: Sequence[Array], free: Sequence[Bools], which: Ints
 ) -> Array:
-    """(k, n): sizes of the free shared and own numbers in scales, their own size where that is larger, else 0."""
+    """Return (k, n) sizes of the free numbers in scales, their own size where that is larger; 0 of the others."""
     (shared_of, own_of), (shared, own) = parameters, values
     shared_units = np.maximum(np.abs(shared) / shared_of.scale, 1.0) * free[0]
     own_units = np.maximum(np.abs(own) / own_of.scale, 1.0)[which] * free[1]

@@ -45,20 +45,20 @@ class RobustLoss:
         return float(np.sum(np.where(size <= self.threshold, r * r, self.threshold * (2 * size - self.threshold))))
 
     def influence(self, r: Array) -> Array:
-        """(m,) psi, half the derivative of rho: r clipped to the threshold."""
+        """Return (m,) psi, half the derivative of rho: r clipped to the threshold."""
         return np.clip(r, -self.threshold, self.threshold)
 
     def weight(self, r: Array) -> Array:
-        """(m,) psi / r, which stands for half the second derivative of rho in a step."""
+        """Return (m,) psi / r, which stands for half the second derivative of rho in a step."""
         return self.threshold / np.maximum(np.abs(r), self.threshold) if self.robust else np.ones_like(r)
 
     def inside(self, r: Array) -> Array:
-        """(m,) half the second derivative of rho itself: 1 up to the threshold, 0 beyond."""
+        """Return (m,) half the second derivative of rho itself: 1 up to the threshold, 0 beyond."""
         return (np.abs(r) <= self.threshold).astype(float)
 
     @property
     def normal_square(self) -> float:
-        """The mean of psi^2 under standard normal residuals."""
+        """Return the mean of psi^2 under standard normal residuals."""
         if not self.robust:
             return 1.0
         k = self.threshold

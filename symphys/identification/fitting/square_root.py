@@ -27,7 +27,7 @@ TOUCHED = 1e-3
 
 
 def triangle(rows: Array) -> Array:
-    """(n, n) R with R'R = F'F of rows F (m, n)."""
+    """Compute (n, n) R with R'R = F'F of rows F (m, n)."""
     n = rows.shape[1]
     found = np.zeros((n, n))
     if n and len(rows):
@@ -57,12 +57,12 @@ class Root:
 
     @property
     def square(self) -> Array:
-        """(..., n, n) the inverse of F'F."""
+        """Return (..., n, n) the inverse of F'F."""
         return np.asarray(self.whitener @ np.swapaxes(self.whitener, -1, -2))
 
 
 def pseudo_root(rows: Array, noise: Array | float = 0.0) -> Root:
-    """See ``Root``.
+    """Compute the pseudo-inverse of rows.
 
     Args:
         rows: (..., m, n).
@@ -103,7 +103,7 @@ class Eliminated:
 
 
 def stacked(rows: Array) -> Array:
-    """(K m, s) of rows (K, m, s)."""
+    """Stack rows (K, m, s) to (K m, s)."""
     return rows.reshape(rows.shape[0] * rows.shape[1], rows.shape[2])
 
 

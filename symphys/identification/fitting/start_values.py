@@ -21,16 +21,16 @@ FACTORS = (0.01, 0.03, 0.1, 0.3, 0.5, 2.0, 4.0, 10.0)
 """Of a guess other than 0."""
 SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Of the range between two bounds; of a number at 0 with an open bound, of ten scales to both sides."""
-STEPS = 4
+TRIAL_STEPS = 4
 """Of all numbers, from each value."""
-WORTH = 4.0
+MIN_GAIN = 4.0
 """Another start is taken where it lowers the merit by so many times the merit per residual: two standard errors."""
 
 
 def begin_with_effect(
     problem: RecordedResiduals, options: FitOptions, which: Ints, stop: Callable[[], bool] | None = None
 ) -> FitState:
-    """The guess, with other values of shared numbers without an effect there; ``notes`` say which."""
+    """Return the guess, with other values of shared numbers without an effect there; ``notes`` say which."""
     shared, own, notes = problem.shared.guess.copy(), problem.own.guess, list[str]()
     for j in without_effect(problem, options, which) if options.start_values else ():
         name, guess = problem.shared.names[j], float(shared[j])
@@ -43,7 +43,7 @@ def begin_with_effect(
         best = min(trials, key=lambda value: trials[value])
         size = sum(len(problem.rows(int(k)).time) for k in which)
         text = f"{name} has no effect on what was measured at its guess, {guess:.4g}"
-        if trials[guess] - trials[best] > WORTH * trials[best] / max(size, 1):
+        if trials[guess] - trials[best] > MIN_GAIN * trials[best] / max(size, 1):
             shared[j] = best
             notes.append(f"{text}: the fit begins at {best:.4g}, the best of {len(trials)} values")
         else:
@@ -76,6 +76,8 @@ def values_to_try(parameters: FitParameters, j: int) -> list[float]:
 
 
 def tried(problem: RecordedResiduals, options: FitOptions, which: Ints, shared: Array) -> float:
-    """The merit after a few steps from shared numbers (s,); inf where a simulation is not finite."""
-    outcome = RecordingFit(problem, replace(options, iterations=STEPS), which).run(begin(shared, problem.own.guess))
+    """Return the merit after a few steps from shared numbers (s,); inf where a simulation is not finite."""
+    outcome = RecordingFit(problem, replace(options, iterations=TRIAL_STEPS), which).run(
+        begin(shared, problem.own.guess)
+    )
     return np.inf if outcome.status is FitStatus.NOT_FINITE and not outcome.system.finite else outcome.merit

@@ -82,13 +82,13 @@ def bootstrap(
 
 
 def no_bootstrap(s: int, note: str) -> Bootstrap:
-    """Without draws of the s numbers, and why."""
+    """Return a bootstrap of s numbers without draws, and why there are none."""
     none = np.full((s, 2), np.nan)
     return Bootstrap(np.zeros((0, s)), none, none, np.zeros((0, s)), note)
 
 
 def resampling_weights(recordings: int, draws: int, seed: int) -> Array:
-    """(draws, K) how often each recording is in each draw."""
+    """Draw (draws, K) how often each recording is in each draw."""
     stream = np.random.default_rng(seed)
     return stream.multinomial(recordings, np.full(recordings, 1 / recordings), size=draws).astype(float)
 
@@ -96,7 +96,7 @@ def resampling_weights(recordings: int, draws: int, seed: int) -> Array:
 def steps(
     problem: RecordedResiduals, shared: Array, system: ArrowSystem, information: Information, weights: Array
 ) -> Array:
-    """(b, s) where one Gauss-Newton step with the weights (b, K) leads, within the bounds."""
+    """Compute (b, s) where one Gauss-Newton step with the weights (b, K) leads, within the bounds."""
     s, whitener = len(shared), information.shared.whitener
     sides = system.gradients[:, :s] + np.einsum("kos,ko->ks", information.gain, system.own_gradient)
     rows = information.left @ whitener
@@ -114,7 +114,7 @@ def steps(
 
 
 def bca(draws: Array, estimate: Array, left_out: Array, tails: Array) -> Array:
-    """(s, 2) bias-corrected and accelerated quantiles of draws (b, s); left_out (K, s) without one recording each."""
+    """Compute (s, 2) bias-corrected and accelerated quantiles of draws (b, s); left_out (K, s): one recording less."""
     below = np.mean(draws < estimate, axis=0) + np.mean(draws == estimate, axis=0) / 2
     shift = scipy.stats.norm.ppf(np.clip(below, 1 / len(draws), 1 - 1 / len(draws)))
     away = left_out.mean(axis=0) - left_out
@@ -135,7 +135,7 @@ def refitted(
     draws: int,
     stop: Callable[[], bool] | None = None,
 ) -> Array:
-    """(r, s) the first ``count`` of ``draws`` of ``bootstrap`` fitted in full; fewer after an interruption."""
+    """Fit in full the first ``count`` of ``draws`` of ``bootstrap``: (r, s); fewer after an interruption."""
     found: list[Array] = []
     for weights in resampling_weights(len(which), draws, seed)[:count]:
         if stop is not None and stop():

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy.stats
 
-from symphys.identification.interface import RecordedResiduals, ResidualRows
-from symphys.results.identification.parts import PredictionErrors, QuantityResiduals
+from symphys.identification.interface import DerivedResiduals, RecordedResiduals, ResidualRows
+from symphys.results.identification.record import PredictionErrors, QuantityResiduals
 from symphys.types import Array, Bools, Ints
 
 COLUMNS = ("quantity", "component", "time", "noise", "impact")
@@ -52,17 +53,17 @@ class ResidualSamples:
     rows: ResidualRows
 
     def some(self, chosen: Bools) -> ResidualSamples:
-        """Those that are chosen (m,)."""
+        """Return the samples that are chosen (m,)."""
         parts = (getattr(self.rows, name)[chosen] for name in COLUMNS)
         return ResidualSamples(self.residual[chosen], self.recording[chosen], ResidualRows(*parts))
 
     def of(self, quantity: int) -> ResidualSamples:
-        """Those of one quantity."""
+        """Return the samples of one quantity."""
         return self.some(self.rows.quantity == quantity)
 
 
 def samples(problem: RecordedResiduals, shared: Array, own: Array, which: Ints) -> ResidualSamples:
-    """The residuals of the recordings in ``which``."""
+    """Return the residuals of the recordings in ``which``."""
     rows = [problem.rows(int(k)) for k in which]
     found = problem.residuals(shared, own, which)
     joined = [np.concatenate([np.zeros(0), *(getattr(each, name) for each in rows)]) for name in COLUMNS]
@@ -83,7 +84,7 @@ def study(problem: RecordedResiduals, found: ResidualSamples) -> tuple[QuantityR
 
 
 def quantity_residuals(name: str, unit: str, known: bool, part: ResidualSamples) -> QuantityResiduals:
-    """What is left of one quantity, with its verdict."""
+    """Study the residuals of one quantity."""
     r, rows = part.residual, part.rows
     correlation, probability, lags = ljung_box(series(part))
     since = ~np.isnan(rows.impact)
@@ -113,7 +114,7 @@ def quantity_residuals(name: str, unit: str, known: bool, part: ResidualSamples)
 
 
 def judged(found: QuantityResiduals, courses: Sequence[str]) -> QuantityResiduals:
-    """With its verdict, in words; ``courses``: the shares that count."""
+    """Add the verdict, in words; ``courses``: the shares that count."""
     if found.count < FEWEST:
         return replace(found, verdict="too few", text=f"{found.count} residuals are too few for a verdict")
     reasons = [f"{getattr(found, name):.0%} depends on {COURSES[name]}" for name in courses]
@@ -129,14 +130,14 @@ def judged(found: QuantityResiduals, courses: Sequence[str]) -> QuantityResidual
 
 
 def series(part: ResidualSamples) -> list[Array]:
-    """The residuals of each recording and component over time."""
+    """Return the residuals of each recording and component over time."""
     order = np.lexsort((part.rows.time, part.rows.component, part.recording))
     ends = np.diff(part.recording[order]) | np.diff(part.rows.component[order])
     return np.split(part.residual[order], np.flatnonzero(ends) + 1)
 
 
 def ljung_box(runs: Sequence[Array]) -> tuple[float, float, int]:
-    """(lag-1 correlation, probability under white noise, lags), of mean 0, pooled over series; nan where too short."""
+    """Return lag-1 correlation, probability under white noise, and lags, pooled over series of mean 0."""
     longest = max((len(run) for run in runs), default=0)
     lags = min(LAGS, longest // 4)
     power = sum(float(run @ run) for run in runs)
@@ -154,7 +155,7 @@ def ljung_box(runs: Sequence[Array]) -> tuple[float, float, int]:
 
 
 def binned(time: Array, component: Ints) -> Ints:
-    """(m,) which of ``BINS`` parts of the samples, in the order of time, by component."""
+    """Return (m,) the group of each sample: one of ``BINS`` parts in the order of time, by component."""
     if not time.size:
         return np.zeros(0, np.int64)
     edges = np.unique(np.quantile(time, np.linspace(0, 1, BINS + 1)[1:-1]))
@@ -185,7 +186,7 @@ def rms(values: Array) -> float:
 
 
 def prediction_errors(problem: RecordedResiduals, found: ResidualSamples) -> tuple[PredictionErrors, ...]:
-    """How far the recordings are from their simulations, quantity by quantity."""
+    """Compute the errors of simulations against the recordings, by quantity."""
     entries = []
     for index, (name, unit) in enumerate(zip(problem.quantities, problem.units, strict=True)):
         part = found.of(index)
@@ -204,8 +205,39 @@ def prediction_errors(problem: RecordedResiduals, found: ResidualSamples) -> tup
 
 
 def recording_errors(problem: RecordedResiduals, found: ResidualSamples) -> Array:
-    """(K,) root mean square of residuals by noise, recording by recording; nan without any."""
+    """Return (K,) the root mean square of residuals by noise of each recording; nan without any."""
     count = len(problem.recordings)
     numbers = np.bincount(found.recording, minlength=count)
     squares = np.bincount(found.recording, found.residual**2, minlength=count)
     return np.sqrt(np.where(numbers > 0, squares / np.where(numbers > 0, numbers, 1), np.nan))
+
+
+@runtime_checkable
+class SimulatedImpacts(Protocol):
+    """A problem of identification that simulates when impacts are."""
+
+    def simulated_impacts(self, shared: Array, own: Array, which: Ints) -> list[Array]:
+        """Return (i,) [s] the instants of impacts, rising, of each recording in ``which``."""
+
+
+class TimedRecordings(DerivedResiduals):
+    """A problem whose rows have the time since the last impact, from instants of all recordings."""
+
+    def __init__(self, problem: RecordedResiduals, impacts: Sequence[Array]) -> None:
+        """Take the instants of impacts (i,) [s] of each of the K recordings, rising."""
+        super().__init__(problem)
+        self.impacts = impacts
+
+    def rows(self, recording: int) -> ResidualRows:
+        """Describe the residuals of a recording, with the time since the last impact."""
+        rows, instants = self.problem.rows(recording), self.impacts[recording]
+        count = np.searchsorted(instants, rows.time)
+        last = np.concatenate([[np.nan], instants])[count]
+        return replace(rows, impact=rows.time - last)
+
+
+def timed(problem: RecordedResiduals, source: RecordedResiduals, shared: Array, own: Array) -> RecordedResiduals:
+    """Return ``problem`` with the impacts that ``source`` simulates at shared (s,), own (K, o), if it simulates any."""
+    if not isinstance(source, SimulatedImpacts):
+        return problem
+    return TimedRecordings(problem, source.simulated_impacts(shared, own, np.arange(len(own))))

@@ -68,7 +68,7 @@ class Information:
 
     @property
     def own_open(self) -> Bools:
-        """(k, o) numbers that take part in a direction without information."""
+        """Return (k, o) the own numbers that take part in a direction without information."""
         return self.own.touched & self.free_own
 
     @property
@@ -81,7 +81,7 @@ class Information:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """How well K recordings determine s shared and o own numbers, in their own units.
+    """The uncertainty of s shared and o own numbers of K recordings, in their own units.
 
     Attributes:
         covariance: (s, s) of the shared numbers; inf on the diagonal without information, nan for what a bound holds.
@@ -104,7 +104,7 @@ class Uncertainty:
     information: Information
 
     def interval(self, value: Array) -> Array:
-        """(s, 2) about the shared estimates (s,)."""
+        """Return (s, 2) the intervals about the shared estimates (s,)."""
         half = self.quantile * self.error
         return np.stack([value - half, value + half], axis=1)
 
@@ -176,7 +176,7 @@ def uncertainty(
     loss: RobustLoss,
     noise_known: bool,
 ) -> Uncertainty:
-    """Of the estimates shared (s,) and own (K, o), from the recordings in ``which`` and their Jacobian there.
+    """Compute the uncertainty of shared (s,) and own (K, o) estimates from the Jacobian of recordings there.
 
     The quantile is Student's where the noise is estimated, else the normal one.
     """

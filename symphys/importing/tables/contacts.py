@@ -17,6 +17,8 @@ import numpy as np
 from symphys.importing.tables.pose import at_start
 from symphys.importing.tables.reading import ModelReading, numbers
 from symphys.importing.tables.shapes import Shapes
+from symphys.model.world import COMBINE, mujoco_tangent
+from symphys.types import Array
 
 Law = tuple[float, float, float]
 """Friction, torsion [m], rolling [m]."""
@@ -69,6 +71,9 @@ def read_contacts(
     meet = without_overlap(reading, owners, without_rule(reading, kinds, meet))
     meet = few_enough(reading, owners, surfaces, kinds, meet)
     pairs = write_contacts(reading, classes_of(reading, owners), surfaces, still, meet)
+    directed = directed_pairs(reading, owners, meet)
+    named = [set(table["between"]) for table in directed]
+    pairs = [table for table in pairs if set(table["between"]) not in named] + directed
     soft(reading, owners)
     return {"pair": pairs, "touching": set(meet)}
 
@@ -152,12 +157,39 @@ def geom_law(reading: ModelReading, one: int, other: int) -> Law:
 
 
 def pair_law(reading: ModelReading, pair: int) -> Law:
-    """Return the law of an explicit pair; its two directions of friction are one here."""
+    """Return the law of an explicit pair, with the larger of its coefficients along the two tangents."""
     friction = reading.model.pair_friction[pair]
-    if friction[0] != friction[1]:
-        text = "friction is the same in all directions here; the larger one holds"
-        reading.note("approximated", f"contact pair {pair}", text, f"{abs(friction[0] - friction[1]):g}")
     return law_of(max(friction[:2]), friction[2], max(friction[3:5]), int(reading.model.pair_dim[pair]))
+
+
+def directed_pairs(reading: ModelReading, owners: dict[int, str], meet: Meetings) -> list[dict[str, Any]]:
+    """Return [[pair]] tables with two coefficients of friction; note pairs whose directions turn with a body."""
+    model, tables = reading.model, []
+    geoms = Counter(owners.values())
+    for pair, friction in enumerate(model.pair_friction):
+        ends = int(model.pair_geom1[pair]), int(model.pair_geom2[pair])
+        names = tuple(sorted(owners.get(geom, "") for geom in ends))
+        if friction[0] == friction[1] or int(model.pair_dim[pair]) < 3 or names not in meet:
+            continue
+        direction = tangent_of(reading, *ends)
+        if direction is None or any(geoms[name] > 1 for name in names):
+            text = "friction along and across a direction that is not the same in all of their contacts; the larger "
+            text += "coefficient holds in all directions: a [[pair]] may state another, with a friction_direction"
+            reading.note("approximated", f"contact pair {pair}", text, f"{abs(friction[0] - friction[1]):g}")
+            continue
+        along_across = {"friction": numbers(friction[:2]), "friction_direction": numbers(direction)}
+        lengths = {key: numbers(value) for key, value in zip(KEYS[1:], meet[names][1:], strict=True)}
+        tables.append({"between": list(names), **along_across, **lengths})
+    return tables
+
+
+def tangent_of(reading: ModelReading, one: int, other: int) -> Array | None:
+    """Return the first tangent (3,) of the contacts of two geoms; None if it turns with one of them."""
+    kinds, types = reading.model.geom_type, reading.library.mjtGeom
+    plane, body = (one, other) if kinds[one] == types.mjGEOM_PLANE else (other, one)
+    if kinds[plane] != types.mjGEOM_PLANE or kinds[body] == types.mjGEOM_CAPSULE:
+        return None
+    return mujoco_tangent(np.array(reading.data.geom_xmat[plane]).reshape(3, 3)[:, 2])
 
 
 def law_of(friction: float, torsion: float, rolling: float, directions: int) -> Law:
@@ -287,11 +319,8 @@ def statement(names: tuple[str, str], own: Mapping[str, Law], meet: Meetings) ->
     law = meet.get(names)
     if law is None:
         return APART
-    stated = [own[name] for name in names if name in own]
-    follows = list(stated[0])
-    if len(stated) == 2:  # friction is multiplied, lengths are added
-        (a, *c), (b, *d) = stated
-        follows = [a * b, *(x + y for x, y in zip(c, d, strict=True))]
+    stated = list(zip(KEYS, zip(*(own[name] for name in names if name in own), strict=True), strict=True))
+    follows = [each[0] if len(each) == 1 else COMBINE[key](list(each)) for key, each in stated]
     off = [key for key, x, y in zip(KEYS, law, follows, strict=True) if abs(x - y) > 1e-12]
     return tuple((key, numbers(value)) for key, value in zip(KEYS, law, strict=True) if key in off)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Sequence
+from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
@@ -23,6 +24,8 @@ from symphys.importing.tables.reading import (
 from symphys.model.gimbal import Screw, locks
 from symphys.types import Array
 
+PARALLEL = 1e-9
+"""Largest deviation of the cosine between the axes of a screw's two joints from 1."""
 ROTOR, LEAST_ROTOR = 0.1, 1e-6
 """Armature against gimbal lock: a share of a body's largest moment of inertia, at least LEAST_ROTOR [kg m^2]."""
 FIXED, AFFINE = 0, 1
@@ -48,16 +51,62 @@ MAX_LOOP_GAP = 1e-6
 def read_joints(reading: ModelReading) -> tuple[dict[int, list[dict[str, Any]]], list[dict[str, Any]]]:
     """Return (frames before each link, by its top body; [[joint]] tables)."""
     frames, joints = dict[int, list[dict[str, Any]]](), list[dict[str, Any]]()
+    found = threads(reading)
     for top, link in reading.links.items():
         if top == link.top:
-            frames[top], more = chain(reading, link)
+            frames[top], more = chain(reading, link, found)
             joints += more
     return frames, joints
 
 
-def chain(reading: ModelReading, link: WeldedLink) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Return the frames and joints from the parent of a link to it."""
-    model, indices = reading.model, list(reading.joints_of(link.top))
+@dataclass(frozen=True)
+class Thread:
+    """A slide that follows a hinge about the same axis: indices of joints and of the equality, ``pitch`` [m]."""
+
+    hinge: int
+    slide: int
+    equality: int
+    pitch: float
+
+
+def threads(reading: ModelReading) -> list[Thread]:
+    """Find the screws of a model: a hinge and a slide tied by an equality, with nothing else on the slide."""
+    model, found = reading.model, list[Thread]()
+    for equality in range(model.neq):
+        if int(model.eq_type[equality]) != int(reading.library.mjtEq.mjEQ_JOINT) or not reading.holds(equality):
+            continue
+        ids = int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality])
+        types, (constant, ratio, *others) = [int(model.jnt_type[k]) for k in ids], model.eq_data[equality][:5]
+        if min(ids) < 0 or sorted(types) != [SLIDE, HINGE] or constant or any(others) or not ratio:
+            continue
+        slide, hinge = ids if types[0] == SLIDE else ids[::-1]
+        cosine = float(np.dot(reading.data.xaxis[slide], reading.data.xaxis[hinge]))
+        next_to = abs(slide - hinge) == 1 and model.jnt_bodyid[slide] == model.jnt_bodyid[hinge]
+        if next_to and abs(cosine) > 1 - PARALLEL and not burdened(reading, slide, equality):
+            lead = float(ratio if types[0] == SLIDE else 1 / ratio) * np.sign(cosine)
+            found.append(Thread(hinge, slide, equality, 2 * np.pi * lead))
+    return found
+
+
+def burdened(reading: ModelReading, joint: int, equality: int) -> bool:
+    """Whether anything but one equality constraint acts on a joint or reads it."""
+    model, types = reading.model, reading.library
+    dof = int(model.jnt_dofadr[joint])
+    own = (model.jnt_stiffness[joint], model.dof_damping[dof], model.dof_armature[dof], model.dof_frictionloss[dof])
+    others = [k for k in range(model.neq) if k != equality and int(model.eq_type[k]) == int(types.mjtEq.mjEQ_JOINT)]
+    users = [model.eq_obj1id[others], model.eq_obj2id[others]]
+    users.append(model.actuator_trnid[:, 0][model.actuator_trntype == int(types.mjtTrn.mjTRN_JOINT)])
+    users.append(model.sensor_objid[model.sensor_objtype == int(types.mjtObj.mjOBJ_JOINT)])
+    users.append(model.wrap_objid[model.wrap_type == int(types.mjtWrap.mjWRAP_JOINT)])
+    return any(own) or bool(model.jnt_limited[joint]) or any(joint in ids for ids in users)
+
+
+def chain(
+    reading: ModelReading, link: WeldedLink, found: Sequence[Thread]
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Make the frames and joints from the parent of a link to it; ``found``: the screws of the model."""
+    pitches, slides = {each.hinge: each.pitch for each in found}, {each.slide for each in found}
+    model, indices = reading.model, [k for k in reading.joints_of(link.top) if k not in slides]
     free = [j for j in indices if model.jnt_type[j] == FREE]
     for joint in free:
         reading.joint_names[joint] = link.name
@@ -82,9 +131,11 @@ def chain(reading: ModelReading, link: WeldedLink) -> tuple[list[dict[str, Any]]
         after = link.name if last else reading.names.give("frame", f"{link.name}_{name}")
         if not last:
             frames.append(frame_table(after, np.array(reading.data.xanchor[joint])))
-        joints.append(joint_table(reading, joint, name, (before, after)))
+        joints.append(joint_table(reading, joint, name, (before, after), pitches.get(joint)))
         before = after
-    if len(indices) > 1 and locks([screw for joint in indices for screw in screws_of(reading, joint)]):
+    if len(indices) > 1 and locks(
+        [screw for joint in indices for screw in screws_of(reading, joint, pitches.get(joint, 0.0))]
+    ):
         carried = max(ROTOR * float(np.max(model.body_inertia[link.top])), LEAST_ROTOR)
         joints[0]["armature"] = numbers(carried)
         text = "axes of several joints of one body can come together, where frames without mass have no inertia"
@@ -92,15 +143,15 @@ def chain(reading: ModelReading, link: WeldedLink) -> tuple[list[dict[str, Any]]
     return frames, joints
 
 
-def screws_of(reading: ModelReading, joint: int) -> list[Screw]:
-    """Return the coordinates of a joint at the reference pose as screws."""
+def screws_of(reading: ModelReading, joint: int, pitch: float) -> list[Screw]:
+    """Return the coordinates of a joint at the reference pose; ``pitch`` [m] of a screw."""
     model, point = reading.model, np.array(reading.data.xanchor[joint], float)
     carried = bool(model.dof_armature[int(model.jnt_dofadr[joint])])
     if model.jnt_type[joint] == BALL:
         return [Screw(axis, point, carried=carried) for axis in np.eye(3)]
     axis, slides = np.array(reading.data.xaxis[joint], float), model.jnt_type[joint] == SLIDE
     low, high = range_of(reading, joint)
-    return [Screw(axis, None if slides else point, low, high, carried)]
+    return [Screw(axis, None if slides else point, low, high, carried, pitch / (2 * np.pi))]
 
 
 def lost_forces(reading: ModelReading, what: str, acting: dict[str, Any], why: str) -> None:
@@ -110,13 +161,17 @@ def lost_forces(reading: ModelReading, what: str, acting: dict[str, Any], why: s
             reading.note("left out", f"{key} of {what}", why, f"{np.max(values):g}")
 
 
-def joint_table(reading: ModelReading, joint: int, name: str, between: tuple[str, str]) -> dict[str, Any]:
-    """Return the table of one joint."""
+def joint_table(
+    reading: ModelReading, joint: int, name: str, between: tuple[str, str], pitch: float | None
+) -> dict[str, Any]:
+    """Make the table of a joint; ``pitch`` [m] of a screw, None for others."""
     model, kind = reading.model, int(reading.model.jnt_type[joint])
     table: dict[str, Any] = {"name": name, "between": list(between)}
     axis = numbers(np.array(reading.data.xaxis[joint]))
     if kind == BALL:
         table["ball"] = {}
+    elif pitch is not None:
+        table["helical"] = {"axis": axis, "pitch": numbers(pitch)}
     else:
         table["hinge" if kind == HINGE else "slider"] = {"axis": axis}
     table["point"] = numbers(np.array(reading.data.xanchor[joint]))
@@ -300,34 +355,40 @@ def force_range(reading: ModelReading, actuator: int, joint: int, gear: float) -
     return [ends[0], max(ends)]
 
 
-def read_loops(
-    reading: ModelReading, touching: Container[tuple[str, ...]]
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Return ([[joint]] tables that close loops, [[coupling]] tables) of the equality constraints.
+def read_couplings(reading: ModelReading) -> list[dict[str, Any]]:
+    """Make the [[coupling]] tables, of the equality constraints of coordinates."""
+    model, found = reading.model, list[dict[str, Any]]()
+    screws = [each.equality for each in threads(reading)]
+    for equality in (k for k in range(model.neq) if k not in screws):
+        if int(model.eq_type[equality]) == int(reading.library.mjtEq.mjEQ_JOINT) and reading.holds(equality):
+            table = coupling(reading, equality)
+            found += [table] if table else []
+    reading.rigid += len(found) + len(screws)
+    return found
+
+
+def read_loops(reading: ModelReading, touching: Container[tuple[str, ...]]) -> list[dict[str, Any]]:
+    """Make the [[joint]] tables that close loops, of all equality constraints but those of coordinates.
 
     Bodies that a loop holds together may touch as the model lets them: ``touching``, names in alphabetical order.
     """
     model, types = reading.model, reading.library.mjtEq
-    joints, couplings, rigid = list[dict[str, Any]](), list[dict[str, Any]](), 0
+    joints = list[dict[str, Any]]()
     for equality in range(model.neq):
         kind, what = int(model.eq_type[equality]), reading.called("equality", equality)
-        if not model.eq_active0[equality] or reading.off("EQUALITY"):
+        if not reading.holds(equality):
             reading.note("left out", what, "it is not active")
-        elif kind == int(types.mjEQ_JOINT):
-            table = coupling(reading, equality)
-            couplings += [table] if table else []
-            rigid += bool(table)
         elif kind in (int(types.mjEQ_CONNECT), int(types.mjEQ_WELD)):
             table = loop(reading, equality, kind == int(types.mjEQ_WELD))
             if table and tuple(sorted(table["between"])) in touching:
                 table["collide"] = True
             joints += [table] if table else []
-            rigid += bool(table)
-        else:
+            reading.rigid += bool(table)
+        elif kind != int(types.mjEQ_JOINT):
             reading.note("left out", what, "constraints of tendons and of flexible bodies have no counterpart")
-    if rigid:
-        reading.note("approximated", f"softness of {rigid} equality constraints", "they are rigid here")
-    return joints, couplings
+    if reading.rigid:
+        reading.note("approximated", f"softness of {reading.rigid} equality constraints", "they are rigid here")
+    return joints
 
 
 def coupling(reading: ModelReading, equality: int) -> dict[str, Any] | None:

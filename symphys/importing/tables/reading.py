@@ -106,6 +106,7 @@ class ModelReading:
         findings: what became of parts, in order.
         links: by the index of each body, the link that it belongs to; bodies that the world holds have none.
         joint_names: of joints, by index; of a free joint that of its body.
+        rigid: number of equality constraints that were taken over.
         static_names: of what stands still, by the index of its geom.
         key: the index of the keyframe that the robot begins at; None: the reference pose.
         motors: the efforts and velocities that a URDF gives its joints, by their names there.
@@ -124,6 +125,7 @@ class ModelReading:
     findings: list[Finding] = field(default_factory=list)
     links: dict[int, WeldedLink] = field(default_factory=dict)
     joint_names: dict[int, str] = field(default_factory=dict)
+    rigid: int = 0
     static_names: dict[int, str] = field(default_factory=dict)
     seen: set[str] = field(default_factory=set)
     driven: set[str] = field(default_factory=set)
@@ -148,6 +150,10 @@ class ModelReading:
         rigid = flag in ("CONTACT", "LIMIT", "EQUALITY", "FRICTIONLOSS")
         own = bool(flags & int(getattr(self.library.mjtDisableBit, f"mjDSBL_{flag}")))
         return own or (rigid and bool(flags & int(self.library.mjtDisableBit.mjDSBL_CONSTRAINT)))
+
+    def holds(self, equality: int) -> bool:
+        """Whether an equality constraint is active."""
+        return bool(self.model.eq_active0[equality]) and not self.off("EQUALITY")
 
     def joints_of(self, body: int) -> range:
         """Return the indices of the joints of a body."""

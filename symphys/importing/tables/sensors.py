@@ -8,7 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from symphys.importing.tables.reading import HINGE, SLIDE, ModelReading, WeldedLink, is_upright, numbers, quaternion
+from symphys.importing.tables.reading import (
+    FREE,
+    HINGE,
+    SLIDE,
+    ModelReading,
+    WeldedLink,
+    is_upright,
+    numbers,
+    quaternion,
+)
 from symphys.types import Array
 
 MIN_ARM = 1e-6
@@ -77,7 +86,7 @@ def formula(reading: ModelReading, sensor: int, kind: str) -> str | None:
         return of_subtree(reading, index, "position" if kind == "SUBTREECOM" else "velocity")
     if kind == "TOUCH":
         return of_touch(reading, index)
-    if kind in ("GYRO", "ACCELEROMETER", "VELOCIMETER"):
+    if kind in ("GYRO", "ACCELEROMETER", "VELOCIMETER", "FORCE", "TORQUE"):
         frame = frame_of(reading, int(reading.library.mjtObj.mjOBJ_SITE), index)
         return None if frame is None else of_inertial_unit(reading, frame, index, kind)
     if kind.startswith("FRAME") and int(model.sensor_refid[sensor]) < 0:
@@ -199,16 +208,36 @@ def frame_of(reading: ModelReading, kind: int, index: int) -> SensorFrame | None
     return SensorFrame(link, link.to_body(np.array(place[index])), turned)
 
 
-def of_inertial_unit(reading: ModelReading, frame: SensorFrame, site: int, kind: str) -> str:
-    """Return angular velocity, acceleration of the centre of mass, or velocity, in the axes of a site."""
+def of_inertial_unit(reading: ModelReading, frame: SensorFrame, site: int, kind: str) -> str | None:
+    """Return the reading of a gyro, accelerometer, velocimeter, force or torque sensor, in the axes of a site."""
     name = frame.link.name
     if kind == "GYRO":
         return frame.own_axes(f"{name}.gyro")
     if kind == "VELOCIMETER":
         q = f"{name}.orientation"
         return frame.own_axes(f"rotate([{q}[0], -{q}[1], -{q}[2], -{q}[3]], {frame.reads('FRAMELINVEL')})")
+    if kind in ("FORCE", "TORQUE"):
+        return of_joint_before(reading, frame, site, kind)
     arm = float(np.linalg.norm(frame.offset))
     if arm > MIN_ARM:
         text = "it is at the centre of mass of its body here"
         reading.note("approximated", f"accelerometer at {reading.called('site', site)}", text, f"{1000 * arm:.3g} mm")
     return frame.own_axes(f"{name}.accelerometer")
+
+
+def of_joint_before(reading: ModelReading, frame: SensorFrame, site: int, kind: str) -> str | None:
+    """Return the force of the parent on a site's body, or its torque about the site, in the axes of the site.
+
+    None where the body is welded to its parent, or floats.
+    """
+    body = int(reading.model.site_bodyid[site])
+    joints = reading.joints_of(body)
+    held = body in reading.links and reading.links[body].top == body and len(joints)
+    if not held or reading.model.jnt_type[joints[-1]] == FREE:
+        return None
+    name = reading.joint_names[joints[-1]]
+    if kind == "FORCE":
+        return frame.own_axes(f"{name}.reaction_force")
+    arm = numbers(frame.offset - frame.link.to_body(np.array(reading.data.xanchor[joints[-1]])))
+    moment = f" - cross({arm}, {name}.reaction_force)" if any(arm) else ""
+    return frame.own_axes(f"{name}.reaction_torque{moment}")

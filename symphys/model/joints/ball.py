@@ -2,6 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 from symphys.model.joints.kind import Kind
+from symphys.model.joints.specs import JointSpec
 
 BALL = Kind("ball")
+
+
+@dataclass(frozen=True)
+class BallJoint(JointSpec):
+    """Two points stay together; all turns are free."""
+
+    summary: ClassVar[str] = "two points stay together, all turns are free"
+
+    @property
+    def kind(self) -> Kind:
+        """Return the kind of joint."""
+        return BALL

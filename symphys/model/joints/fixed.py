@@ -2,6 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 from symphys.model.joints.kind import Kind
+from symphys.model.joints.specs import JointSpec
 
 FIXED = Kind("fixed", turns=((0, 1), (1, 2), (2, 0)))
+
+
+@dataclass(frozen=True)
+class FixedJoint(JointSpec):
+    """Nothing is left free."""
+
+    summary: ClassVar[str] = "nothing is left free"
+    anywhere: ClassVar[bool] = True
+
+    @property
+    def kind(self) -> Kind:
+        """Return the kind of joint."""
+        return FIXED

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
 import casadi as ca
 
 from symphys.maths.smoothing import angle_of
+from symphys.model.joints.frames import single_axis
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
-from symphys.types import Expr
+from symphys.model.joints.specs import DIRECTION, MovingJoint, Vector
+from symphys.types import Array, Expr
 
 
 def angle(placed: PlacedFrames) -> Expr:
@@ -17,9 +22,47 @@ def angle(placed: PlacedFrames) -> Expr:
     return angle_of(sin, cos)
 
 
-def axis(placed: PlacedFrames) -> Expr:
-    """X of the second side."""
-    return placed.b[:, 0]
+HINGE = Kind("hinge", turns=((0, 1), (0, 2)), coordinates=(Coordinate("angle", angle),))
 
 
-HINGE = Kind("hinge", turns=((0, 1), (0, 2)), coordinates=(Coordinate("angle", True, angle, axis),))
+@dataclass(frozen=True)
+class Hinge(MovingJoint):
+    """The second turns about an axis.
+
+    Attributes:
+        axis: (3,) of any length but 0, as the bodies lie, world coordinates.
+
+    Example:
+        >>> from symphys import Problem, simulate
+        >>> from symphys.model import Body, Hinge, Servo, Spring, make_world
+        >>> rod = {"radius": 0.02, "length": 0.4, "mass": 0.5}
+        >>> bodies = [Body.capsule(name, **rod, position=(0, 0, z)) for name, z in (("upper", 0.8), ("lower", 0.4))]
+        >>> joints = [
+        ...     Hinge("shoulder", ("world", "upper"), axis=(0, 1, 0), point=(0, 0, 1), start=0.4),
+        ...     Hinge("elbow", ("upper", "lower"), axis=(0, 1, 0), point=(0, 0, 0.6), limits=(-2, 2),
+        ...           motor=Servo(gain=20, torque=3, velocity=8), spring=Spring(stiffness=0.1, damping=0.01)),
+        ... ]
+        >>> problem = Problem.from_world(make_world(bodies, joints=joints), duration=0.5)
+        >>> round(float(simulate(problem)["shoulder.angle"][0]), 12)
+        0.4
+    """
+
+    summary: ClassVar[str] = "turns about an axis"
+    example: ClassVar[str] = "{ axis = [0, 1, 0] }"
+
+    axis: Vector = field(kw_only=True, metadata=DIRECTION)
+
+    @property
+    def kind(self) -> Kind:
+        """Return the kind of joint."""
+        return HINGE
+
+    @property
+    def frame_axes(self) -> Array:
+        """Return the axes (3, 3) of both frames as columns, as the bodies lie, world frame."""
+        return single_axis(self.axis)
+
+    @classmethod
+    def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
+        """Return the keys of its table in problem files."""
+        return {"axis": axes[:, 0].tolist()}

@@ -133,5 +133,5 @@ class Joint:
 
     @property
     def locked(self) -> int:
-        """How many rows it locks."""
-        return (3 if self.kind.slides is None else len(self.kind.slides)) + len(self.kind.turns)
+        """Return the number of locked rows."""
+        return self.kind.locked

@@ -102,7 +102,7 @@ def _grown(joints: Sequence[Joint], root: int) -> Iterator[Link]:
     """The links of the tree of a root, breadth first."""
     rigid = [(k, joint) for k, joint in enumerate(joints) if not joint.soft]
     held = next(((k, joint) for k, joint in rigid if joint.second is None and joint.first == root), None)
-    count = FLOATING if held is None else FLOATING - held[1].locked
+    count = FLOATING if held is None else held[1].kind.free
     yield Link(root, None if held is None else held[0], None, 1, 0, count)
     seen, queue, start = {root}, [root], count
     while queue:
@@ -113,7 +113,7 @@ def _grown(joints: Sequence[Joint], root: int) -> Iterator[Link]:
             body = joint.second if joint.first == parent else joint.first
             if body in seen:
                 continue
-            free = FLOATING - joint.locked
+            free = joint.kind.free
             yield Link(body, k, parent, 1 if joint.first == body else -1, start, free)
             start += free
             seen.add(body)

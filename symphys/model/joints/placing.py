@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symphys.errors import SymphysError
+from symphys.model.joints import JOINTS
 from symphys.model.joints.frames import WORLD, Pose, check_meeting, placed_joint_frames, pose
 from symphys.model.joints.joint import Joint, JointFrame
 from symphys.model.joints.kind import Kind
@@ -45,7 +46,7 @@ def placed_joints(
     """
     for spec in specs:
         if not isinstance(spec, JointSpec):
-            text = "must be Hinge, Slider, UniversalJoint, BallJoint or FixedJoint"
+            text = f"must be one of {', '.join(sorted(each.__name__ for each in JOINTS.values()))}"
             raise SymphysError(
                 f"joints: {text}, not {type(spec).__name__}; those with frames go into World(joints=...)"
             )

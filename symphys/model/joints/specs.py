@@ -1,31 +1,31 @@
 """Joints as they are described: what they hold, their place and axes as the bodies lie, and what acts along them.
 
-``make_world`` makes a ``Joint`` with frames of each. The words are those of [[joint]] tables in problem files.
+``make_world`` makes a ``Joint`` with frames of each. The words are those of [[joint]] tables in problem files, which
+have a table for each kind, with a key for each field whose metadata say what ``value`` it takes, ``direction``,
+``directions`` (two) or ``nonzero``, and what the schema says ``about`` it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import Field, dataclass, field, fields
 from math import inf, isfinite
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from symphys.model.joints.ball import BALL
-from symphys.model.joints.fixed import FIXED
-from symphys.model.joints.frames import single_axis, two_axes
-from symphys.model.joints.hinge import HINGE
 from symphys.model.joints.joint import Limits, Spring
 from symphys.model.joints.kind import Kind
 from symphys.model.joints.motor import Motor
-from symphys.model.joints.slider import SLIDER
-from symphys.model.joints.universal import UNIVERSAL
 from symphys.model.scalar import Scalar
 from symphys.types import Array
 
 Vector = Sequence[float] | Array
 """three of them"""
+AXIS = "[x, y, z], world coordinates at the start, any length but 0"
+"""Description of an axis in the schema of problem files."""
+DIRECTION = {"value": "direction", "about": f"about or along which the second body moves: {AXIS}"}
+"""Metadata of the field of a kind with one axis."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,10 @@ class JointSpec:
         collide: whether the two bodies may touch each other.
     """
 
-    kind: ClassVar[Kind]
+    summary: ClassVar[str]
+    """Description of its table in the schema of problem files."""
+    example: ClassVar[str] = "{}"
+    """An example of its table in problem files."""
     anywhere: ClassVar[bool] = False
     """Whether it needs no point."""
 
@@ -56,24 +59,24 @@ class JointSpec:
     collide: bool = field(default=False, kw_only=True)
 
     @property
+    def kind(self) -> Kind:
+        """Return the kind of joint."""
+        raise NotImplementedError
+
+    @property
     def frame_axes(self) -> Array:
         """(3, 3): the axes of both frames as columns, as the bodies lie, world frame; ValueError for axes of none."""
         return np.eye(3)
 
+    @classmethod
+    def own_fields(cls) -> list[Field[Any]]:
+        """Return the fields that are keys of its table in problem files."""
+        return [each for each in fields(cls) if "value" in each.metadata]
 
-@dataclass(frozen=True)
-class BallJoint(JointSpec):
-    """Two points stay together; all turns are free."""
-
-    kind: ClassVar[Kind] = BALL
-
-
-@dataclass(frozen=True)
-class FixedJoint(JointSpec):
-    """Nothing is left free."""
-
-    kind: ClassVar[Kind] = FIXED
-    anywhere: ClassVar[bool] = True
+    @classmethod
+    def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
+        """Return the keys of its table from a kind of numbers and the axes (3, 3) of its frames at coordinates 0."""
+        return {}
 
 
 @dataclass(frozen=True)
@@ -139,81 +142,3 @@ class MovingJoint(JointSpec):
             if (lower is not None and value < lower) or (upper is not None and value > upper):
                 raise ValueError(f"start: {value:g} is beyond the limits of this joint")
         return values if any(values) else ()
-
-
-@dataclass(frozen=True)
-class Hinge(MovingJoint):
-    """The second turns about an axis.
-
-    Attributes:
-        axis: (3,) of any length but 0, as the bodies lie, world coordinates.
-
-    Example:
-        >>> from symphys import Body, Hinge, Problem, Servo, Spring, make_world, simulate
-        >>> rod = {"radius": 0.02, "length": 0.4, "mass": 0.5}
-        >>> bodies = [Body.capsule(name, **rod, position=(0, 0, z)) for name, z in (("upper", 0.8), ("lower", 0.4))]
-        >>> joints = [
-        ...     Hinge("shoulder", ("world", "upper"), axis=(0, 1, 0), point=(0, 0, 1), start=0.4),
-        ...     Hinge("elbow", ("upper", "lower"), axis=(0, 1, 0), point=(0, 0, 0.6), limits=(-2, 2),
-        ...           motor=Servo(gain=20, torque=3, velocity=8), spring=Spring(stiffness=0.1, damping=0.01)),
-        ... ]
-        >>> problem = Problem.from_world(make_world(bodies, joints=joints), duration=0.5)
-        >>> round(float(simulate(problem)["shoulder.angle"][0]), 12)
-        0.4
-    """
-
-    kind: ClassVar[Kind] = HINGE
-
-    axis: Vector = field(kw_only=True)
-
-    @property
-    def frame_axes(self) -> Array:
-        """See ``JointSpec``."""
-        return single_axis(self.axis)
-
-
-@dataclass(frozen=True)
-class Slider(MovingJoint):
-    """The second moves along an axis and does not turn.
-
-    Attributes:
-        axis: (3,) of any length but 0, as the bodies lie, world coordinates.
-
-    Example:
-        >>> from symphys import Body, Problem, Slider, TorqueMotor, make_world, simulate
-        >>> cart = Body.box("cart", size=(0.2, 0.2, 0.1), mass=1)
-        >>> rail = Slider("rail", ("world", "cart"), axis=(1, 0, 0), motor=TorqueMotor(torque=10))
-        >>> push = {"sets": "rail.command", "guess": [2.0]}
-        >>> pushed = Problem.from_world(make_world([cart], joints=[rail]), duration=1.0, variables={"push": push})
-        >>> round(float(simulate(pushed)["rail.position"][-1]), 6)
-        1.0
-    """
-
-    kind: ClassVar[Kind] = SLIDER
-    anywhere: ClassVar[bool] = True
-
-    axis: Vector = field(kw_only=True)
-
-    @property
-    def frame_axes(self) -> Array:
-        """See ``JointSpec``."""
-        return single_axis(self.axis)
-
-
-@dataclass(frozen=True)
-class UniversalJoint(MovingJoint):
-    """The second turns about two axes (Cardan).
-
-    Attributes:
-        axes: two of (3,), perpendicular to each other, as the bodies lie, world coordinates; the first stays with the
-            first body, the second with the second.
-    """
-
-    kind: ClassVar[Kind] = UNIVERSAL
-
-    axes: tuple[Vector, Vector] = field(kw_only=True)
-
-    @property
-    def frame_axes(self) -> Array:
-        """See ``JointSpec``."""
-        return two_axes(self.axes)

@@ -157,30 +157,26 @@ def moving_side(joint: NamedJoint, tree: Tree) -> tuple[list[str], str, float]:
 def move(joint: NamedJoint, start: Sequence[Expr], tree: Tree, state: dict[str, Expr], back: bool = False) -> None:
     """Move one side of a joint from coordinates 0 to these, or ``back``, in place; of casadi's DM or MX."""
     moved, base, sign = moving_side(joint, tree)
-    coordinates = list(zip(joint.kind.coordinates, start, strict=True))
-    for coordinate, value in reversed(coordinates) if back else coordinates:
-        placed, pivot = frames_of(joint, state)
-        axis, by = coordinate.axis(placed), (-sign if back else sign) * value
-        turn, shift = ca.DM([1, 0, 0, 0]), by * axis
-        if coordinate.turns:
-            turn, shift = ca.vertcat(ca.cos(by / 2), ca.sin(by / 2) * axis), ca.DM.zeros(3)
-        for name in moved:
-            _displace(name, base, BodyDisplacement(pivot, shift, turn), state)
+    placed, pivot = frames_of(joint, state)
+    by: Expr = ca.vertcat(*start)
+    turn, shift = joint.kind.transform(joint.kind.axes(placed), -by if back else by)
+    if sign < 0:
+        turn = ca.vertcat(turn[0], -turn[1:4])
+        shift = -rotation.rotate(turn, shift)
+    for name in moved:
+        _displace(name, base, BodyDisplacement(pivot, shift, turn), state)
 
 
 def drive(joint: NamedJoint, rates: Sequence[Expr], tree: Tree, state: dict[str, Expr]) -> None:
     """Add rates of its coordinates [rad/s] or [m/s] to the velocities of the side that ``move`` moves, in place."""
     moved, _, sign = moving_side(joint, tree)
     placed, pivot = frames_of(joint, state)
-    for coordinate, rate in zip(joint.kind.coordinates, rates, strict=True):
-        along = sign * rate * coordinate.axis(placed)
+    for (slide, turn), rate in zip(joint.kind.motions(placed), rates, strict=True):
+        velocity, spin = sign * rate * slide, sign * rate * turn
         for name in moved:
-            if coordinate.turns:
-                state[f"{name}.angular_velocity"] = state[f"{name}.angular_velocity"] + along
-                arm = state[f"{name}.position"] - pivot
-            state[f"{name}.velocity"] = state[f"{name}.velocity"] + (
-                ca.cross(along, arm) if coordinate.turns else along
-            )
+            arm = state[f"{name}.position"] - pivot
+            state[f"{name}.angular_velocity"] = state[f"{name}.angular_velocity"] + spin
+            state[f"{name}.velocity"] = state[f"{name}.velocity"] + velocity + ca.cross(spin, arm)
 
 
 def _displace(name: str, base: str, motion: BodyDisplacement, state: dict[str, Expr]) -> None:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
 import casadi as ca
 
 from symphys.maths.smoothing import angle_of
+from symphys.model.joints.frames import two_axes
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
-from symphys.types import Expr
+from symphys.model.joints.specs import AXIS, MovingJoint, Vector
+from symphys.types import Array, Expr
 
 
 def swing(placed: PlacedFrames) -> Expr:
@@ -25,7 +30,44 @@ UNIVERSAL = Kind(
     "universal",
     turns=((0, 1),),
     coordinates=(
-        Coordinate("angle1", True, swing, lambda placed: placed.b[:, 1]),
-        Coordinate("angle2", True, twist, lambda placed: placed.a[:, 0], fixed_in_first=True),
+        Coordinate("angle1", swing, axis=1),
+        Coordinate("angle2", twist, axis=0, fixed_in_first=True),
     ),
 )
+
+
+@dataclass(frozen=True)
+class UniversalJoint(MovingJoint):
+    """The second turns about two axes (Cardan).
+
+    Attributes:
+        axes: two of (3,), perpendicular to each other, as the bodies lie, world coordinates; the first stays with the
+            first body, the second with the second.
+    """
+
+    summary: ClassVar[str] = "turns about two axes"
+    example: ClassVar[str] = "{ axes = [[0, 1, 0], [1, 0, 0]] }"
+
+    axes: tuple[Vector, Vector] = field(
+        kw_only=True,
+        metadata={
+            "value": "directions",
+            "about": "two, perpendicular to each other: the first stays with the first body, the second with the "
+            f"second; each {AXIS}",
+        },
+    )
+
+    @property
+    def kind(self) -> Kind:
+        """Return the kind of joint."""
+        return UNIVERSAL
+
+    @property
+    def frame_axes(self) -> Array:
+        """Return the axes (3, 3) of both frames as columns, as the bodies lie, world frame."""
+        return two_axes(self.axes)
+
+    @classmethod
+    def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
+        """Return the keys of its table in problem files."""
+        return {"axes": [axes[:, 1].tolist(), axes[:, 0].tolist()]}

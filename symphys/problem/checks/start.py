@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from functools import partial
+from typing import Any, NoReturn
 
 import casadi as ca
 import numpy as np
 
+from symphys.expression import FormulaError
 from symphys.model.joints.frames import MEET, WORLD
 from symphys.problem.checks.start_values import Start
 from symphys.problem.model import DURATION, Variable
@@ -16,6 +18,7 @@ from symphys.problem.parametric.starts import begin
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity
 from symphys.problem.reading.faults import Faults
+from symphys.suggest import quote
 from symphys.types import Array
 
 OVERLAP = 1e-3
@@ -49,17 +52,22 @@ def varied(variables: Sequence[Variable]) -> list[str]:
     return [slot.name for variable in variables for slot in variable.slots]
 
 
-def formula_names(values: Mapping[str, Array], start: Start, variables: Sequence[Variable]) -> dict[str, Any]:
-    """Every name that a formula may use, with a value of its shape."""
+def formula_names(
+    values: Mapping[str, Array], start: Start, variables: Sequence[Variable], warm_start: bool = True
+) -> dict[str, Any]:
+    """Every name that a formula may use, with a value of its shape; see ``Formula.evaluate``."""
     named: dict[str, Any] = {name: ca.DM(value) for name, value in values.items() if "-" not in name}
     named |= {"time": ca.DM(0.0), "duration": ca.DM(values[DURATION])}
     named |= start.quantities()
+    if not warm_start:
+        kept = (name for name, sensor in start.functions.sensors.items() if sensor.kind.kept)
+        named |= {name: partial(_without_warm_start, name) for name in kept}
     return named | {variable.name: ca.DM(variable.guess) for variable in variables}
 
 
-def sensor_names(values: Mapping[str, Array], start: Start) -> dict[str, Any]:
-    """Every name that a sensor may read, with a value of its shape: all but the variables."""
-    return formula_names(values, start, ())
+def _without_warm_start(name: str) -> NoReturn:
+    text = "reads what joints gave in the step before, which is not kept; take out warm_start = false in [simulation]"
+    raise FormulaError(f"{quote(name)} {text}")
 
 
 def check_overlap(parametric: ParametricWorld, start: Start, faults: Faults) -> None:

@@ -6,29 +6,21 @@ parameters in which worlds have differed so far, and evaluated for every further
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from symphys.dynamics.kept import structure
-from symphys.dynamics.observation import (
-    accelerometers,
-    body_quantities,
-    gap_function,
-    named_readings,
-    readings,
-    site_quantities,
-)
-from symphys.dynamics.observation.joint_coordinates import Reading
-from symphys.model.state_layout import GIVEN, Layout, initial_state
+from symphys.dynamics.observation import NamedSensor, SensedState, gap_function, joint_readings, named_sensors
+from symphys.model.state_layout import GIVEN, Layout, initial_state, input_sizes
 from symphys.model.world import World
 from symphys.problem.parametric.parts import DISTRIBUTION
 from symphys.problem.parametric.world import ParametricWorld
-from symphys.types import Array
+from symphys.types import Array, Expr
 
 MOST_KEPT = 8
 """How many structures of worlds are kept at once."""
@@ -42,6 +34,7 @@ class StartFunctions:
         self.world = world
         self.parameters = parameters
         self.x = ca.SX.sym("x", Layout(world).size)
+        self._sensed: dict[str, ca.Function] = {}
 
     @cached_property
     def gaps(self) -> ca.Function:
@@ -49,22 +42,26 @@ class StartFunctions:
         return gap_function(self.world, self.parameters)
 
     @cached_property
-    def quantities(self) -> tuple[list[str], ca.Function]:
-        """Names of formulas, and their values: of joints, and what is felt on bodies that are not accelerated."""
-        layout = Layout(self.world)
-        still = {body.name: self.x[layout[f"{body.name}.velocity"]] for body in self.world.bodies}
-        found = named_readings(self.world, self._readings) | body_quantities(self.world, self.x)
-        found |= accelerometers(self.world, self.x, still, 1.0) | site_quantities(self.world, self.x)
-        return list(found), self._function("quantities", list(found.values()))
+    def sensors(self) -> dict[str, NamedSensor]:
+        """The sensors of the world, by name."""
+        return named_sensors(self.world)
+
+    def sensor(self, name: str) -> ca.Function:
+        """(x, p) -> what a sensor reads of bodies that are not accelerated, on which no input has acted."""
+        if name not in self._sensed:
+            self._sensed[name] = self._function("sensor", [self.sensors[name].read(self._still)])
+        return self._sensed[name]
 
     @cached_property
-    def _readings(self) -> dict[str, Reading]:
-        return readings(self.world, self.x)
+    def _still(self) -> SensedState:
+        layout = Layout(self.world)
+        before: dict[str, Expr] = {name: ca.SX.zeros(size) for name, size in input_sizes(self.world).items()}
+        return SensedState(self.world, self.x, before | {name: self.x[layout[name]] for name in layout.names()})
 
     @cached_property
     def joints(self) -> ca.Function:
         """Return a function for the separation, tilt and coordinates of each joint."""
-        found = self._readings.values()
+        found = self._still.shared(joint_readings).values()
         return self._function("joints", [part for each in found for part in (each.separation, each.tilt, each.value)])
 
     def _function(self, name: str, values: list[Any]) -> ca.Function:
@@ -88,10 +85,13 @@ class Start:
         """(pairs,) [m]."""
         return np.array(self.functions.gaps(self.x, self.p)).ravel()
 
-    def quantities(self) -> dict[str, Any]:
-        """Names of formulas, with casadi's DM: of joints, and what is felt on bodies that are not accelerated."""
-        names, function = self.functions.quantities
-        return dict(zip(names, function.call([self.x, self.p]), strict=True))
+    def quantities(self) -> dict[str, Callable[[], Expr]]:
+        """By the names of sensors, functions that return what they read; see ``Formula.evaluate``."""
+        return {name: partial(self.sensed, name) for name in self.functions.sensors}
+
+    def sensed(self, name: str) -> Expr:
+        """(size,) what a sensor reads of bodies that are not accelerated."""
+        return self.functions.sensor(name)(self.x, self.p)
 
     def joints(self) -> list[tuple[float, float, Array]]:
         """Return for each joint its separation [m], its tilt [rad], and its coordinates (k,)."""

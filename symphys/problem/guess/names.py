@@ -26,8 +26,7 @@ def guessable(world: World) -> dict[str, int]:
         if is_ball(link, joint):
             found |= {f"{joint.name}.{field}": size for field, size in OF_BALLS.items()}
         elif joint.kind.coordinates:
-            value = "angle" if joint.kind.coordinates[0].turns else "position"
-            found |= {f"{joint.name}.{field}": len(joint.kind.coordinates) for field in (value, "rate")}
+            found |= {f"{joint.name}.{field}": len(joint.kind.coordinates) for field in (joint.kind.quantity, "rate")}
     return found
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from symphys.model.joints import JOINTS
 from symphys.model.joints.frames import WORLD
 from symphys.model.orientation import turned
 from symphys.problem.include.merge import MergedFiles
@@ -102,14 +103,18 @@ class Placement:
         if table.anchors is not None:
             sides = zip(table.between, table.anchors, strict=True)
             update["anchors"] = [self.point(anchor) if name == WORLD else anchor for name, anchor in sides]
-        for key in ("hinge", "slider"):
-            kind = getattr(table, key)
-            if kind is not None:
-                update[key] = kind.model_copy(update={"axis": self.direction(kind.axis)})
-        if table.universal is not None:
-            axes = [self.direction(axis) for axis in table.universal.axes]
-            update["universal"] = table.universal.model_copy(update={"axes": axes})
-        return table.model_copy(update=update)
+        for word, spec in JOINTS.items():
+            if (own := getattr(table, word)) is not None:
+                moved: dict[str, Any] = {}
+                for each in spec.own_fields():
+                    given, value = getattr(own, each.name), each.metadata["value"]
+                    if value == "direction":
+                        moved[each.name] = self.direction(given)
+                    elif value == "directions":
+                        moved[each.name] = [self.direction(axis) for axis in given]
+                update[word] = own.model_copy(update=moved)
+        placed: SchemaTable = table.model_copy(update=update)
+        return placed
 
     def site(self, place: Place, table: SiteTable) -> SchemaTable:
         """A site of the world; one of a body moves with that."""

@@ -59,9 +59,10 @@ class ParametricJoint:
         return f"{self.name}.anchor"
 
     def parameters(self) -> dict[str, Numbers]:
-        """Parameter names and values: those of motor and spring, armature and friction if not 0, and the anchor."""
+        """Return names and values of parameters: of kind, motor, spring, the anchor, armature and friction if not 0."""
         parts = [part for part in (self.motor, self.spring) if part is not None]
         found = {f"{self.name}.{key}": getattr(part, key) for part in parts for key in given(part)}
+        found |= {f"{self.name}.{key}": number for key, number in self.kind.numbers.items()}
         found |= {f"{self.name}.{key}": getattr(self, key) for key in OWN if getattr(self, key)}
         return found | {self.anchor: self.frames[1].point}
 
@@ -69,7 +70,7 @@ class ParametricJoint:
         """The joint with its parameters' values; ``places`` has the indices of bodies."""
         return Joint(
             name=self.name,
-            kind=self.kind,
+            kind=self.kind.valued({key: value(f"{self.name}.{key}") for key in self.kind.numbers}),
             first=places[self.first],
             second=None if self.second is None else places[self.second],
             frames=(self.frames[0], replace(self.frames[1], point=value(self.anchor))),

@@ -60,14 +60,12 @@ Numbers = float | tuple[float, ...]
 Value = Callable[[str], Any]
 """A parameter's value by name: a scalar, or a tuple of them."""
 
-LAW = {each.name: each.metadata for each in fields(Law)}
+LAW = {each.name: each.metadata for each in fields(Law) if each.metadata}
 """The coefficients of a contact law, all of which a [[pair]] table may state."""
-COMBINE: dict[str, Callable[[list[Scalar]], Scalar]] = {
-    name: about["combine"] for name, about in LAW.items() if "combine" in about
+VARIABLE: dict[str, tuple[float, float]] = {
+    name: about["physical"] for name, about in LAW.items() if "physical" in about
 }
-"""Those that surfaces state."""
-VARIABLE: dict[str, tuple[float, float]] = {name: about["physical"] for name, about in LAW.items()}
-"""All of them are parameters where stated: the least and the largest value that is physical."""
+"""Those that are parameters where stated: the least and the largest value that is physical."""
 STRUCTURAL = tuple(name for name, about in LAW.items() if "structural" in about)
 """Those whose 0 leaves equations out of the step, so that they are parameters only where they are not 0."""
 DISTRIBUTION = ("second_moments", "correlations")
@@ -75,9 +73,9 @@ DISTRIBUTION = ("second_moments", "correlations")
 CENTRE = "centre_of_mass"
 
 
-def stated(states: Mapping[str, float]) -> dict[str, Numbers]:
+def stated(states: Mapping[str, Any]) -> dict[str, Numbers]:
     """Return the coefficients that variables may set."""
-    return {key: number for key, number in states.items() if number or key not in STRUCTURAL}
+    return {key: number for key, number in states.items() if key in VARIABLE and (number or key not in STRUCTURAL)}
 
 
 @dataclass(frozen=True)
@@ -102,7 +100,7 @@ class ParametricBody:
     shapes: tuple[Shape, ...]
     hollow: bool
     inertia: Any
-    states: Mapping[str, float]
+    states: Mapping[str, Any]
     collides_with: frozenset[str] | None
     group: str | None = None
 
@@ -213,7 +211,7 @@ class ParametricStatic:
     """
 
     static: Static
-    states: Mapping[str, float]
+    states: Mapping[str, Any]
     group: str | None = None
     collides_with: frozenset[str] | None = None
 
@@ -249,7 +247,7 @@ class PairRule:
     name: str
     between: frozenset[str]
     collide: bool
-    states: Mapping[str, float]
+    states: Mapping[str, Any]
 
     def parameters(self) -> dict[str, Numbers]:
         """Parameter names and values."""

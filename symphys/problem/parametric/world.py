@@ -19,11 +19,11 @@ from symphys.model.joints import Joint
 from symphys.model.joints.coupling import CouplingSpec, placed_couplings
 from symphys.model.shapes import Scalar, Static
 from symphys.model.site import Site
-from symphys.model.world import Law, Pair, Side, World, points_of
+from symphys.model.world import Law, Pair, Side, Statements, World, points_of
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.parts import (
-    COMBINE,
+    LAW,
     Numbers,
     PairRule,
     ParametricBody,
@@ -197,18 +197,21 @@ class ParametricWorld:
 
     def law(self, a: str, b: str, value: Value) -> Law:
         """The contact law of the two by the rule above, with the values of what is a parameter."""
-        found: dict[str, Scalar] = {}
-        for key, sources in self.sources(a, b).items():
-            numbers = [value(f"{owner}.{key}") if varies else number for owner, number, varies in sources]
-            found[key] = numbers[0] if len(numbers) == 1 else COMBINE[key](numbers)
-        return Law(**found)
+        return Law.of(self.statements(a, b, value))
 
-    def sources(self, a: str, b: str) -> dict[str, list[tuple[str, float, bool]]]:
+    def statements(self, a: str, b: str, value: Value | None = None) -> Statements:
+        """What the tables state for the two, with the values of what is a parameter; None: as the file has it."""
+        return {
+            key: [(owner, value(f"{owner}.{key}") if value and varies else number) for owner, number, varies in sources]
+            for key, sources in self.sources(a, b).items()
+        }
+
+    def sources(self, a: str, b: str) -> dict[str, list[tuple[str, Any, bool]]]:
         """Map coefficients to who states them (a pair, [contact], surfaces), the value, and if it is a parameter."""
         pair = self.pair(a, b)
-        found: dict[str, list[tuple[str, float, bool]]] = {}
-        for key, number in vars(self.contact).items():
-            found[key] = [(CONTACT, number, f"{CONTACT}.{key}" in self.contact_parameters)]
+        found: dict[str, list[tuple[str, Any, bool]]] = {}
+        for key in LAW:
+            found[key] = [(CONTACT, getattr(self.contact, key), f"{CONTACT}.{key}" in self.contact_parameters)]
             sides = [self._named[name] for name in (a, b) if key in self._named[name].states]
             tables = [pair] if pair and key in pair.states else sides
             if tables:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from symphys.dynamics.observation import SENSOR_KINDS
 from symphys.maths import rotation
+from symphys.model.state_layout import INPUT_FIELDS
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.schema.recording import CONVERSIONS, ColumnsTable
 from symphys.suggest import quote
@@ -16,7 +18,7 @@ from symphys.types import Array
 Key = tuple[str | int, ...]
 PLACED = "position"
 """The field of quantities that a frame turns and shifts; points of space."""
-TURNED = ("velocity", "angular_velocity", "force", "torque", "contact_force", "reaction_force", "reaction_torque")
+TURNED = frozenset({*INPUT_FIELDS, *(kind.key for kind in SENSOR_KINDS if kind.axes == "world")} - {PLACED})
 """Fields of vectors in world coordinates, which a frame turns."""
 ORIENTATION = "orientation"
 LARGEST = 1e30

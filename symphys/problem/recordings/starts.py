@@ -32,8 +32,7 @@ def joint_starts(joints: Sequence[ParametricJoint]) -> dict[str, RecordedJoint]:
     tree, found = spanning_tree(joints), dict[str, RecordedJoint]()
     for joint in joints:
         if joint.name in tree[joint.first] and len(joint.kind.coordinates) == 1:
-            value = "angle" if joint.kind.coordinates[0].turns else "position"
-            found[f"{joint.name}.{value}"] = RecordedJoint(joint, rate=False)
+            found[f"{joint.name}.{joint.kind.quantity}"] = RecordedJoint(joint, rate=False)
             found[f"{joint.name}.rate"] = RecordedJoint(joint, rate=True)
     return found
 
@@ -124,20 +123,15 @@ class Starts:
 
 def turn_on(joint: ParametricJoint, body: str, rate: float, state: State) -> None:
     """Give a body, in place, the rate of its joint; what the file's start has of it is replaced."""
-    coordinate = joint.kind.coordinates[0]
     placed, point = placed_frames(joint, state)
-    axis = np.asarray(coordinate.axis(placed), float)
+    ((slide, turn),) = (np.array(each, float).reshape(2, 3) for each in joint.kind.motions(placed))
     base = (joint.second or WORLD) if body == joint.first else joint.first
     sign = 1.0 if body == joint.first else -1.0
     spin, velocity, centre = motion_of(base, state)
     arm = state[f"{body}.position"] - centre
     still = velocity + np.cross(spin, arm)
-    if coordinate.turns:
-        state[f"{body}.angular_velocity"] = spin + sign * rate * axis
-        state[f"{body}.velocity"] = still + sign * rate * np.cross(axis, state[f"{body}.position"] - point)
-    else:
-        state[f"{body}.angular_velocity"] = spin.copy()
-        state[f"{body}.velocity"] = still + sign * rate * axis
+    state[f"{body}.angular_velocity"] = spin + sign * rate * turn
+    state[f"{body}.velocity"] = still + sign * rate * (slide + np.cross(turn, state[f"{body}.position"] - point))
 
 
 def casadi_state(state: State) -> dict[str, ca.DM]:

@@ -43,6 +43,13 @@ def is_number(value: object, bound: bool = False) -> TypeGuard[int | float]:
     return not math.isnan(number) if bound else math.isfinite(number)
 
 
+def nonzero(value: object) -> float:
+    """Return the value if it is a finite number but 0."""
+    if not is_number(value) or value == 0:
+        raise fault(f"must be a number but 0, not {shown(value)}")
+    return float(value)
+
+
 def identifier(value: object) -> str:
     """A name that formulas can use."""
     if not isinstance(value, str) or not re.fullmatch(IDENTIFIER, value) or len(value) > MAX_IDENTIFIER:

@@ -6,10 +6,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from symphys.dynamics.observation import SENSOR_KINDS
 from symphys.problem.schema.types import Finite, Identifier, NonNegative, Numbers, SchemaTable, Texts
 
 Width = Annotated[int, Field(ge=1, le=100_000)]
 Activation = Literal["tanh", "relu", "linear"]
+
+
+OWNERS = {"body": "torso", "joint": "knee", "site": "tip"}
+SENSED = ", ".join(f'"{OWNERS[kind.owner]}.{kind.key}"' for kind in SENSOR_KINDS)
+"""Every kind of sensor, by an example."""
 
 
 class SensorTable(SchemaTable):
@@ -17,8 +23,7 @@ class SensorTable(SchemaTable):
 
     name: Identifier = Field(description="how controllers refer to it")
     reads: Texts = Field(
-        description='formulas, joined one after the other: "knee.angle", "knee.rate", "knee.command" (of the step '
-        'before), "knee.torque", "torso.orientation", "torso.gyro", "torso.accelerometer", "foot.contact_force", '
+        description=f'formulas, joined one after the other: {SENSED}, "knee.command" (of the step before), '
         '"torso.position[2]", "sin(2 * pi * time)"'
     )
 
@@ -62,7 +67,7 @@ class NetTable(SchemaTable):
 
 
 class FunctionTable(SchemaTable):
-    """A casadi function that Python gives: load_problem(..., functions={name: function})."""
+    """A casadi function that Python gives: symphys.load(..., functions={name: function})."""
 
     weights: Numbers | None = Field(default=None, description="its numbers at the start; default 0")
 

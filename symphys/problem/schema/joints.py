@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, create_model
 
+from symphys.model.joints import JOINTS
 from symphys.problem.schema.shapes import UPRIGHT
 from symphys.problem.schema.types import (
     Coordinates,
@@ -13,31 +14,42 @@ from symphys.problem.schema.types import (
     Finite,
     Identifier,
     NonNegative,
+    NonZero,
     Orientation,
     Positive,
     SchemaTable,
     Vector,
 )
 
-AXIS = "[x, y, z], world coordinates at the start, any length but 0"
+VALUES: dict[str, Any] = {
+    "direction": Vector,
+    "directions": Annotated[list[Vector], Field(min_length=2, max_length=2)],
+    "nonzero": NonZero,
+}
+"""Types of the keys of kinds of joints, by the metadata of ``JointSpec``."""
 
 
-class BareTable(SchemaTable):
-    """A kind without keys: { }."""
+def kinds_of_joints() -> type[SchemaTable]:
+    """Make a table with an optional table for each kind of joint, after the keys of ``HeldTable``."""
+    found: dict[str, Any] = {}
+    for word, spec in JOINTS.items():
+        keys: dict[str, Any] = {
+            each.name: (VALUES[each.metadata["value"]], Field(description=each.metadata["about"]))
+            for each in spec.own_fields()
+        }
+        name = f"{word.capitalize()}JointTable"
+        about = f"{spec.summary[:1].upper()}{spec.summary[1:]}."
+        table = create_model(name, __base__=SchemaTable, __doc__=about, __module__=__name__, **keys)
+        found[word] = (table | None, Field(default=None, description=f"{spec.example}: {spec.summary}"))
+    return create_model("KindsOfJointsTable", __base__=HeldTable, __module__=__name__, **found)
 
 
-class AxisTable(SchemaTable):
-    """A hinge or a slider."""
+class HeldTable(SchemaTable):
+    """The name of a joint and the bodies that it connects."""
 
-    axis: Vector = Field(description=f"about or along which the second body moves: {AXIS}")
-
-
-class UniversalTable(SchemaTable):
-    """A universal joint."""
-
-    axes: Annotated[list[Vector], Field(min_length=2, max_length=2)] = Field(
-        description="two, perpendicular to each other: the first stays with the first body, the second with the "
-        f"second; each {AXIS}"
+    name: Identifier = Field(description="how formulas, variables and settings refer to it")
+    between: Annotated[list[str], Field(min_length=2, max_length=2)] = Field(
+        description='two bodies, or "world" and a body; coordinates are those of the second against the first'
     )
 
 
@@ -129,24 +141,13 @@ class SiteTable(SchemaTable):
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
 
 
-class JointTable(SchemaTable):
+class JointTable(kinds_of_joints()):  # type: ignore[misc]
     """What holds two bodies together, or a body to the world; coordinates are 0 as the bodies lie in the file.
 
     With ``start`` they begin elsewhere. Angles count whole turns: a hinge that has gone round twice is at 12.57 rad.
-    One of ball, hinge, slider, universal and fixed says how.
+    The table of one kind says how.
     """
 
-    name: Identifier = Field(description="how formulas, variables and settings refer to it")
-    between: Annotated[list[str], Field(min_length=2, max_length=2)] = Field(
-        description='two bodies, or "world" and a body; coordinates are those of the second against the first'
-    )
-    ball: BareTable | None = Field(default=None, description="{ }: two points stay together, all turns are free")
-    hinge: AxisTable | None = Field(default=None, description="{ axis = [0, 1, 0] }: turns about an axis")
-    slider: AxisTable | None = Field(default=None, description="{ axis = [1, 0, 0] }: moves along an axis")
-    universal: UniversalTable | None = Field(
-        default=None, description="{ axes = [[0, 1, 0], [1, 0, 0]] }: turns about two axes"
-    )
-    fixed: BareTable | None = Field(default=None, description="{ }: nothing is left free")
     point: Vector | None = Field(default=None, description="where the joint is at the start, world coordinates [m]")
     anchors: Annotated[list[Vector], Field(min_length=2, max_length=2)] | None = Field(
         default=None,

@@ -61,6 +61,11 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+NonZero = Annotated[
+    float,
+    PlainValidator(checks.nonzero),
+    WithJsonSchema({"type": "number", "not": {"const": 0}}),
+]
 Vector = Annotated[list[float], PlainValidator(checks.vector(3)), WithJsonSchema(vector_schema(3))]
 Pair = Annotated[list[float], PlainValidator(checks.vector(2)), WithJsonSchema(vector_schema(2))]
 Ends = Annotated[list[float], PlainValidator(checks.ends), WithJsonSchema(vector_schema(2))]

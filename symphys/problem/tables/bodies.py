@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
 from symphys.model.shapes import Shape
 from symphys.model.shapes.inertia import centring, off_centre
+from symphys.model.world import COMBINE
 from symphys.problem.checks.magnitude import check_magnitudes
-from symphys.problem.parametric.parts import COMBINE, ParametricBody
+from symphys.problem.parametric.parts import ParametricBody
 from symphys.problem.reading.faults import Faults
 from symphys.problem.schema.physics import BodyTable, MemberTable, SurfaceTable
 from symphys.problem.tables.shapes import read_orientation, read_shape
@@ -109,7 +111,7 @@ def touching(table: MemberTable) -> frozenset[str] | None:
     return None if table.collides_with is None else frozenset(table.collides_with)
 
 
-def states(table: SurfaceTable, keys: Iterable[str] = COMBINE) -> dict[str, float]:
+def states(table: SurfaceTable, keys: Iterable[str] = COMBINE) -> dict[str, Any]:
     """The coefficients that a table states, among those that its kind of table has."""
     given = {key: getattr(table, key) for key in keys}
     return {key: value for key, value in given.items() if value is not None}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from symphys.model.world import Law, World
+from symphys.model.world import Law, World, contradictions
 from symphys.problem.parametric.parts import LAW, PairRule
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults, Place
@@ -112,13 +112,13 @@ def rival_of(parametric: ParametricWorld, index: int, name: str, rivals: Rivals)
 def check_laws(parametric: ParametricWorld, nominal: World, faults: Faults) -> None:
     """A contact is either soft or has restitution; a [[pair]] table must belong to surfaces that may touch."""
     check_ranks(parametric, faults)
-    laws = {parametric.owners(pair): pair.law for pair in nominal.pairs}
     used = set()
-    for owners, law in laws.items():
+    for owners in dict.fromkeys(map(parametric.owners, nominal.pairs)):
         table = parametric.pair(*owners)
         used.add(table and table.name)
-        if law.soft and law.restitution:
-            faults.add(law_place(parametric, table), f"{' and '.join(sorted(owners))}: {either(law)}")
+        stated = parametric.statements(*owners)
+        for key, message in contradictions(owners, stated):
+            faults.add((*table_place(parametric, stated[key][0][0], faults), key), message)
     for index, pair in enumerate(parametric.pairs):
         if pair.collide and pair.name not in used:
             faults.add(("pair", index, "between"), unused(parametric, pair))
@@ -139,14 +139,6 @@ def check_varied(
             faults.add(place, f"{name} cannot vary: {owner} has soft contacts, which have no restitution")
 
 
-def either(law: Law) -> str:
-    """The message for a contact that is both."""
-    return (
-        f"a contact is either soft (frequency {law.frequency:g} Hz) or has restitution ({law.restitution:g}); "
-        "leave one out, or make one of them 0 for these two in a [[pair]] table"
-    )
-
-
 def unused(parametric: ParametricWorld, pair: PairRule) -> str:
     """The message for a [[pair]] table that holds for no two surfaces."""
     if any(pair.between == jointed.between for jointed in parametric.jointed):
@@ -156,11 +148,14 @@ def unused(parametric: ParametricWorld, pair: PairRule) -> str:
     return "no two of these ever touch, or tables that name them more closely go before this one: it has no effect"
 
 
-def law_place(parametric: ParametricWorld, table: PairRule | None) -> Place:
-    """Where the frequency of a pair is stated."""
-    if table and "frequency" in table.states:
-        return ("pair", parametric.pairs.index(table), "frequency")
-    return ("contact", "frequency")
+def table_place(parametric: ParametricWorld, owner: str, faults: Faults) -> Place:
+    """Where the table is that states a coefficient: of a surface, a pair or [contact], by its name."""
+    for kind in ("body", "plane", "block", "terrain"):
+        for index, table in enumerate(faults.data.get(kind, ())):
+            if table["name"] == owner:
+                return kind, index
+    pairs = [pair.name for pair in parametric.pairs]
+    return ("pair", pairs.index(owner)) if owner in pairs else (owner,)
 
 
 def check_damping(parametric: ParametricWorld, faults: Faults) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.dynamics.observation import SENSOR_KINDS
 from symphys.expression import FormulaError, parse
 from symphys.problem.feedback import ForceLaw
 from symphys.problem.model import Phase, Variable, VariableSlot
@@ -17,8 +18,8 @@ from symphys.problem.schema.control import ForceTable
 from symphys.problem.tables.simulation import find_phase
 from symphys.suggest import quote
 
-NOT_AHEAD = "accelerometer"
-"""What is not known half a step ahead."""
+NOT_AHEAD = tuple(f".{kind.key}" for kind in SENSOR_KINDS if not kind.ahead)
+"""Ends of the names of what is not known half a step ahead."""
 VARYING = ("parameter", "weight")
 """Kinds of variables that have one value over the whole motion, which a law may name."""
 
@@ -83,7 +84,7 @@ def _read(
         if kinds.get(name, VARYING[0]) not in VARYING:
             instead = " or ".join(slot.name for v in variables if v.name == name for slot in v.slots)
             faults.add((*place, "value"), f"the variable {quote(name)} sets {instead}; name that instead")
-        if name.endswith(f".{NOT_AHEAD}"):
+        if name.endswith(NOT_AHEAD):
             faults.add((*place, "value"), f"{quote(name)} is not known while the force is; take velocities")
     size = int(value.shape[0])
     if size != len(slot.components):

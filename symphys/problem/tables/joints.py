@@ -10,7 +10,7 @@ import numpy as np
 
 from symphys.model.gimbal import Screw, locks
 from symphys.model.joints import (
-    KINDS,
+    JOINTS,
     AffineMotor,
     JointFrame,
     Kind,
@@ -29,14 +29,6 @@ from symphys.problem.schema.joints import JointTable, MotorTable, SpringTable
 from symphys.problem.tables.joint_frames import read_joint_frames
 from symphys.suggest import hint, quote
 from symphys.types import Array
-
-EXAMPLES = {
-    "ball": "ball = {}",
-    "hinge": "hinge = { axis = [0, 1, 0] }",
-    "slider": "slider = { axis = [1, 0, 0] }",
-    "universal": "universal = { axes = [[0, 1, 0], [1, 0, 0]] }",
-    "fixed": "fixed = {}",
-}
 
 
 def read_joints(
@@ -135,9 +127,10 @@ def _crossed(joint: ParametricJoint, body: str | None, pose: Array, screws: list
     low, high = (_bound(joint.limits.lower, -np.inf), _bound(joint.limits.upper, np.inf))
     low, high = (-high, -low) if body == joint.first else (low, high)
     carried = not is_zero(joint.armature)
-    axes = {"fixed": [], "hinge": [0], "slider": [0], "universal": [1, 0], "ball": [0, 1, 2]}[joint.kind.name]
-    for k in axes if body == joint.first else reversed(axes):
-        screws.append(Screw(frame[:3, k], None if joint.kind.name == "slider" else frame[:3, 3], low, high, carried))
+    moves = [(each.axis, each.turns, each.lead) for each in joint.kind.coordinates]
+    moves = moves or [(k, True, 0.0) for k in range(joint.kind.free)]
+    for k, turns, lead in moves if body == joint.first else reversed(moves):
+        screws.append(Screw(frame[:3, k], frame[:3, 3] if turns else None, low, high, carried, float(lead)))
     return np.asarray(frame @ np.linalg.inv(there), float)
 
 
@@ -164,7 +157,7 @@ def check_loops(joints: Sequence[ParametricJoint | None], faults: Faults) -> Non
         return name
 
     for index, joint in enumerate(joints):
-        if joint is None or joint.kind.name != "fixed" or joint.frequency:
+        if joint is None or joint.kind.free or joint.frequency:
             continue
         a, b = root(joint.first), root(joint.second or WORLD)
         if a == b:
@@ -195,9 +188,12 @@ class JointReader:
         """The joint; None if it is unclear what it holds together, or how."""
         before, table = len(self.faults.issues), self.table
         self.check_between()
-        kind = self.kind()
-        if len(self.faults.issues) > before or kind is None:
+        word = self.kind()
+        if len(self.faults.issues) > before or word is None:
             return None
+        own = {each.name: getattr(getattr(table, word), each.name) for each in JOINTS[word].own_fields()}
+        spec = JOINTS[word](table.name, tuple(table.between), **own)
+        kind = spec.kind
         self.check_acting(kind)
         self.check_damping()
         second, first = (None if name == WORLD else name for name in table.between)
@@ -208,7 +204,7 @@ class JointReader:
             kind=kind,
             first=first,
             second=second,
-            frames=read_joint_frames(self.place, table, self.initial, self.faults),
+            frames=read_joint_frames(self.place, table, spec, word, self.initial, self.faults),
             motor=self.motor(table.motor),
             limits=limits,
             spring=read_spring(table.spring),
@@ -236,13 +232,14 @@ class JointReader:
                 known = [WORLD, *self.bodies]
                 self.add("between", f"no body is called {quote(name)}; {hint(name, known)}")
 
-    def kind(self) -> Kind | None:
-        """The one that is given."""
-        given = [name for name in EXAMPLES if getattr(self.table, name) is not None]
+    def kind(self) -> str | None:
+        """Return the name of the kind that is given."""
+        given = [name for name in JOINTS if getattr(self.table, name) is not None]
         if len(given) == 1:
-            return KINDS[given[0]]
+            return given[0]
         start = f"has {' and '.join(given)}; give only" if given else "give"
-        self.faults.add(self.place, f"{start} one of {', '.join(EXAMPLES.values())}")
+        examples = ", ".join(f"{name} = {each.example}" for name, each in JOINTS.items())
+        self.faults.add(self.place, f"{start} one of {examples}")
         return None
 
     def check_acting(self, kind: Kind) -> None:
@@ -284,8 +281,7 @@ class JointReader:
         table = self.table
         if table.limits is not None and table.limits_deg is not None:
             self.add("limits_deg", "limits are given too; leave one out")
-        slides = any(not coordinate.turns for coordinate in kind.coordinates)
-        if table.limits_deg is not None and slides:
+        if table.limits_deg is not None and not kind.turning:
             self.add("limits_deg", f"a {kind.name} has no angle; give limits [m]")
         degrees = [] if table.limits_deg is None else np.deg2rad(table.limits_deg).tolist()
         ends = degrees if table.limits is None else table.limits
@@ -298,10 +294,10 @@ class JointReader:
         key, given = ("start", table.start) if table.start_deg is None else ("start_deg", table.start_deg)
         if given is None or not kind.coordinates:
             return ()
-        count, turns = len(kind.coordinates), kind.coordinates[0].turns
+        count = len(kind.coordinates)
         if table.start is not None and table.start_deg is not None:
             self.add("start_deg", "start is given too; leave one out")
-        if key == "start_deg" and not turns:
+        if key == "start_deg" and not kind.turning:
             self.add(key, f"a {kind.name} has no angle; give start [m]")
         if len(given) != count:
             self.add(key, f"a {kind.name} has {count} coordinate{'s' * (count > 1)}, but {len(given)} are given")

@@ -197,5 +197,5 @@ def bending(joints: Sequence[ParametricJoint], bodies: Sequence[str]) -> tuple[P
         for joint in joints
         if joint.first in bodies
         and joint.name in tree[joint.first]
-        and [coordinate.turns for coordinate in joint.kind.coordinates] == [True]
+        and [each.turns and not each.slides for each in joint.kind.coordinates] == [True]
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from symphys.dynamics.observation import SENSOR_KINDS
 from symphys.expression import Formula
 from symphys.problem.feedback import Sensor
 from symphys.problem.model import Phase, Simulation, Termination
@@ -122,12 +123,13 @@ def check_read_at_start(
 ) -> None:
     """Sensors and [termination] look at a state alone, which does not say in which phase it is."""
     names = {name for phase in phases for name in phase.sets}
+    depends = tuple(f".{kind.key}" for kind in SENSOR_KINDS if kind.parameters & names)
     read: list[tuple[Place, Formula]] = []
     for k, sensor in enumerate(sensors):
         read += [(("sensor", k, "reads"), formula) for formula in sensor.formulas]
     read += [] if ending[1] is None else [((ending[0], "margin"), ending[1].margin)]
     for place, formula in read:
-        felt = {name for name in formula.names if name.endswith(".accelerometer")} if "gravity" in names else set()
+        felt = {name for name in formula.names if name.endswith(depends)}
         for name in sorted(formula.names & names | felt):
             faults.add(place, f"looks at {name}, which a phase changes; a state does not tell its phase")
     faults.stop_if_any()

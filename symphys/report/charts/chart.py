@@ -1,20 +1,20 @@
-"""A chart: panels of lines as numbers, which ``curves.js`` draws; small, and made without matplotlib."""
+"""A chart: panels of curves as numbers. A light page draws it by ``charts.js``, a full page by ``charts.drawing``."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from symphys.report.figures.style import thin
+from symphys.report.figures.data import Table, thin
 from symphys.types import Array
 
 POINTS = 240
-"""Samples of a line at most about: a panel is some 300 pixels wide."""
-STEPS = 4000
+"""Largest number of samples of a line in a light page, about: a panel is some 300 pixels wide."""
+RESOLUTION = 4000
 """Numbers of a linear panel are rounded to this share of their range; a panel is some 150 pixels high."""
 DIGITS = 4
 
@@ -28,7 +28,10 @@ class Line:
         colour: as CSS writes it.
         x, y: (samples,); nan is a gap.
         width: [px].
-        look: "" for a line, "steps" (a value holds until the next), "dashed", "pale", "dots", "rings".
+        look: words. "steps": a value holds until the next; "middles": until half way to the next; "dashed", "dotted",
+            "pale" (translucent); "plain": without dots at few samples; "area": shaded down to 0. "points", "dots" and
+            "rings" are marks alone: small, large, and hollow ones.
+        mark: matplotlib's name of "dots" and "rings" in a figure.
     """
 
     name: str
@@ -37,6 +40,11 @@ class Line:
     y: Array
     width: float = 1.4
     look: str = ""
+    mark: str = "D"
+
+    def has(self, word: str) -> bool:
+        """Whether ``look`` has this word."""
+        return word in self.look.split()
 
 
 @dataclass(frozen=True)
@@ -51,29 +59,76 @@ class Bars:
 
 @dataclass(frozen=True)
 class Panel:
-    """One set of axes.
+    """A set of axes with lines or bars.
 
     Attributes:
         title: what it shows, with the unit.
         lines: in the order in which they are drawn.
         along: title of the horizontal axis.
         scale: 0 for linear, -1 for logarithmic, else linear up to this size and logarithmic beyond.
-        edges: horizontal lines at these heights, such as bounds.
-        met: whether what is at 1 or below is met, which is marked.
-        least: (low, high) that the vertical axis shows at least; empty for what the lines need.
+        across: -1 for a logarithmic horizontal axis, which only figures have.
+        edges: heights of horizontal lines, such as bounds.
+        beyond: (low, high) heights that are shaded, such as those past a limit; infinite at an open end.
+        met: whether a value of 1 or below is met, which is marked.
+        least: (low, high) that the vertical axis shows at least, or (low,); empty for what the lines need.
         bars: rows of bars in place of lines.
         ticks: marks along the bottom.
+        stages: (from, to, text) along the horizontal axis: bands, and what stands above them.
+        end: (x, text) of a vertical line; empty for none.
+        note: stands beside the title.
     """
 
     title: str
     lines: tuple[Line, ...] = ()
     along: str = ""
     scale: float = 0.0
+    across: float = 0.0
     edges: tuple[float, ...] = ()
+    beyond: tuple[tuple[float, float], ...] = ()
     met: bool = False
     least: tuple[float, ...] = ()
     bars: tuple[Bars, ...] = ()
     ticks: tuple[float, ...] = ()
+    stages: tuple[tuple[float, float, str], ...] = ()
+    end: tuple[float, str] | tuple[()] = ()
+    note: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the panel as ``charts.js`` reads it, without what it does not use."""
+        drawn, shared = [], list[Array]()
+        for group in by_abscissa(self.lines):
+            x, columns = thin(group[0].x, np.stack([line.y for line in group], axis=1), POINTS)
+            for line, y in zip(group, columns.T, strict=True):
+                values = rounded(y) if self.scale else differences(y)
+                entry = {"x": len(shared), "y": values, "c": line.colour, "w": line.width, "l": line.look}
+                drawn.append({**entry, "n": line.name})
+            shared.append(x)
+        found = {
+            "title": f"{self.title}, {self.note}" if self.note else self.title,
+            "lines": [{key: value for key, value in line.items() if value != ""} for line in drawn],
+            "x": [differences(x) for x in shared],
+            "along": self.along,
+            "scale": self.scale,
+            "edges": [number for number in map(float, self.edges) if math.isfinite(number)],
+            "beyond": [rounded(np.array(band)) for band in self.beyond],
+            "met": self.met,
+            "least": list(self.least),
+            "bars": [[bar.name, bar.colour, [list(span) for span in bar.spans], bar.note] for bar in self.bars],
+            "ticks": rounded(np.array(self.ticks)),
+            "stages": [[*rounded(np.array(stage[:2])), stage[2]] for stage in self.stages],
+            "end": list(self.end),
+        }
+        return {key: value for key, value in found.items() if value}
+
+
+@dataclass(frozen=True)
+class Key:
+    """An entry of the legend; ``look`` and ``mark`` as of a ``Line``, or "shade" for an area; a line has no mark."""
+
+    name: str
+    colour: str
+    look: str = ""
+    mark: str = ""
 
 
 @dataclass(frozen=True)
@@ -81,73 +136,65 @@ class Chart:
     """Panels side by side, row after row.
 
     Attributes:
-        name: what a figure with the same content is called.
-        alt: says what it shows.
+        name: of the figure's files.
+        alt: what it shows, for those who cannot see it.
         panels: None is an empty place.
         columns: panels in a row.
-        keys: (name, colour) of what the colours mean.
+        keys: what the colours mean.
+        tables: the numbers that it shows, for its CSV file.
+        height: [in] of a row in a figure.
+        widths: of the columns in a figure, relative; empty for equal ones.
+        points: largest number of samples of a line in a figure, about.
     """
 
     name: str
     alt: str
     panels: tuple[Panel | None, ...]
     columns: int = 1
-    keys: tuple[tuple[str, str], ...] = ()
+    keys: tuple[Key, ...] = ()
+    tables: tuple[Table, ...] = ()
+    height: float = 1.75
+    widths: tuple[float, ...] = ()
+    points: int = 700
 
     def to_json(self) -> dict[str, Any]:
-        """What ``curves.js`` reads."""
-        panels = [None if panel is None else panel_data(panel) for panel in self.panels]
-        return {"panels": panels, "columns": self.columns, "keys": [list(key) for key in self.keys]}
+        """Return the chart as ``charts.js`` reads it."""
+        panels = [panel and panel.to_json() for panel in self.panels]
+        return {"panels": panels, "columns": self.columns, "keys": [[key.name, key.colour] for key in self.keys]}
 
 
 def lines(x: Array, columns: Array, names: Sequence[str], colours: Sequence[str], **look: Any) -> tuple[Line, ...]:
-    """A line for each column of (rows, k), all over the same x, thinned together."""
-    over, values = thin(x, columns, POINTS)
+    """Return a line for each column of (rows, k), all over the same x."""
     return tuple(
-        Line(name, colour, over, values[:, k], **look)
+        Line(name, colour, x, columns[:, k], **look)
         for k, (name, colour) in enumerate(zip(names, colours, strict=False))
     )
 
 
-def panel_data(panel: Panel) -> dict[str, Any]:
-    """A panel in JSON; what it does not use is left out."""
-    shared: list[Array] = []
-    found = []
-    for line in panel.lines:
-        place = next((n for n, x in enumerate(shared) if x is line.x), len(shared))
-        if place == len(shared):
-            shared.append(line.x)
-        values = rough(line.y) if panel.scale else fine(line.y)
-        entry = {"x": place, "y": values, "c": line.colour, "w": line.width, "l": line.look, "n": line.name}
-        found.append({key: value for key, value in entry.items() if value != ""})
-    bars = [[bar.name, bar.colour, [list(span) for span in bar.spans], bar.note] for bar in panel.bars]
-    asked = {
-        "title": panel.title,
-        "lines": found,
-        "x": [fine(x) for x in shared],
-        "along": panel.along,
-        "scale": panel.scale,
-        "edges": [number for number in map(float, panel.edges) if math.isfinite(number)],
-        "met": panel.met,
-        "least": list(panel.least),
-        "bars": bars,
-        "ticks": rough(np.array(panel.ticks)),
-    }
-    return {key: value for key, value in asked.items() if value}
+def by_abscissa(drawn: Sequence[Line]) -> Iterator[list[Line]]:
+    """Yield neighbouring lines that share one x, which are thinned together."""
+    group: list[Line] = []
+    for line in drawn:
+        if group and line.x is not group[0].x:
+            yield group
+            group = []
+        group.append(line)
+    if group:
+        yield group
 
 
-def rough(values: Array) -> list[float | None]:
-    """Numbers with ``DIGITS`` significant digits; null for one that is not finite."""
+def rounded(values: Array) -> list[float | None]:
+    """Return numbers with ``DIGITS`` significant digits; null for one that is not finite."""
     return [float(f"{value:.{DIGITS - 1}e}") if math.isfinite(value) else None for value in values.tolist()]
 
 
-def fine(values: Array) -> Any:
-    """Differences in whole steps of one size, ``{"q": step, "d": [...]}``: small once compressed; or ``rough``."""
-    reach = float(np.ptp(values)) if values.size else 0.0
-    if not math.isfinite(reach) or reach == 0:
-        return rough(values)
-    step = float(f"{reach / STEPS:.2e}")
+def differences(values: Array) -> Any:
+    """Return ``{"q": step, "d": [...]}``, differences in whole steps, small once compressed; or ``rounded`` numbers."""
+    span = float(np.ptp(values)) if values.size else 0.0
+    if not math.isfinite(span) or span == 0:
+        return rounded(values)
+    step = float(f"{span / RESOLUTION:.2e}")
     whole = np.round(values / step) if step > 0 else np.full(values.shape, np.inf)
     if not np.all(np.abs(whole) < 2**53):
-        return rough(values)
+        return rounded(values)
     return {"q": step, "d": np.diff(whole, prepend=0.0).astype(np.int64).tolist()}

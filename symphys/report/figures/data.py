@@ -3,7 +3,7 @@
 Every figure of a report is a ``DataFigure``. Where something is drawn, ``keep`` keeps its numbers, thinned where they
 are drawn thinned; ``table`` makes the CSV file beside the SVG from them. A column belongs to the nearest column of
 time, work or knots to its left, which lines over the same times share. Bounds, limits and instants are lists by
-themselves. Below the end of what a column holds it is empty.
+themselves. Columns of different length are filled up with empty cells.
 """
 
 from __future__ import annotations
@@ -15,13 +15,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from symphys.types import Array
+from symphys.types import Array, Ints
 
 Column = Array | Sequence[str] | Sequence[float]
 """Numbers, or words."""
+Table = Mapping[str, Column]
+"""Columns by name, with the unit, ``"ball.position.x [m]"``; the first is what the others are over."""
 TIME = "time [s]"
 
 
@@ -34,19 +36,14 @@ class DataFigure(Figure):
     """
 
     def __init__(self, **look: Any) -> None:
-        """See matplotlib's Figure; nothing is kept yet."""
+        """Take the arguments of matplotlib's ``Figure``."""
         super().__init__(**look)
         self.blocks: list[dict[str, list[Any]]] = []
 
 
-def keep(axes: Axes, columns: Mapping[str, Column]) -> None:
-    """Keep numbers that a panel shows; a figure of another kind keeps none.
-
-    Args:
-        axes: the panel.
-        columns: by name, with the unit, ``"ball.position.x [m]"``; the first is what the others are over.
-    """
-    figure = axes.get_figure(root=True)
+def keep(where: Artist, columns: Table) -> None:
+    """Keep numbers that a figure shows, or one of its panels; a figure of another kind keeps none."""
+    figure = where.get_figure(root=True)
     if not isinstance(figure, DataFigure):
         return
     named = {name: plain(column) for name, column in columns.items()}
@@ -61,20 +58,49 @@ def keep(axes: Axes, columns: Mapping[str, Column]) -> None:
             into[unused(name, into)] = column
 
 
+def thin(time: Array, columns: Array, points: int = 700) -> tuple[Array, Array]:
+    """Keep at most about ``points`` samples of (rows, k): the lowest and highest value of every stretch."""
+    if len(time) <= points:
+        return time, columns
+    chosen = kept_rows(columns, points)
+    return time[chosen], columns[chosen]
+
+
+def thinned(columns: Table, points: int) -> Table:
+    """Keep at most about ``points`` rows of a table of numbers, as ``thin`` does; all of one with words."""
+    first, *others = (np.asarray(column) for column in columns.values())
+    if len(first) <= points or first.dtype.kind == "U":
+        return columns
+    chosen = kept_rows(np.stack(others or [first], axis=1).astype(float), points)
+    return {name: np.asarray(column)[chosen] for name, column in columns.items()}
+
+
+def kept_rows(columns: Array, points: int) -> Ints:
+    """Return the indices of the first, the last, and the extreme rows of every stretch of (rows, k) numbers."""
+    rows = len(columns)
+    stretches = np.array_split(np.arange(rows), max(points // (2 * columns.shape[1]), 30))
+    filled = np.nan_to_num(columns, nan=0.0, posinf=0.0, neginf=0.0)
+    kept = {0, rows - 1}
+    for stretch in stretches:
+        part = filled[stretch]
+        kept.update(int(i) for i in stretch[np.concatenate([part.argmin(axis=0), part.argmax(axis=0)])])
+    return np.array(sorted(kept))
+
+
 def plain(column: Column) -> list[Any]:
-    """Python's own numbers, or words."""
+    """Return numbers as Python's own, or words."""
     words = isinstance(next(iter(column), None), str)
     return list(column) if words else np.asarray(column).tolist()
 
 
 def vector(name: str, unit: str, values: Array, components: str = "xyz") -> dict[str, Array]:
-    """The columns of (rows, k) values: ``ball.position.x [m]``, ..."""
+    """Return the columns of (rows, k) values by name: ``ball.position.x [m]``, ..."""
     end = f" [{unit}]" if unit else ""
     return {f"{name}.{component}{end}": values[:, k] for k, component in enumerate(components)}
 
 
 def table(figure: DataFigure) -> str:
-    """The text of the CSV file: a header, then numbers in full precision, "nan" where one is not known."""
+    """Write the text of the CSV file: a header, then numbers in full precision, "nan" where one is not known."""
     names: dict[str, None] = {}
     for block in figure.blocks:
         for name in block:
@@ -88,7 +114,7 @@ def table(figure: DataFigure) -> str:
 
 
 def unused(name: str, names: Mapping[str, Any]) -> str:
-    """The name, with a number behind it where there is one such already."""
+    """Return the name, with a number behind it where it is taken already."""
     count, found = 1, name
     while found in names:
         count += 1
@@ -97,10 +123,10 @@ def unused(name: str, names: Mapping[str, Any]) -> str:
 
 
 def written(value: Any) -> str:
-    """A number by the fewest digits that give it again, or a word."""
+    """Write a number with the fewest digits that give it again, or a word."""
     return printable(value) if isinstance(value, str) else repr(int(value) if isinstance(value, bool) else value)
 
 
 def printable(text: str) -> str:
-    """The text in one line, without what a file of text cannot hold."""
+    """Return the text in one line, without what a text file cannot hold."""
     return "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text)

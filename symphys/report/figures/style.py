@@ -96,7 +96,7 @@ SETTINGS: Any = {
 }
 
 
-CLOSE, LEAST = 1e-9, 1e-50
+RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-9, 1e-50
 """Numbers on an axis count as equal where they differ by less than this share of their size, or by less than this."""
 
 
@@ -112,7 +112,7 @@ class Picture:
 
 @contextmanager
 def paper() -> Iterator[None]:
-    """The settings under which figures are made and saved; all others are matplotlib's defaults."""
+    """Yield the settings under which figures are made and saved; all others are matplotlib's defaults."""
     with warnings.catch_warnings(), matplotlib.rc_context():
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         matplotlib.rcdefaults()
@@ -121,12 +121,12 @@ def paper() -> Iterator[None]:
 
 
 def picture(name: str, alt: str, figure: DataFigure | None) -> list[Picture]:
-    """A figure as texts of SVG and CSV that depend on its content alone; nothing for no figure."""
+    """Return a figure as texts of SVG and CSV that depend on its content alone; nothing for no figure."""
     return [] if figure is None else [Picture(name, alt, svg_text(figure), table(figure))]
 
 
 def svg_text(figure: Figure) -> str:
-    """A figure as SVG text that depends on its content alone."""
+    """Return a figure as SVG text that depends on its content alone."""
     buffer = io.StringIO()
     # Figure.savefig gives the same, but lays the figure out and draws it a first time for nothing.
     canvas: Any = FigureCanvasSVG(figure)
@@ -145,12 +145,12 @@ def solver_marks(solvers: Iterable[str]) -> dict[str, tuple[str, str]]:
 
 
 def short(text: str, length: int = 38) -> str:
-    """A name cut to what a figure has room for."""
+    """Return a name cut to what a figure has room for."""
     return text if len(text) <= length else text[: length - 1] + "\N{HORIZONTAL ELLIPSIS}"
 
 
 def number_label(value: float, _position: int = 0) -> str:
-    """A tick's label: powers of ten only where they are shorter."""
+    """Return a tick's label: powers of ten only where they are shorter."""
     return writing.show(value, 4).replace("1 × 10", "10") if value else "0"  # noqa: RUF001
 
 
@@ -172,31 +172,20 @@ def scale_of(values: Array) -> float:
     return -1.0 if (known > 0).all() else float(max(np.quantile(sizes, 0.1), sizes.max() * 1e-6))
 
 
-def fit_scale(axes: Axes, which: str, values: Array) -> None:
-    """The axis that ``scale_of`` says."""
-    scale = scale_of(values)
-    if scale == 0:
-        set_linear(axes, which)
-    elif scale < 0:
-        set_log(axes, which, values[np.isfinite(values)])
-    else:
-        set_symlog(axes, which, scale)
-
-
 def axis_of(axes: Axes, which: str) -> matplotlib.axis.Axis:
-    """The x or y axis."""
+    """Return the x or y axis."""
     return axes.xaxis if which == "x" else axes.yaxis
 
 
 def set_linear(axes: Axes, which: str, ticks: int = 5) -> None:
-    """A linear axis with at most about ``ticks`` ticks, at round numbers."""
+    """Set a linear axis with at most about ``ticks`` ticks, at round numbers."""
     axis = axis_of(axes, which)
     axis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10]))
     axis.set_major_formatter(FuncFormatter(number_label))
 
 
 def set_log(axes: Axes, which: str, values: Array) -> None:
-    """A logarithmic axis whose ticks suit the decades that it covers."""
+    """Set a logarithmic axis whose ticks suit the decades that it covers."""
     axes.set(**{f"{which}scale": "log"})
     axis = axis_of(axes, which)
     positive = values[values > 0]
@@ -207,7 +196,7 @@ def set_log(axes: Axes, which: str, values: Array) -> None:
 
 
 def set_symlog(axes: Axes, which: str, linear: float) -> None:
-    """A symmetric logarithmic axis, linear up to a power of ten near ``linear``."""
+    """Set a symmetric logarithmic axis, linear up to a power of ten near ``linear``."""
     threshold = 10.0 ** np.ceil(np.log10(linear))
     transform = {"value": "symlog", "linthresh": threshold, "linscale": 0.5}
     (axes.set_xscale if which == "x" else axes.set_yscale)(**transform)
@@ -220,34 +209,20 @@ def set_symlog(axes: Axes, which: str, linear: float) -> None:
 
 
 def apart(low: Array, high: Array) -> tuple[Array, Array]:
-    """The lowest and highest corners (k,) of a box; those of a larger one about it where an axis sees only a point.
+    """Return the corners (k,) of a box, or of a larger one about it where an axis would see only a point.
 
-    That is a box whose sides are all below ``CLOSE`` of its coordinates. The larger one takes a fifth of these, or 1.
+    That is where all sides are below ``RELATIVE_TOLERANCE`` of the coordinates. The larger box takes a fifth of these,
+    or 1.
     """
     size = float(max(np.abs(low).max(), np.abs(high).max()))
-    if float((high - low).max()) > max(CLOSE * size, LEAST):
+    if float((high - low).max()) > max(RELATIVE_TOLERANCE * size, ABSOLUTE_TOLERANCE):
         return low, high
-    middle, half = low + (high - low) / 2, 0.1 * size if size > LEAST else 0.5
+    middle, half = low + (high - low) / 2, 0.1 * size if size > ABSOLUTE_TOLERANCE else 0.5
     return middle - half, middle + half
 
 
-def thin(time: Array, columns: Array, points: int = 700) -> tuple[Array, Array]:
-    """At most about ``points`` samples of (rows, k) that keep the lowest and highest value of every stretch."""
-    rows = len(time)
-    if rows <= points:
-        return time, columns
-    stretches = np.array_split(np.arange(rows), max(points // (2 * columns.shape[1]), 30))
-    filled = np.nan_to_num(columns, nan=0.0, posinf=0.0, neginf=0.0)
-    keep = {0, rows - 1}
-    for stretch in stretches:
-        part = filled[stretch]
-        keep.update(int(i) for i in stretch[np.concatenate([part.argmin(axis=0), part.argmax(axis=0)])])
-    chosen = np.array(sorted(keep))
-    return time[chosen], columns[chosen]
-
-
 def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    """One legend for all panels, in a row above them."""
+    """Draw one legend for all panels, in a row above them."""
     figure.legend(handles, labels, loc="outside upper left", ncols=min(len(labels), 8), borderaxespad=0.2)
 
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from symphys.interrupts import Interrupts
-from symphys.report.making.page import AUTO, PageFault, attempt, fitting_kinds, is_light
-from symphys.report.making.pool import make_run_pages
+from symphys.report.making.run_pages import AUTO, PageFault, attempt, fitting_kinds, is_light, make_run_pages
 from symphys.report.making.stamps import BATCH_PAGE, FULL, LIGHT, batch_digest, folder_digest, is_current
 from symphys.report.pages.batch import write_batch_report
 from symphys.report.pages.identification import identification_folders, write_identification_page
@@ -19,13 +18,13 @@ from symphys.results.text_files import ReportError
 
 MOST_NAMED = 3
 
-Told = Callable[[int], None]
+Progress = Callable[[int], None]
 """Receives how many pages of runs are done; all of them: that of the batch begins."""
 
 
 @dataclass(frozen=True)
 class MadePages:
-    """What came of it.
+    """The pages that were made, and those that could not be.
 
     Attributes:
         page: that of the batch; of a single run folder its own. It is not new where ``faults`` names it.
@@ -84,7 +83,7 @@ def make_pages(
     wanted: WantedPages,
     kind: str = AUTO,
     jobs: int = 1,
-    tell: Told = lambda _: None,
+    tell: Progress = lambda _: None,
     limit: float = math.inf,
 ) -> MadePages:
     """Make the pages of runs, then that of the batch, which links to them.
@@ -130,8 +129,8 @@ def make_pages(
     return MadePages(index, made, light, tuple(found), wanted.kept)
 
 
-def report(folder: str | Path, pages: str = AUTO, jobs: int = 1, remake: bool = False) -> Path:
-    """Make the report of a run folder, or of all runs below a folder. Also called as ``symphys.report``.
+def write_report(folder: str | Path, pages: str = AUTO, jobs: int = 1, remake: bool = False) -> Path:
+    """Make the report of a run folder, or of all runs below a folder.
 
     Pages are made that are missing, or made from other files or by other code than there are now.
 
@@ -148,12 +147,12 @@ def report(folder: str | Path, pages: str = AUTO, jobs: int = 1, remake: bool = 
         its own, report.html.
 
     Raises:
-        ReportError: there is no such folder, it holds no run folder, or a page cannot be made; all others are then.
+        SymphysError: there is no such folder, it holds no run folder, or a page cannot be made; all others are then.
 
     Example:
         >>> import symphys
         >>> solution = symphys.solve("ball_throw", "least_squares", backend="casadi", folder="reports")
-        >>> symphys.report("reports").name
+        >>> symphys.write_report("reports").name
         'index.html'
     """
     identified = identification_folders(Path(folder))

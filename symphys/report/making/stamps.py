@@ -53,7 +53,7 @@ STAMP = re.compile(rb'<meta name="made-from" content="(full|light) ([0-9a-f]{64}
 
 @dataclass(frozen=True)
 class Stamp:
-    """What a page says of itself.
+    """The kind of a page, a checksum of what it was made from, and its figures.
 
     Attributes:
         kind: "full" or "light".
@@ -66,11 +66,11 @@ class Stamp:
     figures: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        """As it stands in the page."""
+        """Return the stamp as it stands in the page."""
         return " ".join([self.kind, self.digest, *self.figures])
 
     def beside(self, figures: Iterable[str]) -> Stamp:
-        """The same of a page with these figures."""
+        """Return the stamp of a page with these figures."""
         return replace(self, figures=tuple(figures))
 
 
@@ -84,7 +84,7 @@ def is_current(page: Path, digest: str, kinds: Iterable[str] = (FULL,)) -> bool:
 
 
 def read_stamp(page: Path) -> Stamp | None:
-    """The stamp of a page; None where there is no page, or none with a stamp."""
+    """Read the stamp of a page; None where there is no page, or none with a stamp."""
     try:
         if not stat.S_ISREG(page.stat().st_mode):
             return None
@@ -99,7 +99,7 @@ def read_stamp(page: Path) -> Stamp | None:
 
 
 def folder_digest(folder: Path) -> str:
-    """Of a folder's path, of the names and contents of the files in it but its pages, and of the drawing code."""
+    """Return the checksum of a folder's path, of the files in it but its pages, and of the drawing code."""
     found = hashlib.sha256(f"{drawing_digest()} {folder.resolve()}".encode(errors="surrogateescape"))
     try:
         with os.scandir(folder) as inside:
@@ -114,7 +114,7 @@ def folder_digest(folder: Path) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """Of a file's content; of what is no file, or cannot be read, only that."""
+    """Return the checksum of a file's content, or a word for what is no file or cannot be read."""
     try:
         mode = path.stat().st_mode
         if not stat.S_ISREG(mode):
@@ -126,7 +126,7 @@ def file_digest(path: Path) -> str:
 
 
 def batch_digest(root: Path) -> str:
-    """Of a batch: of its run folders, and of which have a page that it links to.
+    """Return the checksum of a batch: its run folders, and which of them have a page.
 
     Raises:
         ReportError: there is no such folder.
@@ -141,7 +141,7 @@ def batch_digest(root: Path) -> str:
 
 @cache
 def drawing_digest() -> str:
-    """Of the sources that take part in a page, and of the versions of Python, matplotlib and numpy."""
+    """Return the checksum of the code that draws pages, and of the versions of Python, matplotlib and numpy."""
     found = hashlib.sha256(f"{sys.version} {mpl.__version__} {np.__version__}".encode())
     for path in sorted(each for name in DRAWING for each in sources(PACKAGE / name)):
         found.update(f"\0{path.relative_to(PACKAGE)}\0{file_digest(path)}".encode())
@@ -149,5 +149,5 @@ def drawing_digest() -> str:
 
 
 def sources(path: Path) -> list[Path]:
-    """A module, or those of a room and what its pages hold."""
+    """Return a module, or those of a room and what its pages hold."""
     return [path] if path.is_file() else [each for each in path.rglob("*") if each.suffix in SOURCES]

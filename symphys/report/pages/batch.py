@@ -5,30 +5,32 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
 from symphys import files
 from symphys.findings import writing
 from symphys.findings.verdict import ACCEPTED
+from symphys.report.charts.convergence import convergence_chart
+from symphys.report.charts.drawing import chart_pictures
 from symphys.report.figures import style
-from symphys.report.figures.checks import MOST_CHECKS, MOST_DOTS, draw_checks, ratios
-from symphys.report.figures.convergence import draw_convergence
+from symphys.report.figures.data import Column, DataFigure, keep
 from symphys.report.figures.style import Picture, write_figures
 from symphys.report.making.stamps import BATCH_PAGE, FULL, Stamp, batch_digest
 from symphys.report.pages import comparison
-from symphys.report.pages.brief import BriefReader, with_trace
-from symphys.report.pages.comparison import page_links
+from symphys.report.pages.comparison import page_links, run_card, study_card
 from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag
-from symphys.report.pages.rows import run_card, study_card
+from symphys.report.pages.run import read_motions
 from symphys.report.robots.strip import draw_strip
 from symphys.report.scene.animation import NUMBERS, animation
 from symphys.report.scene.motion import draw_motion
 from symphys.results.discovery import Entry, Study, read_all, sample, studies
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.file_names import FIGURES, GUESS, SCENE, TRAJECTORY
-from symphys.results.run import Run
-from symphys.results.scene import Scene, read_scene
+from symphys.results.file_names import FIGURES
+from symphys.results.run import BriefReader, Run, with_trace
 from symphys.results.text_files import ReportError
-from symphys.results.trajectories import POSES, read_trajectory
-from symphys.trajectory import Trajectory
+from symphys.types import Array
 
 PAGE = BATCH_PAGE
 UNMADE = "0" * 64
@@ -78,7 +80,7 @@ def write_batch_report(batch_dir: Path, unmade: Mapping[Path, str] | None = None
 
 
 def unmade_card(root: Path, unmade: Mapping[Path, str]) -> Html:
-    """The runs whose pages could not be made, and why; nothing without any."""
+    """Return the runs whose pages could not be made, and why; nothing without any."""
     named = list(unmade.items())[: comparison.MOST_BROKEN]
     rows = [[tag("code", folder.relative_to(root).as_posix()), why] for folder, why in named]
     more = f" The first {len(named)} of {len(unmade)}." if len(named) < len(unmade) else ""
@@ -93,7 +95,7 @@ def build_tables(found: Sequence[Study]) -> list[Html]:
 
 
 def build_studies(found: Sequence[Study], root: Path) -> list[Html]:
-    """The problems one after the other; with links to each and headings where there are several."""
+    """Return the problems one after the other; with links to each and headings where there are several."""
     if not found:
         return []
     names = anchors(found)
@@ -110,17 +112,17 @@ def build_studies(found: Sequence[Study], root: Path) -> list[Html]:
 
 
 def linked(study: Study) -> str:
-    """The title, with the settings that tell it from another study of the same problem."""
+    """Return the title, with the settings that tell it from another study of the same problem."""
     return f"{study.title}, {study.settings}" if study.settings else study.title
 
 
 def name_of(folder: Path) -> str:
-    """The folder's own name, whatever path it was given by."""
+    """Return the folder's own name, whatever path it was given by."""
     return folder.resolve().name or "this folder"
 
 
 def anchors(found: Sequence[Study]) -> list[str]:
-    """A file-name stem and anchor for each study, all different."""
+    """Return a file-name stem and anchor for each study, all different."""
     names: list[str] = []
     for study in found:
         name, count = slug(study.problem), 1
@@ -132,7 +134,7 @@ def anchors(found: Sequence[Study]) -> list[str]:
 
 
 def build_study(study: Study, root: Path, numbers: int, anchor: str, curves: int, every: Html | None = None) -> Html:
-    """Everything about one problem.
+    """Make the section of one problem.
 
     Args:
         study: the problem's runs, read for tables.
@@ -146,7 +148,7 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, curves: int
     whole = Study(few.problem, few.place, tuple(Entry(e.solver, tuple(map(with_trace, e.runs))) for e in few.entries))
     moved, played = best_motion(study.best, anchor, numbers)
     with style.paper():
-        converged = style.picture(f"{anchor}-convergence", "Objective and errors", draw_convergence(drawable(whole)))
+        converged = chart_pictures([convergence_chart(f"{anchor}-convergence", drawable(whole))])
         checked = style.picture(f"{anchor}-checks", "Errors against tolerances", draw_checks(study))
     write_figures(root / FIGURES, converged + checked + moved)
     best = study.best
@@ -171,32 +173,19 @@ def build_study(study: Study, root: Path, numbers: int, anchor: str, curves: int
 
 
 def best_motion(run: Run, anchor: str, numbers: int) -> tuple[list[Picture], Html]:
-    """Pictures of the motion of a run, and its animation; in its place why there is none, which ends no page."""
+    """Draw the motion of a run, and play it; or say why there is none, which ends no page."""
     try:
-        motion, guess, scene = read_motion(run)
+        recording = read_motions(run.folder)
+        motion, scene, guess = recording.trajectory, recording.scene, recording.guess
+        if motion is None:
+            return [], tag("p", f"There is no motion to draw: {recording.faults[0]}.")
         played = animation(motion, scene, guess, numbers)
         with style.paper():
             drawn = style.picture(f"{anchor}-strip", "The motion at even times", draw_strip(motion, scene))
             drawn += style.picture(f"{anchor}-motion", "Path and poses over time", draw_motion(motion, scene, guess))
-    except ReportError as error:
-        return [], tag("p", f"There is no motion to draw: {error}.")
     except Exception as error:  # what one run has recorded must not take the page of all with it
         return [], tag("p", f"The motion could not be drawn: {type(error).__name__}: {error}.")
     return drawn, played
-
-
-def read_motion(run: Run) -> tuple[Trajectory, Trajectory | None, Scene]:
-    """Motion, guess and scene of a run; ReportError where there is no motion."""
-    motion = read_trajectory(run.folder / TRAJECTORY)
-    try:
-        scene = read_scene(run.folder / SCENE)
-    except ReportError:
-        scene = Scene()
-    try:
-        guess = read_trajectory(run.folder / GUESS, POSES)
-    except ReportError:
-        guess = None
-    return motion, guess, scene
 
 
 def targets(study: Study, pictures: list[Picture]) -> Html:
@@ -237,3 +226,104 @@ def provenance(runs: Sequence[Run]) -> Html:
         ]
     )
     return card("Where this comes from", content)
+
+
+MOST_CHECKS = 16
+MOST_DOTS = 200
+"""Seeds of a solver that are drawn as dots, at most."""
+LOWEST, HIGHEST = 1e-3, 1e4
+"""Ratios are drawn between these at most; beyond them stands an arrow."""
+
+Ratios = dict[str, dict[str, Array]]
+
+
+def ratios(study: Study) -> Ratios:
+    """Error / tolerance by check and solver, one per seed; nan counts as inf."""
+    found: dict[str, dict[str, list[float]]] = {}
+    for run in study.runs:
+        for check in run.checks:
+            ratio = np.inf if np.isnan(check.ratio) else check.ratio
+            found.setdefault(check.name, {}).setdefault(run.solver, []).append(ratio)
+    return {name: {key: np.array(seeds) for key, seeds in solvers.items()} for name, solvers in found.items()}
+
+
+def shown_checks(found: Ratios) -> list[str]:
+    """Return the checks that get a row: all, or those with the largest medians, in the file's order."""
+    worst = {name: max(float(np.median(seeds)) for seeds in solvers.values()) for name, solvers in found.items()}
+    kept = set(sorted(worst, key=lambda name: -worst[name])[:MOST_CHECKS])
+    return [name for name in found if name in kept]
+
+
+def draw_checks(study: Study) -> DataFigure | None:
+    """Draw a row for each check, a lane for each solver: dots for seeds, a mark for their median, a line at 1."""
+    found = ratios(study)
+    if not found:
+        return None
+    names = shown_checks(found)
+    marks = style.solver_marks(entry.solver for entry in study.entries)
+    lane = 0.15
+    row = max(lane * len(marks) + 0.16, 0.36)
+    figure = DataFigure(figsize=(style.WIDTH, 1.15 + row * len(names)), layout="constrained")
+    axes = figure.subplots()
+    low, high = limits(found)
+    dress(axes, names, low, high)
+    for place, name in enumerate(names):
+        for order, solver in enumerate(marks):
+            if solver in found[name]:
+                height = place + (order - (len(marks) - 1) / 2) * lane / row
+                draw_lane(axes, height, np.clip(found[name][solver], low, high), marks[solver], (low, high))
+    keep_ratios(axes, sample(study, MOST_DOTS), names)
+    handles = [Line2D([], [], color=c, marker=m, linestyle="none", markersize=6) for c, m in marks.values()]
+    style.legend_above(figure, handles, [style.short(name, 20) for name in marks])
+    return figure
+
+
+def keep_ratios(axes: Axes, study: Study, names: list[str]) -> None:
+    """Keep the errors of every run in these checks."""
+    rows = [(name, run, check) for name in names for run in study.runs for check in run.checks if check.name == name]
+    columns: dict[str, Column] = {
+        "check": [name for name, _, _ in rows],
+        "solver": [run.solver for _, run, _ in rows],
+        "seed": [run.seed for _, run, _ in rows],
+        "error": [check.error for _, _, check in rows],
+        "tolerance": [check.tolerance for _, _, check in rows],
+        "error / tolerance": [check.ratio for _, _, check in rows],
+    }
+    keep(axes, columns)
+
+
+def limits(found: Ratios) -> tuple[float, float]:
+    """Return the range of the axis: whole decades around the ratios and 1."""
+    every = np.concatenate([seeds for solvers in found.values() for seeds in solvers.values()])
+    positive = every[np.isfinite(every) & (every > 0)]
+    low = 10 ** np.floor(np.log10(min(positive.min(initial=1.0), 0.3)))
+    high = 10 ** np.ceil(np.log10(max(positive.max(initial=1.0), 3.0)))
+    return float(np.clip(low, LOWEST, 0.1)), float(np.clip(high, 10.0, HIGHEST))
+
+
+def dress(axes: Axes, names: list[str], low: float, high: float) -> None:
+    """Name the rows, and draw the logarithmic axis and the tolerance at 1."""
+    axes.set_yticks(range(len(names)), [style.short(name, 46) for name in names])
+    axes.tick_params(axis="y", labelcolor=style.INK, labelsize=8.5)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.grid(visible=False, axis="y")
+    for border in range(1, len(names)):
+        axes.axhline(border - 0.5, color=style.GRID, linewidth=0.7)
+    style.set_log(axes, "x", np.array([low, high]))
+    axes.set_xlim(low / 1.3, high * 1.3)
+    axes.axvspan(low / 1.3, 1, color=style.MET, linewidth=0, zorder=0.5)
+    axes.axvline(1, color=style.GREEN, linewidth=1, linestyle=(0, (4, 2)), zorder=1)
+    axes.set_xlabel("error / tolerance (met at 1 or below)")
+
+
+def draw_lane(axes: Axes, height: float, seeds: Array, mark: tuple[str, str], ends: tuple[float, float]) -> None:
+    """Draw the seeds of one solver in one check."""
+    colour, marker = mark
+    middle = float(np.median(seeds))
+    if seeds.size > 1:
+        axes.plot([seeds.min(), seeds.max()], [height, height], color=colour, linewidth=0.8, alpha=0.4, zorder=2)
+        dots = seeds[np.linspace(0, seeds.size - 1, min(seeds.size, MOST_DOTS)).round().astype(int)]
+        axes.plot(dots, np.full(dots.size, height), "o", color=colour, markersize=3, alpha=0.35, zorder=2.5)
+    face = colour if middle <= 1 else "white"
+    beyond = {ends[0]: "<", ends[1]: ">"}
+    axes.plot(middle, height, beyond.get(middle, marker), color=colour, markerfacecolor=face, markersize=6, zorder=3)

@@ -4,19 +4,39 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+from matplotlib.lines import Line2D
+
 from symphys import files
 from symphys.findings.writing import percent, show
+from symphys.report.charts.chart import Chart, Key, Line, Panel
+from symphys.report.charts.drawing import chart_pictures
 from symphys.report.figures import style
-from symphys.report.figures.closed_loop import draw_commands, draw_latencies, draw_plans
-from symphys.report.pages import motion, sections
-from symphys.report.pages.joints import gait_card, joint_card
-from symphys.report.pages.markup import Html, banner, card, facts, figures, join, page, pill, stats, table, tag
+from symphys.report.figures.data import TIME, DataFigure, keep, thin
+from symphys.report.pages.markup import (
+    Html,
+    banner,
+    card,
+    facts,
+    join,
+    named_figure,
+    page,
+    pill,
+    stats,
+    table,
+    tag,
+)
+from symphys.report.pages.motion import gait_card, joint_card, motion_card, motion_pictures
 from symphys.results.closed_loop import ClosedLoopRecord, read_closed_loop
 from symphys.results.file_names import FIGURES, SCENE, TRAJECTORY
 from symphys.results.scene import read_scene
 from symphys.results.trajectories import read_trajectory
+from symphys.types import Array
 
-ENOUGH = 0.99
+MOST_PANELS = 6
+BINS = 60
+"""Of the histogram of latencies."""
+MIN_IN_TIME = 0.99
 """Share of ticks in time that counts as keeping up."""
 LATE = (
     "A plan acts from the moment it is ready. Until then the plan before goes on. While the solver works, ticks are "
@@ -32,17 +52,12 @@ def write_closed_loop_page(folder: Path) -> Path:
     """
     record = read_closed_loop(folder)
     trajectory, scene = read_trajectory(folder / TRAJECTORY), read_scene(folder / SCENE)
+    pictures = motion_pictures(trajectory, scene)
+    charts = [plans_chart(record), commands_chart(record)]
     with style.paper():
-        pictures = motion.draw(trajectory, scene)
-        made = style.picture("plans", "Plans and what happened, over time", draw_plans(record))
-        made += style.picture("commands", "Commands over time", draw_commands(record))
-        made += style.picture("latencies", "How long plans took", draw_latencies(record))
+        made = chart_pictures(charts) + style.picture("latencies", "How long plans took", draw_latencies(record))
     pictures |= {picture.name: picture for picture in made}
     style.write_figures(folder / FIGURES, pictures.values())
-
-    def drawn(name: str) -> Html:
-        return figures([pictures[name]]) if name in pictures else Html("")
-
     body = join(
         [
             tag("p", f"Closed loop · {record.problem}", class_="kicker"),
@@ -50,10 +65,10 @@ def write_closed_loop_page(folder: Path) -> Path:
             verdict(record),
             numbers(record),
             card("Targets", targets(record), anchor="checks", note="Of the plant, at the end of the closed loop."),
-            sections.motion(trajectory, scene, None, pictures, ()),
-            card("Plans and what happened", drawn("plans"), anchor="plans"),
-            card("Commands", drawn("commands"), anchor="commands"),
-            card("Latency", drawn("latencies"), anchor="latency", note=LATE),
+            motion_card(trajectory, scene, None, pictures, ()),
+            card("Plans and what happened", named_figure(pictures, "plans"), anchor="plans"),
+            card("Commands", named_figure(pictures, "commands"), anchor="commands"),
+            card("Latency", named_figure(pictures, "latencies"), anchor="latency", note=LATE),
             joint_card(trajectory, scene, pictures),
             gait_card(trajectory, scene, pictures),
             card("Setting", setting(record), anchor="provenance"),
@@ -65,7 +80,7 @@ def write_closed_loop_page(folder: Path) -> Path:
 
 
 def verdict(record: ClosedLoopRecord) -> Html:
-    """Whether the task is done, and whether plans came in time."""
+    """Say whether the task is done, and whether plans came in time."""
     if record.stopped:
         title, level = f"Stopped after {show(record.duration, 3)} s: {record.stopped}", "bad"
     elif not record.targets:
@@ -75,7 +90,7 @@ def verdict(record: ClosedLoopRecord) -> Html:
     else:
         missed = ", ".join(target.name for target in record.targets if not target.met)
         title, level = f"Not met at the end: {missed}", "bad"
-    if level == "good" and record.share < ENOUGH:
+    if level == "good" and record.share < MIN_IN_TIME:
         level = "fair"
     period = 1e3 / record.rate
     sentence = (
@@ -117,7 +132,7 @@ def targets(record: ClosedLoopRecord) -> Html:
 
 
 def setting(record: ClosedLoopRecord) -> Html:
-    """How it was made."""
+    """Show the settings of the controller and of the plant."""
     plans = f"{show(record.horizon, 4)} s ahead in steps of {show(record.dt, 4)} s, {record.iterations} iteration"
     between = "answer what is measured, by the gains of the plan" if record.feedback else "as planned"
     counted = {"measured": "the wall time of the solver", "cpu": "the processor time of the solver"}
@@ -130,3 +145,79 @@ def setting(record: ClosedLoopRecord) -> Html:
             ("Evaluated by", f"{record.evaluator}, threads {record.threads}"),
         ]
     )
+
+
+def plans_chart(record: ClosedLoopRecord) -> Chart | None:
+    """Chart what happened, with what some plans predicted; the quantities that move most."""
+    shown = most_varied(record.actual)
+    if not shown or not len(record.plan_time):
+        return None
+    panels, tables = list[Panel](), []
+    for column in shown:
+        name, drawn = record.value_names[column], list[Line]()
+        for k, (time, value) in enumerate(zip(record.plan_time, record.plan_value[:, :, column], strict=True), 1):
+            drawn.append(Line("", style.VERMILION, time, value, 0.9, "plain"))
+            drawn.append(Line("", style.VERMILION, time[:1], value[:1], look="points"))
+            tables.append({f"plan {k} {TIME}": time, f"plan {k} {name}": value})
+        drawn.append(Line(name, style.INK, record.actual_time, record.actual[:, column], 1.8))
+        tables.append({TIME: record.actual_time, name: record.actual[:, column]})
+        panels.append(Panel(name, tuple(drawn), TIME))
+    keys = Key("what happened", style.INK), Key("plans, from where they began", style.VERMILION)
+    return Chart("plans", "Plans and what happened, over time", tuple(panels), 1, keys, tuple(tables), 1.7)
+
+
+def commands_chart(record: ClosedLoopRecord) -> Chart | None:
+    """Chart what acted on the plant over time."""
+    panels, tables = list[Panel](), []
+    for column in most_varied(record.command):
+        name, values = record.command_names[column], record.command[:, column]
+        panels.append(Panel(name, (Line(name, style.BLUE, record.command_time, values, 1.2, "steps"),), TIME))
+        tables.append({TIME: record.command_time, name: values})
+    alt = "Commands over time"
+    return Chart("commands", alt, tuple(panels), tables=tuple(tables), height=1.5) if panels else None
+
+
+def draw_latencies(record: ClosedLoopRecord) -> DataFigure | None:
+    """Draw how long plans took: a histogram with the period of a tick, and over time."""
+    if not len(record.latency):
+        return None
+    figure = DataFigure(figsize=(style.WIDTH, 2.9), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    wall, work, period = (1e3 * each for each in (record.latency, record.work, np.array(1 / record.rate)))
+    edges = bin_edges(np.concatenate([wall, work, [float(period)]]))
+    for numbers, colour, name in ((wall, style.BLUE, "wall time"), (work, style.ORANGE, "processor time")):
+        counts, _ = np.histogram(numbers, edges)
+        left.stairs(counts, edges, color=colour, linewidth=1.3)
+        keep(left, {f"{name} from [ms]": edges[:-1], f"{name} plans": counts})
+        time, value = thin(record.asked, numbers[:, None])
+        right.plot(time, value[:, 0], ".", color=colour, markersize=2.5)
+        keep(right, {f"{name} at {TIME}": time, f"{name} [ms]": value[:, 0]})
+    for axes, along in ((left, left.axvline), (right, right.axhline)):
+        along(float(period), color=style.VERMILION, linewidth=1.0, linestyle=(0, (4, 2)))
+        which = "x" if axes is left else "y"
+        style.set_log(axes, which, edges)
+    left.set_title("Plans by the time they took")
+    left.set_xlabel("[ms]")
+    style.set_symlog(left, "y", 1.0)
+    style.set_linear(right, "x", 6)
+    right.set_title("Time that each plan took [ms]")
+    right.set_xlabel(TIME)
+    handles = [Line2D([], [], color=colour) for colour in (style.BLUE, style.ORANGE)]
+    handles.append(Line2D([], [], color=style.VERMILION, linestyle=(0, (4, 2))))
+    style.legend_above(figure, handles, ["wall time", "processor time", "a tick"])
+    return figure
+
+
+def most_varied(values: Array) -> list[int]:
+    """Return the indices of the columns of (rows, k) values that vary most, in their order."""
+    if not values.size:
+        return []
+    spread = np.ptp(values, axis=0)
+    return sorted(int(k) for k in np.argsort(-spread, kind="stable")[:MOST_PANELS])
+
+
+def bin_edges(numbers: Array) -> Array:
+    """Return the edges of bins that are equally wide on a logarithmic axis."""
+    known = numbers[np.isfinite(numbers) & (numbers > 0)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (1.0, 1.0)
+    return np.geomspace(low / 1.05, high * 1.05, BINS + 1)

@@ -1,19 +1,22 @@
-"""The words and tables that compare solvers on a batch page."""
+"""Words and tables that compare solvers and runs on the page of a batch."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from urllib.parse import quote
 
+from symphys import files
 from symphys.findings import writing
 from symphys.findings.verdict import BEST_FOUND, DOUBTED
 from symphys.findings.writing import show
 from symphys.report.figures import style
 from symphys.report.making.stamps import RUN_PAGE
 from symphys.report.pages import words
-from symphys.report.pages.markup import ICONS, Html, banner, card, dot, join, pill, table, tag
+from symphys.report.pages.markup import ICONS, Html, banner, card, dot, embedded, join, pill, table, tag
 from symphys.results.discovery import Entry, Study, middle
 from symphys.results.result import CheckRecord, smoothed
 from symphys.results.run import Run
@@ -26,11 +29,12 @@ NOTHING_TO_MEET = (
     "The problem states nothing to meet, and no solver converged: what was found is the best of what was tried."
 )
 
-Column = tuple[str, Callable[[Run], float], Callable[[float], str]]
+Measure = tuple[str, Callable[[Run], float], Callable[[float], str]]
+"""A numeric column of the table of solvers: its title, how a run has it, and how it is written."""
 
 
 def summary(found: Sequence[Study], broken: Sequence[Run]) -> str:
-    """How many runs of how many are solved."""
+    """Say how many runs are solved."""
     runs = [run for study in found for run in study.runs]
     solved = sum(run.solved for run in runs)
     text = f"{solved} of {writing.several(len(runs), 'run')} solved"
@@ -46,7 +50,7 @@ def summary(found: Sequence[Study], broken: Sequence[Run]) -> str:
 
 
 def study_verdict(study: Study) -> Html:
-    """A banner: which solvers solved it, and which with the least work and time."""
+    """Return a banner: which solvers solved it, and which with the least work and time."""
     entries = [entry for entry in study.entries if any(run.status != "not_applicable" for run in entry.runs)]
     full = [entry for entry in entries if entry.solved == len(entry.runs)]
     none = [entry for entry in entries if entry.solved == 0]
@@ -61,7 +65,7 @@ def study_verdict(study: Study) -> Html:
 
 
 def doubted(runs: Sequence[Run]) -> str:
-    """Which runs met everything by a motion that is not to be relied on, and why the first of them is not."""
+    """Name the runs that met everything by a motion that is not to be relied on, with the reasons of the first."""
     if not runs:
         return ""
     why = "; ".join(runs[0].doubts)
@@ -73,7 +77,7 @@ def doubted(runs: Sequence[Run]) -> str:
 
 
 def tally(entries: Sequence[Entry], full: Sequence[Entry], none: Sequence[Entry]) -> str:
-    """Solvers by how many of their seeds are solved."""
+    """Name the solvers by how many of their seeds are solved."""
     seeds = max((len(entry.runs) for entry in entries), default=0)
     if len(entries) == len(full):
         some = {1: entries[0].solver if entries else "", 2: "Both solvers"}
@@ -89,10 +93,10 @@ def tally(entries: Sequence[Entry], full: Sequence[Entry], none: Sequence[Entry]
 
 
 def thrift(study: Study) -> str:
-    """The solver with the least work and the one with the least time, among those that solved every run."""
+    """Return the solver with the least work and the one with the least time, among those that solved every run."""
     full = [entry for entry in study.entries if entry.solved == len(entry.runs)]
     work = {e.solver: e.median([run.equivalents for run in e.runs]) for e in full}
-    time = {e.solver: e.median([run.seconds.get("solve", math.nan) for run in e.runs]) for e in full}
+    time = {e.solver: e.median([solve_time(run) for run in e.runs]) for e in full}
     work, time = ({k: v for k, v in numbers.items() if math.isfinite(v)} for numbers in (work, time))
     if len(full) < 2 or not work or not time:
         return ""
@@ -101,9 +105,9 @@ def thrift(study: Study) -> str:
     return f"{least}; fastest: {quick}, {words.seconds(time[quick])}."
 
 
-def columns(study: Study) -> list[Column]:
-    """The numeric columns; those that no run uses are left out."""
-    fixed: list[Column] = [
+def columns(study: Study) -> list[Measure]:
+    """Return the numeric columns; those that no run uses are left out."""
+    fixed: list[Measure] = [
         ("objective", lambda run: run.objective, lambda v: show(v, 4)),
         ("largest error / tolerance", lambda run: run.worst_ratio, lambda v: show(v, 3)),
         ("rollouts", lambda run: run.counts.get("rollouts", math.nan), words.count),
@@ -115,13 +119,18 @@ def columns(study: Study) -> list[Column]:
     return [
         *fixed,
         ("work in rollouts", lambda run: run.equivalents, lambda v: words.count(round(v, 1))),
-        ("solve", lambda run: run.seconds.get("solve", math.nan), words.seconds),
-        ("build", built, words.seconds),
+        ("solve", solve_time, words.seconds),
+        ("build", build_time, words.seconds),
     ]
 
 
-def built(run: Run) -> float:
-    """[s] before the solve: build and compile."""
+def solve_time(run: Run) -> float:
+    """Return the time [s] of the solve."""
+    return run.seconds.get("solve", math.nan)
+
+
+def build_time(run: Run) -> float:
+    """Return the time [s] before the solve: build and compile."""
     return run.seconds.get("build", math.nan) + run.seconds.get("compile", 0.0)
 
 
@@ -129,7 +138,7 @@ LEAST_IS_BEST = ("work in rollouts", "solve")
 
 
 def solver_table(study: Study) -> Html:
-    """A row for each solver, medians over its seeds."""
+    """Return a row for each solver, medians over its seeds."""
     marks = style.solver_marks(entry.solver for entry in study.entries)
     shown = columns(study)
     medians = [[entry.median([read(run) for run in entry.runs]) for _, read, _ in shown] for entry in study.entries]
@@ -147,14 +156,14 @@ def solver_table(study: Study) -> Html:
 
 
 def least(study: Study, numbers: Sequence[float]) -> float:
-    """The smallest number among solvers that solved every run, if there are two to compare."""
+    """Return the smallest number among solvers that solved every run, if there are two to compare."""
     full = [n for entry, n in zip(study.entries, numbers, strict=True) if entry.solved == len(entry.runs)]
     known = [n for n in full if math.isfinite(n)]
     return min(known) if len(known) > 1 else math.nan
 
 
 def seeds(entry: Entry) -> Html:
-    """A chip for each run, linked to its page if there is one; of many runs how many ended in which way."""
+    """Return a chip for each run, linked to its page if there is one; of many runs how many ended in which way."""
     if len(entry.runs) > MOST_CHIPS:
         counted = Counter(map(words.level, entry.runs))
         chips = [pill(level, str(counted[level])) for level in ICONS if counted[level]]
@@ -163,7 +172,7 @@ def seeds(entry: Entry) -> Html:
 
 
 def seed_chip(run: Run) -> Html:
-    """A seed with the sign of how its run ended."""
+    """Return a seed with the sign of how its run ended."""
     level = words.level(run)
     content = join([tag("i", ICONS[level], aria_hidden="true"), str(run.seed)])
     label = f"{run.solver}, seed {run.seed}: {words.headline(run).lower()}"
@@ -174,7 +183,7 @@ def seed_chip(run: Run) -> Html:
 
 
 def page_link(run: Run) -> str:
-    """Where the page of a run is, seen from that of the batch; empty if there is none."""
+    """Return the address of a run's page, seen from that of the batch; empty if there is none."""
     if not (run.folder / RUN_PAGE).is_file():
         return ""
     place = f"{run.place}/{RUN_PAGE}" if run.place not in ("", ".") else RUN_PAGE
@@ -182,12 +191,12 @@ def page_link(run: Run) -> str:
 
 
 def page_links(runs: Sequence[Run]) -> dict[str, str]:
-    """``page_link`` by the places of runs."""
+    """Return the addresses of the pages of runs, by their places."""
     return {run.place: page_link(run) for run in runs}
 
 
 def statuses(entry: Entry) -> Html:
-    """How the runs ended; with counts where they differ."""
+    """Say how the runs ended, with counts where they differ."""
     counted = Counter(words.came_to(run) for run in entry.runs)
     if len(counted) == 1:
         return join(list(counted))
@@ -195,7 +204,7 @@ def statuses(entry: Entry) -> Html:
 
 
 def table_note(study: Study) -> str:
-    """How the table is read."""
+    """Explain the table of solvers."""
     text = "Work counts a rollout as 1 and each derivative by its measured price. Build includes compiling."
     if any(len(entry.runs) > 1 for entry in study.entries):
         text = "Medians over seeds that gave a number. " + text
@@ -203,7 +212,7 @@ def table_note(study: Study) -> str:
 
 
 def smoothing_note(study: Study) -> str:
-    """Which runs used stages of smoothing, and which; nothing where none did."""
+    """Name the runs that used stages of smoothing, and the stages; empty where none did."""
     used: dict[str, list[str]] = {}
     for entry in study.entries:
         for widths in dict.fromkeys(stages_of(run) for run in entry.runs if smoothed(run.stages)):
@@ -217,12 +226,12 @@ def smoothing_note(study: Study) -> str:
 
 
 def stages_of(run: Run) -> str:
-    """The smoothing of its stages."""
+    """Return the smoothing of its stages."""
     return writing.listed([show(stage.smoothing) for stage in run.stages])
 
 
 def convergence_note(study: Study, curves: int) -> str:
-    """The caption: what the figure does not show; ``curves``: runs of a solver that it shows at most."""
+    """Return the caption: what the figure does not show; ``curves``: runs of a solver that it shows at most."""
     most = max(len(entry.runs) for entry in study.entries)
     some = f"Drawn are {curves} of up to {most} runs of a solver, evenly among the seeds. " if most > curves else ""
     marked = any(len(entry.runs) > 1 for entry in study.entries)
@@ -234,7 +243,7 @@ def convergence_note(study: Study, curves: int) -> str:
 
 
 def checks_by_solver(study: Study) -> dict[tuple[str, str], list[CheckRecord]]:
-    """The checks of all seeds, by their name and the solver."""
+    """Return the checks of all seeds, by their name and the solver."""
     found: dict[tuple[str, str], list[CheckRecord]] = {}
     for run in study.runs:
         for check in run.checks:
@@ -243,7 +252,7 @@ def checks_by_solver(study: Study) -> dict[tuple[str, str], list[CheckRecord]]:
 
 
 def check_cell(found: Sequence[CheckRecord]) -> Html:
-    """The median error of one check for one solver, and how many seeds met it."""
+    """Return the median error of one check for one solver, and how many seeds met it."""
     if not found:
         return Html(writing.DASH)
     met = sum(check.met for check in found)
@@ -265,3 +274,155 @@ def broken_card(broken: Sequence[Run]) -> Html:
         table(["folder", "why"], rows, "tt", "Broken folders"),
         note=f"Started and not finished, half written, or made by something else.{more}",
     )
+
+
+PER_PAGE = 25
+MOST_KEYS = 8
+"""Settings that have a column of their own, at most; with more of them all stand in one."""
+DIGITS = 6
+HOW_SHOWN = (
+    "A click on a heading sorts. The filter takes words that a row has, and comparisons such as objective<0.1 or "
+    "seed=12; where a heading has several words, they are joined by _."
+)
+
+
+@dataclass(frozen=True)
+class NumberColumn:
+    """Numbers; nan is shown as a dash."""
+
+    title: str
+    values: Sequence[float]
+
+    def to_json(self) -> dict[str, object]:
+        """Return the column as ``rows.js`` reads it."""
+        return {"title": self.title, "kind": "number", "of": [short(value) for value in self.values]}
+
+
+@dataclass(frozen=True)
+class WordColumn:
+    """Words, most of which recur; ``levels``: of the words that are drawn as a pill."""
+
+    title: str
+    values: Sequence[str]
+    levels: Mapping[str, str] | None = None
+
+    def to_json(self) -> dict[str, object]:
+        """Return each word once, and the index of the word of each row."""
+        known = {word: place for place, word in enumerate(dict.fromkeys(self.values))}
+        data: dict[str, object] = {"title": self.title, "kind": "word", "words": list(known)}
+        data["of"] = [known[word] for word in self.values]
+        return data if self.levels is None else data | {"levels": [self.levels[word] for word in known]}
+
+
+@dataclass(frozen=True)
+class LinkColumn:
+    """Links to pages, all called the same; empty where there is none."""
+
+    title: str
+    text: str
+    links: Sequence[str]
+
+    def to_json(self) -> dict[str, object]:
+        """Return the column as ``rows.js`` reads it."""
+        return {"title": self.title, "kind": "link", "text": self.text, "of": list(self.links)}
+
+
+Column = NumberColumn | WordColumn | LinkColumn
+
+
+def short(value: float) -> float | int | str | None:
+    """Return a number as JSON has it, with ``DIGITS`` digits; infinite ones as words, null for nan."""
+    if not math.isfinite(value):
+        return None if math.isnan(value) else ("inf" if value > 0 else "-inf")
+    if value == int(value) and abs(value) < 2**53:
+        return int(value)
+    return float(f"{value:.{DIGITS - 1}e}")
+
+
+def row_table(columns: Sequence[Column], noun: str) -> Html:
+    """Return the place of a table, and its rows; ``noun``: what a row is."""
+    data = {"columns": [column.to_json() for column in columns], "noun": noun, "page": PER_PAGE}
+    return tag(
+        "div",
+        tag("p", "The table needs JavaScript; result.json of each run folder has its numbers.", class_="note"),
+        embedded(json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)),
+        class_="rows",
+    )
+
+
+def run_card(found: Sequence[Study], links: Mapping[str, str]) -> Html:
+    """Return the table of all runs; ``links``: pages by the places of runs."""
+    pairs = [(study, run) for study in found for run in study.runs]
+    runs = [run for _, run in pairs]
+    status = [words.headline(run) for run in runs]
+    levels = {text: words.level(run) for text, run in zip(status, runs, strict=True)}
+    columns: list[Column] = []
+    if len({study.problem for study in found}) > 1:
+        columns.append(WordColumn("problem", [study.problem for study, _ in pairs]))
+    columns += setting_columns([run.settings for run in runs])
+    columns += [
+        WordColumn("solver", [run.solver for run in runs]),
+        NumberColumn("seed", [run.seed for run in runs]),
+        WordColumn("verdict", status, levels),
+        NumberColumn("objective", [run.objective for run in runs]),
+        NumberColumn("error / tolerance", [run.worst_ratio for run in runs]),
+        *output_columns(runs),
+        NumberColumn("rollouts", [run.counts.get("rollouts", math.nan) for run in runs]),
+        NumberColumn("work in rollouts", [run.equivalents for run in runs]),
+        NumberColumn("solve [s]", [solve_time(run) for run in runs]),
+        LinkColumn("page", "open", [links.get(run.place, "") for run in runs]),
+    ]
+    return card("All runs", row_table(columns, "run"), anchor="runs", note=HOW_SHOWN)
+
+
+def output_columns(runs: Sequence[Run]) -> list[Column]:
+    """Return the reported quantities that any run has, if they are few."""
+    names = dict.fromkeys(name for run in runs for name in run.outputs)
+    if len(names) > MOST_KEYS:
+        return []
+    return [NumberColumn(name, [run.outputs.get(name, math.nan) for run in runs]) for name in names]
+
+
+def setting_columns(settings: Sequence[Mapping[str, object]]) -> list[Column]:
+    """Return a column for each setting, or one for all where they are many; none where no run has any."""
+    keys = sorted({key for each in settings for key in each})
+    if len(keys) > MOST_KEYS:
+        return [WordColumn("settings", [", ".join(f"{k}={written(v)}" for k, v in each.items()) for each in settings])]
+    found: list[Column] = []
+    for key in keys:
+        values = [each.get(key) for each in settings]
+        numeric = all(value is None or type(value) in (int, float) for value in values)
+        if numeric:
+            found.append(NumberColumn(key, [math.nan if value is None else float(value) for value in values]))  # type: ignore[arg-type]
+        else:
+            found.append(WordColumn(key, ["" if value is None else written(value) for value in values]))
+    return found
+
+
+def written(value: object) -> str:
+    """Return a setting as it is typed."""
+    return value if isinstance(value, str) else json.dumps(files.strict(value))
+
+
+def study_card(found: Sequence[Study], links: Mapping[str, str], most: int) -> Html:
+    """Return the table of problems and settings that are too many for a section each."""
+    entries = [(study, entry) for study in found for entry in study.entries]
+    studies = [study for study, _ in entries]
+    best = [Study(study.problem, study.place, (entry,)).best for study, entry in entries]
+    columns: list[Column] = [
+        WordColumn("problem", [study.problem for study in studies]),
+        *setting_columns([study.runs[0].settings for study in studies]),
+        WordColumn("solver", [entry.solver for _, entry in entries]),
+        NumberColumn("runs", [len(entry.runs) for _, entry in entries]),
+        NumberColumn("solved", [entry.solved for _, entry in entries]),
+        NumberColumn("objective", [entry.median([run.objective for run in entry.runs]) for _, entry in entries]),
+        NumberColumn("lowest objective", [run.objective for run in best]),
+        NumberColumn("work in rollouts", [entry.median([r.equivalents for r in entry.runs]) for _, entry in entries]),
+        NumberColumn("solve [s]", [entry.median([solve_time(run) for run in entry.runs]) for _, entry in entries]),
+        LinkColumn("best run", "open", [links.get(run.place, "") for run in best]),
+    ]
+    note = (
+        f"A row for each problem, its settings, and solver; medians over seeds. With more than {most} problems and "
+        "settings the page has no figures: “symphys report” of one of their folders makes its own page."
+    )
+    return card("Problems and settings", row_table(columns, "row"), anchor="studies", note=note)

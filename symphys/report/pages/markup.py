@@ -5,14 +5,15 @@ from __future__ import annotations
 import base64
 import hashlib
 import html
+import json
 import re
-from collections.abc import Iterable, Sequence
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from urllib.parse import quote
 
 from symphys.report.charts.chart import Chart
-from symphys.report.charts.packed import pack, pack_json
 from symphys.report.figures.style import Picture
 from symphys.report.making.stamps import Stamp
 from symphys.results.file_names import FIGURES
@@ -49,14 +50,14 @@ def join(parts: Iterable[Part]) -> Html:
 
 
 def tag(name: str, /, *children: Part, **attributes: str | None) -> Html:
-    """An element. ``class_`` stands for class, ``_`` for a hyphen; an attribute that is None is left out."""
+    """Return an element. ``class_`` stands for class, ``_`` for a hyphen; an attribute that is None is left out."""
     pairs = [(key.rstrip("_").replace("_", "-"), value) for key, value in attributes.items() if value is not None]
     opening = "".join([name, *(f' {key}="{html.escape(value)}"' for key, value in pairs)])
     return Html(f"<{opening}>" if name in VOID else f"<{opening}>{join(children)}</{name}>")
 
 
 def card(title: str, *children: Part, anchor: str | None = None, note: Part = "") -> Html:
-    """A section with a heading; nothing if there is nothing in it."""
+    """Return a section with a heading; nothing if there is nothing in it."""
     body = [child for child in children if child]
     if not body:
         return Html("")
@@ -65,7 +66,7 @@ def card(title: str, *children: Part, anchor: str | None = None, note: Part = ""
 
 
 def table(header: Sequence[Part], rows: Iterable[Sequence[Part]], kinds: str, label: str = "") -> Html:
-    """A table; ``kinds`` has one letter a column: ``t`` for text, ``n`` for a number."""
+    """Return a table; ``kinds`` has one letter a column: ``t`` for text, ``n`` for a number."""
     classes = ["number" if kind == "n" else None for kind in kinds]
     head = [tag("th", cell, class_=kind, scope="col") for cell, kind in zip(header, classes, strict=True)]
     body = [tag("tr", *(tag("td", cell, class_=kind) for cell, kind in zip(row, classes, strict=True))) for row in rows]
@@ -74,19 +75,19 @@ def table(header: Sequence[Part], rows: Iterable[Sequence[Part]], kinds: str, la
 
 
 def pill(level: str, text: str) -> Html:
-    """A short coloured word with a sign, so that colour is never alone."""
+    """Return a short coloured word with a sign, so that colour is never alone."""
     return tag("span", tag("i", ICONS[level], aria_hidden="true"), text, class_=f"pill {level}")
 
 
 def banner(level: str, title: str, *sentences: str) -> Html:
-    """A coloured box with a sign, a title and what there is to say."""
+    """Return a coloured box with a sign, a title and what there is to say."""
     lines = [tag("p", sentence) for sentence in sentences if sentence]
     sign = tag("span", ICONS[level], class_="sign", aria_hidden="true")
     return tag("div", sign, tag("div", tag("b", title), *lines), class_=f"verdict {level}")
 
 
 def dot(colour: str) -> Html:
-    """A spot of a solver's or body's colour."""
+    """Return a spot of a solver's or body's colour."""
     return tag("span", class_="dot", style=f"background:{colour}", aria_hidden="true")
 
 
@@ -102,8 +103,13 @@ def figures(pictures: Iterable[Drawn], caption: Part = "") -> Html:
     return join(parts)
 
 
+def named_figure(pictures: Mapping[str, Drawn], name: str, caption: Part = "") -> Html:
+    """Embed the picture of that name, if it was made."""
+    return figures([pictures[name]] if name in pictures else [], caption)
+
+
 def figure(picture: Picture) -> Html:
-    """A picture embedded in the page, with links to its files, which lie in a folder beside the page."""
+    """Return a picture embedded in the page, with links to its files, which lie in a folder beside the page."""
     code = base64.b64encode(picture.svg.encode()).decode("ascii")
     svg, data = (f"{FIGURES}/{quote(picture.name)}.{kind}" for kind in ("svg", "csv"))
     links = tag("figcaption", tag("a", "SVG", href=svg), " ", tag("a", "CSV", href=data, title="the numbers drawn"))
@@ -111,13 +117,24 @@ def figure(picture: Picture) -> Html:
 
 
 def chart(found: Chart) -> Html:
-    """The place of a chart, and its numbers, compressed."""
-    data = tag("script", Html(pack_json(found.to_json())), type="application/json", class_=PACKED)
-    return tag("figure", tag("div", role="img", aria_label=found.alt), data, class_="chart", data_name=found.name)
+    """Return the place of a chart, and its numbers, compressed."""
+    place = tag("div", role="img", aria_label=found.alt)
+    return tag("figure", place, packed_json(found.to_json()), class_="chart", data_name=found.name)
+
+
+def pack(text: str) -> str:
+    """Compress a text: base64 of a zlib stream, which ``unpack.js`` unpacks in the browser."""
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
+
+
+def packed_json(value: object) -> Html:
+    """Embed a value of strict JSON for scripts of a light page, compressed."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    return tag("script", Html(pack(text)), type="application/json", class_=PACKED)
 
 
 def embedded(data: str) -> Html:
-    """A text of JSON for scripts of the page, harmless in HTML whatever it holds."""
+    """Return a text of JSON for scripts of the page, harmless in HTML whatever it holds."""
     inert = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
     return tag("script", Html(inert), type="application/json")
 
@@ -128,18 +145,18 @@ def stats(pairs: Iterable[tuple[str, str]]) -> Html:
 
 
 def facts(pairs: Iterable[tuple[str, Part]]) -> Html:
-    """Names and values below each other; those without a value are left out."""
+    """Show names and values below each other; those without a value are left out."""
     rows = [join([tag("dt", key), tag("dd", value)]) for key, value in pairs if value]
     return tag("dl", *rows, class_="facts") if rows else Html("")
 
 
 def fold(title: str, text: str) -> Html:
-    """A long text behind a line that opens it; nothing for an empty one."""
+    """Return a long text behind a line that opens it; nothing for an empty one."""
     return tag("details", tag("summary", title), tag("pre", text)) if text.strip() else Html("")
 
 
 def page(title: str, body: Part, animated: bool = False, rows: bool = False, stamp: Stamp | None = None) -> str:
-    """The whole document: no part of it is loaded from elsewhere, and no script but our own may run.
+    """Return the whole document: no part of it is loaded from elsewhere, and no script but our own may run.
 
     ``animated``: whether it plays a motion; ``rows``: whether it has a table that is shown a page at a time; ``stamp``:
     what it was made from.
@@ -150,7 +167,7 @@ def page(title: str, body: Part, animated: bool = False, rows: bool = False, sta
 
 
 def light_page(title: str, body: Part, animated: bool, stamp: Stamp | None = None) -> str:
-    """The same with its scripts compressed, among them what draws charts."""
+    """Make a document whose scripts are compressed, among them the one that draws charts."""
     first, then, packed = light_scripts(animated)
     held = tag("script", Html(packed), type="text/plain", class_=PACKED, id="scripts")
     return document(title, body, join([held, tag("script", Html(first))]), [first, then], stamp)
@@ -158,13 +175,13 @@ def light_page(title: str, body: Part, animated: bool, stamp: Stamp | None = Non
 
 @cache
 def light_scripts(animated: bool) -> tuple[str, str, str]:
-    """What unpacks, what is unpacked, and that compressed."""
+    """Return the script that unpacks, the script that it unpacks, and the latter compressed."""
     then = squeezed(read_static(*(SCRIPTS if animated else ()), *CHARTS))
     return read_static(UNPACK), then, pack(then)
 
 
 def squeezed(script: str) -> str:
-    """The script without indentation and comments that end a line."""
+    """Return the script without indentation and comments that end a line."""
     return "\n".join(filter(None, (re.sub(r"(^|\s+)// [^\"'`]*$", "", line).strip() for line in script.split("\n"))))
 
 
@@ -192,5 +209,5 @@ def document(title: str, body: Part, scripts: Html, allowed: Sequence[str], stam
 
 
 def slug(text: str) -> str:
-    """A name that is safe as a file name and as an anchor."""
+    """Return a name that is safe as a file name and as an anchor."""
     return re.sub(r"[^a-z0-9_]+", "-", text.lower()).strip("-")[:60] or "unnamed"

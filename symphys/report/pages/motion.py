@@ -1,22 +1,50 @@
-"""A page with one motion: what ``symphys show`` writes."""
+"""What a page shows of a motion: played and drawn, with joints, gait, states, controls and contacts.
+
+``symphys show`` writes a page with a motion alone.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from symphys import files
-from symphys.findings.writing import show
-from symphys.report.figures import style
-from symphys.report.figures.contacts import draw_contacts
-from symphys.report.figures.states import draw_controls, draw_states
-from symphys.report.pages import sections
-from symphys.report.pages.joints import gait_card, joint_card, joint_pictures
-from symphys.report.pages.markup import card, figures, join, page, tag
+from symphys.findings.writing import listed, percent, several, show
+from symphys.report.charts.contacts import by_surfaces, shown_pairs
+from symphys.report.charts.drawing import chart_pictures
+from symphys.report.charts.motion import MOST_BODIES, controlled_bodies, motion_charts, shown_bodies
+from symphys.report.figures.style import Picture, paper, picture, write_figures
+from symphys.report.pages.markup import Drawn, Html, Part, card, figures, join, named_figure, page, pill, table, tag
+from symphys.report.robots.branches import is_large
+from symphys.report.robots.gait import LOADED_SHARE, stances, weight
+from symphys.report.robots.joint_charts import shown
+from symphys.report.robots.joint_use import Channel, channels, separation
+from symphys.report.robots.strip import draw_strip
+from symphys.report.scene.animation import animation, light_animation
 from symphys.report.scene.motion import draw_motion
 from symphys.results.file_names import FIGURES
 from symphys.results.scene import Scene, read_scene
+from symphys.results.scene_joints import SceneMotor
 from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory
+
+OFTEN_SATURATED = 0.25
+"""A motor that is saturated for this share of the time is marked in the table."""
+MOST_ROWS = 60
+MOST_NAMED = 4
+HEADER = ("joint", "moves over", "limits", "motor", "largest torque or force", "saturated")
+HOW_DRAWN = "Poses at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
+HOW_ROBOTS_DRAWN = (
+    "Whole poses, each most of a length further on, the later the stronger; lines are paths of base bodies and feet."
+)
+HOW_JOINTS_DRAWN = "Dots are joints, squares those that slide or hold fast; bars are the axes."
+HOW_STRIP_DRAWN = "At even times; the section shown follows what travels far."
+HOW_FORCED = (
+    "A force is the step's impulse over its duration, so an impact is a spike whose height grows as dt shrinks."
+)
 
 
 def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str = "Motion") -> Path:
@@ -38,40 +66,182 @@ def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str =
 
 
 def write_motion_page(trajectory: Trajectory, scene: Scene, out: Path, title: str = "Motion") -> Path:
-    """Write the page of a motion that is at hand; see ``write_motion``."""
-    with style.paper():
-        pictures = draw(trajectory, scene)
-    style.write_figures(out.parent / FIGURES, pictures.values())
+    """Write the page of a motion that is at hand; arguments and errors are those of ``write_motion``."""
+    pictures = motion_pictures(trajectory, scene)
+    write_figures(out.parent / FIGURES, pictures.values())
+    duration, steps = trajectory.time[-1] - trajectory.time[0], len(trajectory.time) - 1
+    bodies = several(len(trajectory.body_names), "body", "bodies")
     body = join(
         [
             tag("p", "Simulated motion", class_="kicker"),
             tag("h1", title),
-            tag("p", summary(trajectory), class_="lead"),
-            sections.motion(trajectory, scene, None, pictures, ()),
-            joint_card(trajectory, scene, pictures),
-            gait_card(trajectory, scene, pictures),
-            *(card(name, figures([pictures[key]])) for key, name in CARDS if key in pictures),
+            tag("p", f"{show(duration, 4)} s in {steps} steps; {bodies}.", class_="lead"),
+            motion_card(trajectory, scene, None, pictures, ()),
+            *motion_cards(trajectory, scene, pictures),
         ]
     )
     files.write_text(out, page(title, body, animated=True))
     return out
 
 
-CARDS = (("states", "States over time"), ("controls", "Controls"), ("contacts", "Contacts"))
+def motion_pictures(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> dict[str, Picture]:
+    """Draw every figure of a motion, by name; what it does not have is left out."""
+    with paper():
+        made = picture("motion", "Path and poses over time", draw_motion(trajectory, scene, guess))
+        alt = "The motion at even times, from the side and from above"
+        made += picture("strip", alt, draw_strip(trajectory, scene))
+        made += chart_pictures(motion_charts(trajectory, scene))
+    return {each.name: each for each in made}
 
 
-def draw(trajectory: Trajectory, scene: Scene) -> dict[str, style.Picture]:
-    """Every figure by name."""
-    made = style.picture("motion", "Path and poses over time", draw_motion(trajectory, scene))
-    made += joint_pictures(trajectory, scene)
-    made += style.picture("states", "Position, velocity and angular velocity over time", draw_states(trajectory))
-    made += style.picture("controls", "Forces and torques over time", draw_controls(trajectory))
-    made += style.picture("contacts", "Contact forces and gaps over time", draw_contacts(trajectory, scene))
-    return {picture.name: picture for picture in made}
+def motion_card(
+    trajectory: Trajectory | None,
+    scene: Scene,
+    guess: Trajectory | None,
+    pictures: Mapping[str, Drawn],
+    faults: Sequence[str],
+) -> Html:
+    """Show the motion played and drawn, or say why there is none; on a light page it is played only."""
+    notes = tag("p", "Not read: " + "; ".join(faults) + ".", class_="note") if faults else Html("")
+    if trajectory is None:
+        return card("The motion", tag("p", "This run recorded no motion."), notes, anchor="motion")
+    if "motion" not in pictures:
+        return card("The motion", light_animation(trajectory, scene, guess), notes, anchor="motion")
+    how = HOW_ROBOTS_DRAWN if is_large(trajectory, scene) else HOW_DRAWN
+    drawn = figures([pictures["motion"]], f"{how} {HOW_JOINTS_DRAWN}" if scene.joints else how)
+    strip = named_figure(pictures, "strip", HOW_STRIP_DRAWN)
+    return card("The motion", animation(trajectory, scene, guess), strip, drawn, notes, anchor="motion")
 
 
-def summary(trajectory: Trajectory) -> str:
-    """Duration, steps and bodies."""
-    duration = trajectory.time[-1] - trajectory.time[0]
-    steps, bodies = len(trajectory.time) - 1, len(trajectory.body_names)
-    return f"{show(duration, 4)} s in {steps} steps; {bodies} {'body' if bodies == 1 else 'bodies'}."
+def motion_cards(motion: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> list[Html]:
+    """Show joints, gait, states, controls and contacts over time."""
+    bodies, touching = len(motion.body_names), by_surfaces(motion)
+    states = shortened(len(shown_bodies(motion)), bodies, "bodies", "that move most")
+    controlled = len(controlled_bodies(motion))
+    acting = shortened(min(controlled, MOST_BODIES), controlled, "bodies", "that come first")
+    contacts = shortened(len(shown_pairs(touching)), len(touching.contact_names), "pairs", "with the largest impulses")
+    return [
+        joint_card(motion, scene, pictures),
+        gait_card(motion, scene, pictures),
+        card("States over time", named_figure(pictures, "states", states), anchor="states"),
+        card("Controls", named_figure(pictures, "controls", acting), anchor="controls"),
+        card("Contacts", named_figure(pictures, "contacts", f"{HOW_FORCED} {contacts}"), anchor="contacts"),
+    ]
+
+
+def shortened(shown: int, total: int, noun: str, which: str) -> str:
+    """Say what a figure leaves out; empty if nothing."""
+    return f"Shown are {shown} of {total} {noun}: those {which}." if shown < total else ""
+
+
+def joint_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> Html:
+    """Show the coordinates of joints and the torques of motors; empty without joints."""
+    every = channels(trajectory, scene)
+    drawn = [pictures[name] for name in ("joints", "motors") if name in pictures]
+    few = shown(every)
+    left_out = f"Drawn are {len(few)} of {len(every)} coordinates: those that move most." * (len(few) < len(every))
+    sentences = [motors_sentence(every), limits_sentence(every), separation_sentence(trajectory)]
+    return card(
+        "Joints",
+        tag("p", " ".join(filter(None, sentences))) if any(sentences) else "",
+        figures(drawn, left_out),
+        use_table(every),
+        anchor="joints",
+    )
+
+
+def motors_sentence(every: Sequence[Channel]) -> str:
+    """Say how many motors are saturated, and which most of all."""
+    driven = [channel for channel in every if channel.bound > 0]
+    full = sorted((c for c in driven if c.share > 0), key=lambda c: -c.share)
+    if not driven:
+        return ""
+    only = len(driven) == 1
+    if not full:
+        never = "The motor is never saturated: it" if only else "No motor is ever saturated: each"
+        return f"{never} could give more at all times."
+    if only:
+        return f"The motor of {full[0].name} is saturated for {percent(full[0].share)} of the time."
+    most = f"{full[0].name}, for {percent(full[0].share)} of the time"
+    verb = "is" if len(full) == 1 else "are"
+    which = "" if len(full) == 1 else "most of all "
+    return f"{len(full)} of {several(len(driven), 'motor')} {verb} saturated at some time, {which}{most}."
+
+
+def limits_sentence(every: Sequence[Channel]) -> str:
+    """Name the joints that reach their limits."""
+    names = [channel.name for channel in every if channel.at_limit]
+    if not names:
+        return ""
+    more = [f"{len(names) - MOST_NAMED} more"] if len(names) > MOST_NAMED else []
+    return f"{listed([*names[:MOST_NAMED], *more])} {'comes' if len(names) == 1 else 'come'} to a limit."
+
+
+def separation_sentence(trajectory: Trajectory) -> str:
+    """Say how far joints come apart."""
+    found = separation(trajectory)
+    if found is None:
+        return ""
+    where = f" ({found.joint} at t = {show(found.time)} s)" if found.most > 0 else ""
+    return f"Joints come apart by {show(found.rms, 2)} m (root mean square) and {show(found.most, 2)} m at most{where}."
+
+
+def use_table(every: Sequence[Channel]) -> Html:
+    """Return a row for each coordinate."""
+    rows = [use_row(channel) for channel in every[:MOST_ROWS]]
+    more = f"and {len(every) - MOST_ROWS} more, in trajectory.npz"
+    note = tag("p", more, class_="note") if len(every) > MOST_ROWS else ""
+    return join([table(HEADER, rows, "tttttt", "Joints"), note]) if rows else Html("")
+
+
+def use_row(channel: Channel) -> list[Part]:
+    """Return the cells of a coordinate."""
+    low, high = float(channel.value.min()), float(channel.value.max())
+    joint = channel.joint
+    bounded = math.isfinite(joint.lower) or math.isfinite(joint.upper)
+    return [
+        join([channel.name, Html(" "), tag("small", joint.kind)]),
+        f"{show(low)} to {show(high)} {channel.unit}",
+        f"{show(joint.lower)} to {show(joint.upper)}" if bounded else "",
+        "" if joint.motor is None else motor_words(joint.motor, channel),
+        f"{show(float(np.abs(channel.torque).max(initial=0.0)))} {channel.torque_unit}" if channel.driven else "",
+        share_words(channel),
+    ]
+
+
+def motor_words(motor: SceneMotor, channel: Channel) -> str:
+    """Write the kind of a motor and its bounds."""
+    speed = f", {show(motor.velocity)} {channel.unit}/s" if math.isfinite(motor.velocity) else ""
+    most = f", {show(motor.torque)} {channel.torque_unit}" if math.isfinite(motor.torque) else ""
+    return f"{motor.kind}{most}{speed}"
+
+
+def share_words(channel: Channel) -> Html:
+    """Write for how long a motor is saturated."""
+    if not channel.bound > 0:
+        return Html("")
+    if channel.share == 0:
+        return tag("small", "never")
+    return pill("fair", percent(channel.share)) if channel.share >= OFTEN_SATURATED else Html(percent(channel.share))
+
+
+def gait_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> Html:
+    """Show when each foot stands; empty where none comes down or leaves the ground."""
+    if "gait" not in pictures:
+        return Html("")
+    least = f"{percent(LOADED_SHARE)} of the weight of {show(weight(trajectory, scene))} N"
+    caption = f"A bar: the body carries more than {least}. The duty factor is the share of the time that it does."
+    figure = named_figure(pictures, "gait", caption)
+    return card("Gait", tag("p", steps_sentence(trajectory, scene)), figure, anchor="gait")
+
+
+def steps_sentence(trajectory: Trajectory, scene: Scene) -> str:
+    """Say how many bodies stand at once."""
+    found = stances(trajectory, scene)
+    at_once = np.sum([stance.stands for stance in found], axis=0)
+    most = int(at_once.max())
+    aloft = float((at_once == 0).mean())
+    air = f"; for {percent(aloft)} of the time none does" if aloft > 0 else ""
+    mean = show(float(at_once.mean()), 2)
+    stand = "stands" if most == 1 else "stand"
+    return f"{several(most, 'body', 'bodies')} at most {stand} at once, {mean} on average{air}."

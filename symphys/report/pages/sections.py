@@ -11,19 +11,33 @@ import numpy as np
 
 from symphys import json_values as values
 from symphys.findings import writing
-from symphys.findings.writing import show
+from symphys.findings.advice import advice, answers, findings, slopes
+from symphys.findings.endings import ending
+from symphys.findings.examination import Examination
+from symphys.findings.levels import MARKS, Judged
+from symphys.findings.physics import sliding
+from symphys.findings.writing import capital, show
+from symphys.report.charts.run import component_names, knotted
 from symphys.report.figures import style
-from symphys.report.figures.variables import component_names, knotted
 from symphys.report.pages import words
-from symphys.report.pages.markup import Drawn, Html, banner, card, facts, figures, fold, join, pill, stats, table, tag
-from symphys.report.robots.branches import is_large
-from symphys.report.scene.animation import animation, light_animation
+from symphys.report.pages.markup import (
+    Drawn,
+    Html,
+    banner,
+    card,
+    facts,
+    fold,
+    join,
+    named_figure,
+    pill,
+    stats,
+    table,
+    tag,
+)
 from symphys.results.case_name import settings_words
-from symphys.results.result import CheckRecord, Result, VariableRecord
+from symphys.results.result import CheckRecord, Result, StageRecord, VariableRecord, smoothed
 from symphys.results.run import Run
-from symphys.results.scene import Scene
 from symphys.results.trace import OUTPUT
-from symphys.trajectory import Trajectory
 from symphys.types import Array
 
 FOOTER = tag("footer", "Made by symphys from the files of the run folder; make it again with “symphys report”.")
@@ -40,12 +54,25 @@ LOG_TAIL = 20_000
 HOW_JUDGED = (
     "Judged by an exact rollout of the result, without smoothing. The bar ends at the error, the line is the tolerance."
 )
-HOW_DRAWN = "Poses at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
-HOW_ROBOTS_DRAWN = (
-    "Whole poses, each most of a length further on, the later the stronger; lines are paths of base bodies and feet."
+HOW_READ = (
+    "Each stage starts from the best point of the one before. “There” is at the stage's own smoothing, as the solver "
+    "saw it; “exact” is the same point in the exact rollout, which alone counts. The last point is the result, unless "
+    "an earlier one or the guess is worth more exactly."
 )
-HOW_JOINTS_DRAWN = "Dots are joints, squares those that slide or hold fast; bars are the axes."
-HOW_STRIP_DRAWN = "At even times; the section shown follows what travels far."
+NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder examines how far to trust it."
+ONLY_MOTION = (
+    "Only the motion was examined. “symphys check --at” this folder also examines its gradient, finer time steps and "
+    "the growth of changes."
+)
+HOW_FAR = "How far to trust this"
+HOW_GROWN = (
+    "By how much a small change of the state at time t is magnified until the end: distances in m, velocities in m/s, "
+    "turning at the bodies' radius of gyration; estimated from a few directions. Ticks: a contact begins."
+)
+HOW_BALANCED = (
+    "Potential energy is 0 at the origin. Angular momentum is not checked: where surfaces touched is not recorded."
+)
+HOW_REFINED = "The same variables, simulated otherwise: the answers, and in percent how much the gradients change."
 CHAPTERS = (
     ("checks", "Checks"),
     ("motion", "Motion"),
@@ -82,7 +109,7 @@ def header(run: Run, cards: Sequence[Html]) -> Html:
 
 
 def key_numbers(run: Run) -> Html:
-    """The strip of numbers below the verdict."""
+    """Return the strip of numbers below the verdict."""
     if not run.readable:
         return Html("")
     derivatives = [(kind, run.counts.get(kind, 0.0)) for kind in ("gradients", "jacobians", "hessians")]
@@ -91,7 +118,7 @@ def key_numbers(run: Run) -> Html:
         [
             ("Objective", show(run.objective)),
             ("Error / tolerance", show(run.worst_ratio)),
-            *((name[:1].upper() + name[1:], show(value)) for name, value in run.outputs.items()),
+            *((capital(name), show(value)) for name, value in run.outputs.items()),
             ("Rollouts", words.count(run.counts.get("rollouts", math.nan))),
             *used,
             *labelled(run),
@@ -101,7 +128,7 @@ def key_numbers(run: Run) -> Html:
 
 
 def labelled(run: Run) -> list[tuple[str, str]]:
-    """The numbers of a result whose definition has a label."""
+    """Return the numbers of a result whose definition has a label."""
     found = []
     for each in dataclasses.fields(Result):
         if "label" in each.metadata:
@@ -139,12 +166,12 @@ def checks(run: Run) -> Html:
 
 
 def joined(number: str, unit: str) -> str:
-    """A number and its unit, where it has one."""
+    """Return a number and its unit, where it has one."""
     return f"{number} {unit}" if unit else number
 
 
 def output_line(run: Run, name: str) -> str:
-    """A number of the result, and what it was at the guess."""
+    """Return a number of the result, and what it was at the guess."""
     return f"{show(run.outputs[name], 4)} (at the guess {show(run.guess.get(OUTPUT + name, math.nan), 4)})"
 
 
@@ -153,25 +180,6 @@ def gauge(check: CheckRecord) -> Html:
     share = min(check.ratio / 2, 1.0) if math.isfinite(check.ratio) else 1.0
     bar = tag("span", style=f"width:{100 * max(share, 0):.1f}%")
     return tag("span", bar, class_=f"gauge {'good' if check.met else 'bad'}", aria_hidden="true")
-
-
-def motion(
-    trajectory: Trajectory | None,
-    scene: Scene,
-    guess: Trajectory | None,
-    pictures: Mapping[str, Drawn],
-    faults: Sequence[str],
-) -> Html:
-    """The motion played and drawn, or why there is none; on a light page it is played only."""
-    notes = tag("p", "Not read: " + "; ".join(faults) + ".", class_="note") if faults else Html("")
-    if trajectory is None:
-        return card("The motion", tag("p", "This run recorded no motion."), notes, anchor="motion")
-    if "motion" not in pictures:
-        return card("The motion", light_animation(trajectory, scene, guess), notes, anchor="motion")
-    how = HOW_ROBOTS_DRAWN if is_large(trajectory, scene) else HOW_DRAWN
-    drawn = figures([pictures["motion"]], f"{how} {HOW_JOINTS_DRAWN}" if scene.joints else how)
-    strip = figures([pictures["strip"]], HOW_STRIP_DRAWN) if "strip" in pictures else Html("")
-    return card("The motion", animation(trajectory, scene, guess), strip, drawn, notes, anchor="motion")
 
 
 def found(run: Run, pictures: Mapping[str, Drawn]) -> Html:
@@ -188,13 +196,13 @@ def found(run: Run, pictures: Mapping[str, Drawn]) -> Html:
         "What was found",
         table(header, rows[:MOST_ROWS], "tnnnnt", "Variables") if rows else "",
         more,
-        figures([pictures["variables"]] if "variables" in pictures else [], "; ".join(curves)),
+        named_figure(pictures, "variables", "; ".join(curves)),
         anchor="found",
     )
 
 
 def variable_rows(variable: VariableRecord) -> list[list[str]]:
-    """One row for each component; one for all of a variable with very many, such as the weights of a net."""
+    """Return a row for each component; one for all of a variable with very many, such as the weights of a net."""
     if len(variable.value) > MOST_ROWS:
         return [many_row(variable)]
     rows: list[list[str]] = []
@@ -209,13 +217,13 @@ def variable_rows(variable: VariableRecord) -> list[list[str]]:
 
 
 def sets_of(variable: VariableRecord) -> str:
-    """What it sets, in words."""
+    """Write what a variable sets."""
     *others, last = variable.sets or ("",)
     return f"{', '.join(others)} and {last}, to the same values" if others else last
 
 
 def many_row(variable: VariableRecord) -> list[str]:
-    """The range of very many components, and how far they are from the guess."""
+    """Return the range of very many components, and how far they are from the guess."""
     guess, value = variable.guess[:, 0], variable.value[:, 0]
     label = join([tag("b", variable.name), f" {len(value)} numbers ", tag("small", sets_of(variable))])
     ranges = [f"{show(float(of.min()))} to {show(float(of.max()))}" for of in (guess, value)]
@@ -225,13 +233,13 @@ def many_row(variable: VariableRecord) -> list[str]:
 
 
 def root_mean_square(numbers: Array) -> float:
-    """Of numbers whose squares may be beyond the largest double; nan if one is."""
+    """Return the root mean square of numbers whose squares may overflow; nan if a number is nan."""
     size = float(np.max(np.abs(numbers)))
     return size * math.sqrt(float(((numbers / size) ** 2).mean())) if 0 < size < math.inf else size
 
 
 def between(value: float, guess: float, low: float, high: float) -> Html:
-    """Where value and guess lie between finite bounds; says so where a bound is active."""
+    """Draw where value and guess lie between finite bounds, and say where a bound is active."""
     if not (math.isfinite(low) and math.isfinite(high) and high > low and math.isfinite(value)):
         return tag("small", "free" if math.isinf(low) and math.isinf(high) else "")
     value, guess, low, high = (number / 2 for number in (value, guess, low, high))  # differences may overflow else
@@ -243,6 +251,101 @@ def between(value: float, guess: float, low: float, high: float) -> Html:
     bar = tag("span", *spots, class_="range", aria_hidden="true")
     edge = min(value - low, high - value) <= 1e-6 * (high - low)
     return join([bar, tag("small", "at a bound")]) if edge else bar
+
+
+def trusted(run: Run, pictures: Mapping[str, Drawn]) -> Html:
+    """Advice, findings, figures, and the refinements as numbers."""
+    judged = run.judged
+    lines = findings(run.examination, judged)
+    if not lines:
+        unknown = tag("p", NOT_EXAMINED) if run.readable else ""
+        return card(HOW_FAR, unknown, anchor="trust")
+    rows = [[pill(line.level, MARKS[line.level]), line.what, line.number, line.meaning] for line in lines]
+    return card(
+        HOW_FAR,
+        tag("p", advice(run.examination, judged)),
+        tag("p", ONLY_MOTION) if not run.examination.gradient else "",
+        table(["", "check", "value", "interpretation"], rows, "tttt", "Verification"),
+        step_note(run.examination),
+        named_figure(pictures, "growth", HOW_GROWN),
+        named_figure(pictures, "energy", " ".join(filter(None, [HOW_BALANCED, sliding(run.examination)]))),
+        refined(run.examination, judged),
+        anchor="trust",
+    )
+
+
+def step_note(trust: Examination) -> Html:
+    """Say with what step the gradient was compared; empty where it was not."""
+    if not math.isfinite(trust.step):
+        return Html("")
+    return tag(
+        "p", f"Central differences with a step of {show(trust.step, 2)} of a variable's scale.", class_="caption"
+    )
+
+
+def refined(trust: Examination, judged: Judged) -> Html:
+    """Return the refinements as tables; nothing without any."""
+    if not trust.refined:
+        return Html("")
+    header, rows = answers(trust, judged)
+    gradients, changes = slopes(trust)
+    return tag(
+        "details",
+        tag("summary", "Refined and smoothed, as numbers"),
+        table(header, rows, "tnnt", "Answers"),
+        table(gradients, changes, "tnnt" + "n" * len(trust.refined), "Gradients"),
+        tag("p", HOW_REFINED, class_="caption"),
+    )
+
+
+def stage_card(run: Run) -> Html:
+    """Return the stages in a table; nothing for a run without smoothing."""
+    if not smoothed(run.stages):
+        return Html("")
+    every = ("rollouts", "gradients", "jacobians", "hessians")
+    kinds = [kind for kind in every if any(stage.counts.get(kind, 0) > 0 for stage in run.stages)]
+    checked = bool(run.checks)
+    header = ["smoothing", "ended as", "objective there", "exact objective"]
+    header += ["error / tolerance there", "exact error / tolerance", ""] if checked else []
+    rows = [stage_row(stage, kinds, checked) for stage in run.stages]
+    layout = "ttnn" + "nnt" * checked + "n" * (len(kinds) + 1)
+    content = table([*header, *kinds, "time"], rows, layout, "Stages of smoothing")
+    return card("Stages of smoothing", content, remark(run), anchor="stages", note=HOW_READ)
+
+
+def stage_row(stage: StageRecord, kinds: Sequence[str], checked: bool) -> list[Html | str]:
+    """Return the cells of one stage."""
+    cells: list[Html | str] = [f"{show(stage.smoothing)} m/s" if stage.smoothing else "0, exact"]
+    cells += [ending(stage.status).brief_words, show(stage.objective), tag("b", show(stage.exact_objective))]
+    if checked:
+        cells += [show(stage.worst), tag("b", show(stage.exact_worst))]
+        cells.append(pill("good", "met") if stage.solved else pill("bad", "missed"))
+    cells += [words.count(stage.counts.get(kind, math.nan)) for kind in kinds]
+    return [*cells, words.seconds(stage.seconds)]
+
+
+def remark(run: Run) -> Html:
+    """Say where an earlier stage came closer than the last; its point is the result then, unless means decided."""
+    last, best = run.stages[-1], min(run.stages, key=rank)
+    if run.status == "interrupted" or rank(best) >= rank(last):
+        return Html("")
+    text = f"The point of the stage at {show(best.smoothing)} m/s "
+    if run.objective == best.exact_objective:
+        text += "is the result: it does better in the exact rollout than that of the last stage"
+    else:
+        text += "does better in the exact rollout than the result"
+    return tag("p", f"{text}: what the last stages gained, they gained for another problem.", class_="caption")
+
+
+def rank(stage: StageRecord) -> tuple[bool, float]:
+    """Return a key by which the stage that comes closest in the exact rollout is first."""
+    return not stage.solved, stage.exact_objective if math.isfinite(stage.exact_objective) else math.inf
+
+
+def convergence(run: Run, pictures: Mapping[str, Drawn]) -> Html:
+    """Show the convergence, and say what the figure leaves out."""
+    caption = f"Pale: the lowest so far{' in its stage' * smoothed(run.stages)}. Work counts one rollout as 1."
+    return card("Convergence", named_figure(pictures, "convergence", caption), anchor="convergence")
 
 
 def time_split(run: Run) -> Html:
@@ -270,7 +373,7 @@ def time_split(run: Run) -> Html:
 
 
 def provenance(run: Run) -> Html:
-    """When, with what and by which command."""
+    """Show when the run was made, with which versions and by which command."""
     versions = ", ".join(f"{name} {version}" for name, version in run.versions.items() if name != "platform")
     memory = values.number(run.provenance.get("peak_memory"))
     return facts(
@@ -283,7 +386,7 @@ def provenance(run: Run) -> Html:
             ("Versions", versions),
             ("Evaluated by", str(run.backend)),
             ("Compiler flags", values.name(run.provenance.get("flags"))),
-            ("Ended as", words.status(run.status)),
+            ("Ended as", ending(run.status).words),
             ("Iterations", words.count(run.iterations) if math.isfinite(run.iterations) else ""),
         ]
     )
@@ -296,13 +399,13 @@ def machine(run: Run) -> str:
 
 
 def commit(run: Run) -> str:
-    """Of the working folder, and whether there were changes."""
+    """Return the commit of the working folder, and whether there were changes."""
     known = values.name(run.provenance.get("commit"))
     return f"{known}, with changes" if known and run.provenance.get("dirty") is True else known
 
 
 def source(title: str, text: str) -> Html:
-    """A file behind a line that opens it; of a long log the end."""
+    """Return a file behind a line that opens it; of a long log the end."""
     if len(text) > LOG_TAIL and title.startswith("Log"):
         text = "…\n" + text[-LOG_TAIL:]
     return fold(title, text)

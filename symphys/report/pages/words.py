@@ -7,18 +7,18 @@ from collections.abc import Sequence
 
 from symphys.findings.endings import ending
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, verdict_words
-from symphys.findings.writing import listed, plain, show
+from symphys.findings.writing import capital, listed, plain, show
 from symphys.results.result import CheckRecord
 from symphys.results.run import Run
 
 
 def count(value: float) -> str:
-    """A count in full; medians of an even number of counts may end in a half."""
+    """Return a count in full; medians of an even number of counts may end in a half."""
     return plain(value, 1) if math.isfinite(value) else show(value)
 
 
 def seconds(value: float) -> str:
-    """A duration with a unit that suits it."""
+    """Return a duration with a unit that suits it."""
     if math.isnan(value) or math.isinf(value):
         return show(value)
     if value < 0.0995:
@@ -26,25 +26,15 @@ def seconds(value: float) -> str:
     return f"{show(value, 3)} s" if value < 600 else f"{show(value / 60, 3)} min"
 
 
-def status(code: str) -> str:
-    """A status in plain words; one that is not known stands as it is."""
-    return ending(code).words
-
-
-def ended(code: str) -> str:
-    """A status in two words at most, for tables."""
-    return ending(code).in_table or ending(code).words
-
-
 def came_to(run: Run) -> str:
-    """How a run ended, in a few words for tables: as its solver did, or its verdict, where that says more."""
+    """Say in a few words how a run ended: as its solver did, or its verdict, where that says more."""
     if run.verdict in (DOUBTED, BEST_FOUND):
         return verdict_words(run.verdict, run.status, bool(run.checks))
-    return ended(run.status)
+    return ending(run.status).brief_words
 
 
 def level(run: Run) -> str:
-    """``good``, ``fair`` (nothing went wrong, but not solved) or ``bad``."""
+    """Return ``good``, ``fair`` (nothing went wrong, but not solved) or ``bad``."""
     if run.solved:
         return "good"
     if run.verdict == DOUBTED:
@@ -53,15 +43,14 @@ def level(run: Run) -> str:
 
 
 def headline(run: Run) -> str:
-    """A few words for a run."""
+    """Return a few words for a run."""
     if run.verdict in (SOLVED, DOUBTED, BEST_FOUND):
-        words = verdict_words(run.verdict, run.status, bool(run.checks))
-        return words[:1].upper() + words[1:]
+        return capital(verdict_words(run.verdict, run.status, bool(run.checks)))
     return ending(run.status).headline
 
 
 def verdict(run: Run) -> str:
-    """What came out, in one or two sentences; the solver's own advice is separate."""
+    """Say in one or two sentences what came out; the solver's own advice is separate."""
     if not run.readable:
         return "No result could be read from this folder."
     missed = [check for check in run.checks if not check.met]
@@ -84,12 +73,12 @@ def verdict(run: Run) -> str:
 
 
 def doubted(run: Run) -> str:
-    """Why a run is not to be relied on, in a sentence; empty where it is, or where it came to nothing anyway."""
+    """Say why a run is not to be relied on; empty where it is, or where it came to nothing anyway."""
     return f"But it is not to be relied on: {'; '.join(run.doubts)}." if run.verdict == DOUBTED else ""
 
 
 def misses(missed: Sequence[CheckRecord], total: int) -> str:
-    """How many checks are missed, and the worst by name."""
+    """Say how many checks are missed, and the worst by name."""
     if not missed:
         return "The run did not end as solved, though no check is missed."
     worst = max(missed, key=lambda check: math.inf if math.isnan(check.ratio) else check.ratio)
@@ -102,7 +91,7 @@ def misses(missed: Sequence[CheckRecord], total: int) -> str:
 
 
 def work(run: Run) -> str:
-    """What a solve took."""
+    """Say what a solve took."""
     counts = [(kind, run.counts.get(kind, 0.0)) for kind in ("rollouts", "gradients")]
     parts = [f"{count(number)} {kind}" for kind, number in counts if number > 0]
     took = run.seconds.get("solve", math.nan)

@@ -13,7 +13,7 @@ from symphys.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class KinematicBranch:
-    """Indices of bodies that joints connect once the base body is taken away, which is a branch of its own."""
+    """Bodies that joints connect once the base body is taken away, by index; the base is a branch of its own."""
 
     name: str
     bodies: tuple[int, ...]
@@ -22,7 +22,7 @@ class KinematicBranch:
 
 
 def linked(trajectory: Trajectory, scene: Scene) -> tuple[int, ...]:
-    """The bodies that joints connect to a body or the world."""
+    """Return the bodies that joints connect to a body or the world."""
     held = {name for joint in scene.joints for name in joint.bodies}
     return tuple(index for index, name in enumerate(trajectory.body_names) if name in held)
 
@@ -33,7 +33,7 @@ def is_large(trajectory: Trajectory, scene: Scene) -> bool:
 
 
 def colours(trajectory: Trajectory, scene: Scene) -> tuple[str, ...]:
-    """The colour of each body: its own, or its branch's where joints connect many."""
+    """Return the colour of each body: its own, or its branch's where joints connect many."""
     names = trajectory.body_names
     if not is_large(trajectory, scene):
         return tuple(style.BODIES[index % len(style.BODIES)] for index in range(len(names)))
@@ -42,7 +42,7 @@ def colours(trajectory: Trajectory, scene: Scene) -> tuple[str, ...]:
 
 
 def keys(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
-    """What colours mean: (name, colour) of bodies, of branches where joints connect many; none where that is plain."""
+    """Return (name, colour) of bodies, or of branches where joints connect many; none where colours are plain."""
     if is_large(trajectory, scene):
         found = [(branch.name, branch.colour) for branch in branches(trajectory, scene)]
     else:
@@ -51,7 +51,7 @@ def keys(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
 
 
 def traced(trajectory: Trajectory, scene: Scene) -> tuple[str, ...]:
-    """The bodies whose path is drawn: all, but of many that joints connect the base bodies and the ends of branches."""
+    """Return the bodies whose path is drawn: all, or of many that joints connect the bases and the ends of branches."""
     names = trajectory.body_names
     if not is_large(trajectory, scene):
         return names
@@ -75,14 +75,14 @@ def branches(trajectory: Trajectory, scene: Scene) -> list[KinematicBranch]:
 
 
 def edges_of(trajectory: Trajectory, scene: Scene) -> set[frozenset[int]]:
-    """The pairs of bodies that joints connect."""
+    """Return the pairs of bodies that joints connect."""
     index = {name: body for body, name in enumerate(trajectory.body_names)}
     pairs = [frozenset(index[name] for name in joint.bodies if name in index) for joint in scene.joints]
     return {pair for pair in pairs if len(pair) == 2}
 
 
 def components(bodies: Sequence[int], edges: set[frozenset[int]]) -> list[tuple[int, ...]]:
-    """The connected parts of ``bodies``, in their order."""
+    """Return the connected parts of ``bodies``, in their order."""
     left, found = list(bodies), []
     while left:
         group, queue = set[int](), [left[0]]
@@ -96,13 +96,13 @@ def components(bodies: Sequence[int], edges: set[frozenset[int]]) -> list[tuple[
 
 
 def base_of(group: Sequence[int], edges: set[frozenset[int]], trajectory: Trajectory, scene: Scene) -> int:
-    """The body that the world holds, else the one with most joints, the first of equals."""
+    """Return the body that the world holds, else the one with most joints, the first of equals."""
     grounded = {joint.first for joint in scene.joints if not joint.second}
     held = [body for body in group if trajectory.body_names[body] in grounded]
     return held[0] if held else max(group, key=lambda body: sum(body in edge for edge in edges))
 
 
 def branch_name(names: Sequence[str]) -> str:
-    """What the names of its bodies begin with, else the first of them."""
+    """Return the beginning that the names of its bodies share, else the first name."""
     same = itertools.takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
     return "".join(letters[0] for letters in same).rstrip("_-. ") or names[0]

@@ -16,16 +16,12 @@ from symphys.results.scene_joints import SceneJoint
 from symphys.trajectory import Trajectory
 from symphys.types import Array
 
-AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}
-"""Which axes of a joint are drawn: (side, axis of that side's frame)."""
-SQUARE = ("slider", "fixed")
-"""Kinds whose mark is a square."""
 BAR = 0.065
 """[in] half length of the bar along an axis"""
 
 
 def on_side(trajectory: Trajectory, joint: SceneJoint, side: int, vector: Array, shot: int, is_point: bool) -> Array:
-    """(3,): a point or direction that one side of a joint carries, in the world."""
+    """Return a point or direction (3,) that one side of a joint carries, in the world."""
     name = joint.bodies[side] if side < len(joint.bodies) else ""
     if not name:
         return vector
@@ -40,17 +36,17 @@ def drawable(trajectory: Trajectory, scene: Scene) -> list[SceneJoint]:
 
 
 def position(trajectory: Trajectory, joint: SceneJoint, shot: int) -> Array:
-    """(3,) [m]: the point of the first side."""
+    """Return the position (3,) [m] of the first side, in the world."""
     return on_side(trajectory, joint, 0, joint.frames[0].point, shot, True)
 
 
 def axes_of(joint: SceneJoint) -> list[tuple[int, Array]]:
     """The axes that are drawn: the side that carries each, and its direction (3,) in that side's frame."""
-    return [(side, turn(joint.frames[side].orientation, np.eye(3)[k])) for side, k in AXES.get(joint.kind, ())]
+    return [(side, turn(joint.frames[side].orientation, np.eye(3)[k])) for side, k in joint.axes]
 
 
 def bones(trajectory: Trajectory, scene: Scene, shot: int) -> Iterator[tuple[int, Array]]:
-    """Lines (2, 3) [m] from the centres of bodies to their joints, and to solids beside them, each with its body."""
+    """Yield a body and a line (2, 3) [m] from its centre to each of its joints, and to each solid beside it."""
     for joint in drawable(trajectory, scene):
         for side, name in enumerate(joint.bodies):
             body = trajectory.body_names.index(name)
@@ -72,15 +68,15 @@ def draw_joint_positions(axes: Axes, view: View, trajectory: Trajectory, scene: 
             half = BAR / scale * view.flat(on_side(trajectory, joint, side, direction, shot, False))
             bars += [place - half, place + half]
     draw_lines(axes, np.array(bars), style.INK, 0.8, 7)
-    for shape, square in (("o", False), ("s", True)):
-        chosen = [position(trajectory, joint, shot) for joint in joints if (joint.kind in SQUARE) == square]
+    for shape, rotates in (("o", True), ("s", False)):
+        chosen = [position(trajectory, joint, shot) for joint in joints if joint.rotates == rotates]
         if chosen:
             (mark,) = axes.plot(*view.flat(np.array(chosen)).T, shape, color="white", markersize=2.5, zorder=7.1)
             mark.set(markeredgecolor=style.INK, markeredgewidth=0.7)
 
 
 def draw_lines(axes: Axes, ends: Array, colour: Any, width: float, zorder: float) -> None:
-    """Lines between each two of these points, as one path; ``ends`` holds (2,) points, in any shape."""
+    """Draw lines between each two of these points as one path; ``ends`` holds (2,) points, in any shape."""
     if ends.size:
         pairs = ends.reshape(-1, 2, 2)
         parts = np.concatenate([pairs, np.full((len(pairs), 1, 2), np.nan)], axis=1).reshape(-1, 2)

@@ -11,15 +11,15 @@ from symphys.results.scene_joints import SceneJoint
 from symphys.trajectory import Trajectory
 from symphys.types import Array, Bools
 
-FULL = 1 - 1e-3
+SATURATED_SHARE = 1 - 1e-3
 """A motor is saturated from this share of its largest torque on."""
-AT_LIMIT = 1e-3
+LIMIT_TOLERANCE = 1e-3
 """[rad] or [m]: how near to a limit a coordinate counts as there."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One coordinate of a joint over N steps.
+    """A coordinate of a joint over N steps.
 
     Attributes:
         name: the joint's, with a number where it has several coordinates.
@@ -38,22 +38,22 @@ class Channel:
 
     @property
     def quantity(self) -> str:
-        """What its value is."""
+        """Return "angle" or "position"."""
         return "angle" if self.turns else "position"
 
     @property
     def effort(self) -> str:
-        """What its motor gives."""
+        """Return "torque" or "force", what its motor gives."""
         return "torque" if self.turns else "force"
 
     @property
     def unit(self) -> str:
-        """Of its value."""
+        """Return the unit of its value."""
         return "rad" if self.turns else "m"
 
     @property
     def torque_unit(self) -> str:
-        """Of what its motor gives."""
+        """Return the unit of what its motor gives."""
         return "N m" if self.turns else "N"
 
     @property
@@ -63,23 +63,23 @@ class Channel:
 
     @property
     def bound(self) -> float:
-        """The most that its motor can give; nan without one."""
+        """Return the most that its motor can give; nan without one."""
         return np.nan if self.joint.motor is None else self.joint.motor.torque
 
     @property
     def saturated(self) -> Bools:
-        """(N,): whether its motor gives the most that it can."""
-        found: Bools = (np.abs(self.torque) >= FULL * self.bound) & (self.bound > 0)
+        """Return (N,) whether its motor gives the most that it can."""
+        found: Bools = (np.abs(self.torque) >= SATURATED_SHARE * self.bound) & (self.bound > 0)
         return found
 
     @property
     def share(self) -> float:
-        """Of the time in saturation; nan without a bound."""
+        """Return the share of the time in saturation; nan without a bound."""
         return float(self.saturated.mean()) if self.saturated.size and self.bound > 0 else np.nan
 
     @property
     def target(self) -> Array | None:
-        """(N,): the commanded angle, or place, of a servo; None for anything else."""
+        """Return (N,) the commanded angle or position of a servo; None for anything else."""
         if self.joint.motor is None or self.joint.motor.kind != "servo" or not np.isfinite(self.command).all():
             return None
         return self.command
@@ -87,13 +87,13 @@ class Channel:
     @property
     def at_limit(self) -> bool:
         """Whether it reached one of its limits."""
-        near = (self.value <= self.joint.lower + AT_LIMIT) | (self.value >= self.joint.upper - AT_LIMIT)
+        near = (self.value <= self.joint.lower + LIMIT_TOLERANCE) | (self.value >= self.joint.upper - LIMIT_TOLERANCE)
         return bool(near.any())
 
 
 @dataclass(frozen=True)
 class Separation:
-    """How far the sides of joints came apart [m], where they should not: over all joints and times, and the worst."""
+    """The distance [m] by which the sides of joints came apart: over all joints and times, and at the worst."""
 
     rms: float
     most: float
@@ -102,7 +102,7 @@ class Separation:
 
 
 def channels(trajectory: Trajectory, scene: Scene) -> list[Channel]:
-    """All coordinates of all joints, in the file's order."""
+    """Return all coordinates of all joints, in the file's order."""
     known = {joint.name: joint for joint in scene.joints}
     found = []
     for index, name in enumerate(trajectory.joint_names):
@@ -125,7 +125,7 @@ def channels(trajectory: Trajectory, scene: Scene) -> list[Channel]:
 
 
 def separation(trajectory: Trajectory) -> Separation | None:
-    """Of all joints; None without any that is known."""
+    """Return the separation of the joints; None where none is known."""
     apart = trajectory.joint_separation
     if not np.isfinite(apart).any():
         return None

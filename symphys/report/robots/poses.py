@@ -10,19 +10,18 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Polygon
 
-from symphys.report.figures import style
+from symphys.report.figures.data import thin
 from symphys.report.robots.branches import colours, linked, traced
 from symphys.report.robots.joint_positions import bones, draw_joint_positions, draw_lines
-from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
-from symphys.report.scene.views import View, centres, corners, reach, turn
+from symphys.report.scene.views import View, centres, corners, inner_edges, outline, reach, turn
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Trajectory
 from symphys.types import Array
 
-APART = 0.75
+MIN_POSE_DISTANCE = 0.75
 """Poses in one picture are apart by this share of the robot's length at least."""
-MOST = 8
+MAX_POSES = 8
 
 
 def draw_robots(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene, scale: float) -> None:
@@ -36,18 +35,18 @@ def draw_robots(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
 
 
 def spaced(trajectory: Trajectory, scene: Scene, view: View) -> list[int]:
-    """The poses: first, last and between at even distances, if linked bodies go far enough; else the last."""
+    """Return the poses: first, last and between at even distances, if linked bodies go far enough; else the last."""
     low, high = extents(trajectory, scene, view, linked(trajectory, scene))
     middle = (low + high) / 2 - (low[0] + high[0]) / 2
-    least = np.abs(middle).max() / (APART * MOST)  # of robots without extent, all poses may be drawn
+    least = np.abs(middle).max() / (MIN_POSE_DISTANCE * MAX_POSES)  # of robots without extent, all poses may be drawn
     gone = middle / np.maximum((high - low).max(axis=0), least if least > 0 else 1.0)
     along = gone[:, np.abs(gone[-1]).argmax()]
-    parts = min(int(abs(along[-1]) / APART), MOST)
+    parts = min(int(abs(along[-1]) / MIN_POSE_DISTANCE), MAX_POSES)
     return sorted({int(np.abs(along - along[-1] * part / parts).argmin()) for part in range(parts)} | {len(along) - 1})
 
 
 def extents(trajectory: Trajectory, scene: Scene, view: View, bodies: Sequence[int]) -> tuple[Array, Array]:
-    """(N+1, 2) [m] each: the lowest and highest seen coordinates of these bodies at each time."""
+    """Return the lowest and the highest seen coordinates (N+1, 2) [m] of these bodies at each time."""
     low, high = [], []
     for body in bodies:
         if not scene.solids(trajectory.body_names[body]):
@@ -63,17 +62,17 @@ def extents(trajectory: Trajectory, scene: Scene, view: View, bodies: Sequence[i
 
 
 def draw_paths(axes: Axes, view: View, trajectory: Trajectory, scene: Scene) -> None:
-    """The paths of base bodies and of the bodies at the ends of branches."""
+    """Draw the paths of base bodies and of the bodies at the ends of branches."""
     kept = traced(trajectory, scene)
     for body, colour in enumerate(colours(trajectory, scene)):
         if trajectory.body_names[body] in kept:
-            _, path = style.thin(trajectory.time, view.flat(trajectory.position[:, body]), 500)
+            _, path = thin(trajectory.time, view.flat(trajectory.position[:, body]), 500)
             axes.plot(*path.T, color=colour, linewidth=0.8, alpha=0.6, zorder=2.2)
 
 
 @dataclass(frozen=True)
 class RobotDrawing:
-    """All bodies of a scene at one time."""
+    """A drawing of all bodies of a scene at one time."""
 
     axes: Axes
     view: View
@@ -82,9 +81,9 @@ class RobotDrawing:
     shot: int
 
     def draw(self, strength: float = 1.0, order: int = 0) -> None:
-        """From the back to the front; paler with less ``strength``, over poses of a lower ``order``."""
+        """Draw from the back to the front; paler with less ``strength``, over poses of a lower ``order``."""
         colour = colours(self.trajectory, self.scene)
-        base = 2.5 + 0.25 * order / MOST
+        base = 2.5 + 0.25 * order / MAX_POSES
         lines = list(bones(self.trajectory, self.scene, self.shot))
         for each in dict.fromkeys(colour[body] for body, _ in lines):
             ends = [self.view.flat(line) for body, line in lines if colour[body] == each]
@@ -103,7 +102,7 @@ class RobotDrawing:
         ]
 
     def draw_solid(self, body: int, solid: Solid, colour: Array, zorder: float) -> None:
-        """Its outline, filled, and the edges that are seen in it."""
+        """Draw the outline of a solid, filled, and the edges that are seen in it."""
         turned = self.trajectory.orientation[self.shot, body]
         centre = self.view.flat(self.trajectory.position[self.shot, body] + turn(turned, solid.centre))
         if solid.radius == 0 and solid.is_ball:
@@ -118,6 +117,6 @@ class RobotDrawing:
 
 
 def mixed(colour: str | Array, strength: float) -> Array:
-    """(3,): a colour on white."""
+    """Return a colour (3,) mixed with white."""
     own = np.array(to_rgb(colour if isinstance(colour, str) else tuple(colour)))
     return 1 - strength * (1 - own)

@@ -27,12 +27,12 @@ LEFT, RIGHT, BOTTOM, TOP, GAP, BETWEEN = 0.72, 0.1, 0.42, 0.3, 0.1, 0.18
 """[in] margins, and gaps between columns and rows"""
 TALLEST, LOWEST = 2.4, 0.75
 """[in] a picture is at most and at least"""
-FAR, FAR_ON_RAILS = 2.0, 6.0
+MAX_EXTENT, MAX_EXTENT_GROUNDED = 2.0, 6.0
 """The section shown is fixed where all fits into so many sizes of the bodies: free ones, and those on the world."""
-POINT = 1e-6
+POINT_SHARE = 1e-6
 """The whole view is shown, too, where the bodies are less than this share of it."""
 MARGIN = 0.06
-EDGE = 0.14
+LABEL_MARGIN = 0.14
 """[in] Numbers are at least so far from the sides of a picture, so that those of neighbours do not meet."""
 
 
@@ -46,7 +46,7 @@ class Strip:
 
 
 def draw_strip(trajectory: Trajectory, scene: Scene) -> DataFigure | None:
-    """The strip; None where no joint holds bodies that move."""
+    """Draw the strip; None where no joint holds bodies that move."""
     if not linked(trajectory, scene) or len(trajectory.time) < 2:
         return None
     views = choose_views(trajectory, scene)
@@ -82,7 +82,7 @@ Place = tuple[float, float, float, float]
 
 
 def lay_out(strips: Sequence[Strip], width: float, scale: float) -> tuple[DataFigure, list[list[Place]]]:
-    """The figure, and the places of its pictures, each ``width`` [in] wide, strip by strip."""
+    """Return the figure, and the places of its pictures, each ``width`` [in] wide, strip by strip."""
     heights = [float(strip.size[1]) * scale for strip in strips]
     total = TOP + BOTTOM + sum(heights) + BETWEEN * (len(strips) - 1)
     places: list[list[Place]] = []
@@ -102,13 +102,13 @@ def even_shots(count: int, size: Array) -> list[int]:
 
 
 def make_strip(view: View, trajectory: Trajectory, scene: Scene, shots: Sequence[int]) -> Strip:
-    """The sections of these shots, and the ground where it is near."""
+    """Return the sections of these shots, and the ground where it is near."""
     low, high = (part[list(shots)] for part in extents(trajectory, scene, view, linked(trajectory, scene)))
     size, middle = (high - low).max(axis=0), (low + high) / 2
     least, most = style.apart(low.min(axis=0), high.max(axis=0))
     union = most - least
-    far = FAR if all(joint.second for joint in scene.joints) else FAR_ON_RAILS
-    still = np.array([union[0] <= far * size[0] or size.max() <= POINT * union.max(), True])
+    far = MAX_EXTENT if all(joint.second for joint in scene.joints) else MAX_EXTENT_GROUNDED
+    still = np.array([union[0] <= far * size[0] or size.max() <= POINT_SHARE * union.max(), True])
     size = np.where(still, union, size)
     corner = np.where(still, least, middle - size / 2)
     room = float(size.max())
@@ -121,7 +121,7 @@ def make_strip(view: View, trajectory: Trajectory, scene: Scene, shots: Sequence
 
 
 def widened(strip: Strip, width: float, height: float) -> Strip:
-    """As wide as its column, and of a least height [m]."""
+    """Widen sections to the width of their column, and to a least height [m]."""
     lack = np.array([width - strip.size[0], max(height - strip.size[1], 0.0)])
     return Strip(strip.view, strip.low - lack / 2, strip.size + lack)
 
@@ -142,7 +142,7 @@ def dress_frame(axes: Axes, panel: ViewPanel, scale: float, first: bool, bottom:
     width, height = panel.span * scale
     style.set_linear(axes, "x", int(np.clip(3.2 * width, 2, 6)))
     style.set_linear(axes, "y", int(np.clip(2.2 * height, 2, 5)))
-    axes.set_xticks(inside(axes.get_xticks(), panel.low[0], panel.high[0], EDGE / scale))
+    axes.set_xticks(inside(axes.get_xticks(), panel.low[0], panel.high[0], LABEL_MARGIN / scale))
     axes.spines[["left", "bottom"]].set_visible(False)
     axes.patch.set_facecolor("#fafbfc")
     axes.tick_params(labelleft=first, labelbottom=bottom)
@@ -151,5 +151,5 @@ def dress_frame(axes: Axes, panel: ViewPanel, scale: float, first: bool, bottom:
 
 
 def inside(ticks: Array, low: float, high: float, edge: float) -> Array:
-    """The ticks that are well within a section."""
+    """Return the ticks that are well within a section."""
     return ticks[(ticks > low + edge) & (ticks < high - edge)]

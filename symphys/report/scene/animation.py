@@ -6,11 +6,10 @@ import json
 
 import numpy as np
 
-from symphys.report.charts.packed import pack_json
 from symphys.report.figures import style
-from symphys.report.pages.markup import PACKED, Html, dot, embedded, join, tag
+from symphys.report.pages.markup import Html, dot, embedded, join, packed_json, tag
 from symphys.report.robots.branches import colours, keys, linked, traced
-from symphys.report.robots.joint_positions import SQUARE, axes_of, drawable
+from symphys.report.robots.joint_positions import axes_of, drawable
 from symphys.report.scene.ghosts import MEASURED
 from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, reach, solids_of
 from symphys.results.polytope import Polytope
@@ -37,10 +36,9 @@ def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = N
 
 
 def light_animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> Html:
-    """The same for a light page: fewer numbers, compressed."""
-    data = pack_json(motion_data(trajectory, scene, guess, LIGHT_NUMBERS))
-    held = tag("script", Html(data), type="application/json", class_=PACKED)
-    return player(trajectory, scene, "The motion plays only with JavaScript.", held)
+    """Make the player of a light page: fewer numbers, compressed."""
+    data = packed_json(motion_data(trajectory, scene, guess, LIGHT_NUMBERS))
+    return player(trajectory, scene, "The motion plays only with JavaScript.", data)
 
 
 def player(trajectory: Trajectory, scene: Scene, without: str, data: Html) -> Html:
@@ -80,7 +78,7 @@ VIEW_TITLES = (("space", "3D"), ("side", "Side"), ("top", "Top"))
 
 
 def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, numbers: int) -> dict[str, object]:
-    """What animation.js and joints.js read; lists are flat, frame after frame, body after body."""
+    """Return what animation.js and joints.js read; lists are flat, frame after frame, body after body."""
     bodies = len(trajectory.body_names)
     frames = int(np.clip(numbers // (7 * bodies), 40, MOST_FRAMES))
     chosen = even(len(trajectory.time), frames)
@@ -154,7 +152,7 @@ def guess_data(guess: Trajectory, scene: Scene) -> list[list[float]]:
 
 
 def even(count: int, most: int) -> Array:
-    """At most ``most`` indices below ``count``, evenly apart, the first and the last among them."""
+    """Return at most ``most`` indices below ``count``, evenly apart, the first and the last among them."""
     return np.linspace(0, count - 1, min(count, most)).round().astype(int)
 
 
@@ -165,12 +163,12 @@ def rounded(values: Array, share: float) -> list[float]:
     return [entry + 0.0 for entry in np.round(values.ravel(), max(decimals, 0)).tolist()]
 
 
-FAR = 2.5
+FOLLOW_DISTANCE = 2.5
 """The camera follows where bodies connected by joints travel farther than so many times their size."""
 
 
 def joint_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
-    """Both sides of each joint, index of the body (-1: the world) and point, and its axes: [side, direction]."""
+    """Return the sides of each joint, index of the body (-1: the world) and point, and its axes: [side, direction]."""
     index = {name: body for body, name in enumerate(trajectory.body_names)} | {"": -1}
     return [
         {
@@ -179,7 +177,7 @@ def joint_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
                 for name, frame in zip((joint.first, joint.second), joint.frames, strict=True)
             ],
             "axes": [[side, direction.round(6).tolist()] for side, direction in axes_of(joint)],
-            "square": joint.kind in SQUARE,
+            "square": not joint.rotates,
         }
         for joint in drawable(trajectory, scene)
     ]
@@ -195,6 +193,6 @@ def follow_data(trajectory: Trajectory, scene: Scene) -> dict[str, object] | Non
     middle[:, 2] = middle[:, 2].mean()
     sizes = [reach(trajectory, scene, body) for body in bodies]
     radius = float((np.linalg.norm(place - middle[:, None], axis=2) + sizes).max())
-    if np.ptp(middle, axis=0).max() <= FAR * 2 * radius:
+    if np.ptp(middle, axis=0).max() <= FOLLOW_DISTANCE * 2 * radius:
         return None
     return {"bodies": bodies, "height": round(float(middle[0, 2]), 6), "radius": round(radius, 6)}

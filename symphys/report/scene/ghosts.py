@@ -17,7 +17,7 @@ MEASURED = " measured"
 
 
 def with_ghosts(replay: RecordingReplay, scene: Scene) -> tuple[Trajectory, Scene]:
-    """The simulated motion and its scene, with a further body for each whose position was measured.
+    """Return the simulated motion and its scene, with a further body for each whose position was measured.
 
     Between samples ghosts go evenly; before the first and after the last they stand.
     """
@@ -43,7 +43,7 @@ def with_ghosts(replay: RecordingReplay, scene: Scene) -> tuple[Trajectory, Scen
 
 
 def _between(time: Array, sampled: Array, values: Array) -> Array:
-    """(N + 1, m) at the times of the motion, from (n, m) samples of which some are missing."""
+    """Interpolate (n, m) samples, of which some are missing, at the times of the motion: (N + 1, m)."""
     known = np.isfinite(values).all(axis=1)
     if not known.any():
         return np.zeros((len(time), values.shape[1]))

@@ -12,21 +12,20 @@ from matplotlib.ticker import MaxNLocator
 
 from symphys.findings import writing
 from symphys.report.figures import style
-from symphys.report.scene.outlines import inner_edges, outline
 from symphys.report.scene.panel import ViewPanel
-from symphys.report.scene.views import View, corners
+from symphys.report.scene.views import View, corners, inner_edges, outline
 from symphys.results.scene import UPRIGHT, Scene, SceneTerrain, Solid
 from symphys.trajectory import Trajectory
 
 SHADES = LinearSegmentedColormap.from_list("heights", ["#ffffff", "#d8dfe6"])
 HATCH: dict[str, Any] = {"facecolor": style.GROUND, "edgecolor": "#d5dbe1", "hatch": "////", "linewidth": 0}
-BEHIND = "#f6f8f9"
-LINES = 8
+BEHIND_COLOUR = "#f6f8f9"
+MAX_CONTOURS = 8
 """Lines of height in a view from above, at most about."""
 
 
 def draw_ground(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene) -> None:
-    """All static surfaces; planes and terrain hide what is below them."""
+    """Draw all static surfaces; planes and terrain hide what is below them."""
     for ground in scene.terrain:
         if panel.view.depth == 2:
             draw_heights(axes, panel, ground)
@@ -38,7 +37,7 @@ def draw_ground(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
 
 
 def draw_fixture(axes: Axes, view: View, solid: Solid) -> None:
-    """The outline of a static solid, and the edges that are seen in it."""
+    """Draw the outline of a static solid, and the edges that are seen in it."""
     upright = np.array(UPRIGHT)
     around = view.flat(solid.centre) + outline(view.flat(corners(upright, solid)), solid.radius)
     axes.add_patch(Polygon(around, **HATCH, zorder=1.55))
@@ -48,7 +47,7 @@ def draw_fixture(axes: Axes, view: View, solid: Solid) -> None:
 
 
 def draw_profile(axes: Axes, panel: ViewPanel, trajectory: Trajectory, ground: SceneTerrain) -> None:
-    """A cut through terrain in the middle of the motion's depth; palely, how high it is behind and in front."""
+    """Draw a cut through terrain at the middle of the motion's depth; palely, its height behind and in front."""
     along_x = panel.view.right == 0
     along, across, z = (ground.x, ground.y, ground.z) if along_x else (ground.y, ground.x, ground.z.T)
     places = trajectory.position[..., panel.view.depth]
@@ -57,17 +56,19 @@ def draw_profile(axes: Axes, panel: ViewPanel, trajectory: Trajectory, ground: S
     bottom = min(panel.low[1], float(np.nanmin(cut, initial=np.inf))) - float(panel.span[1])
     if near.any():
         highest = np.fmax.reduce(z[near], axis=0)
-        axes.fill_between(along, highest, bottom, facecolor=BEHIND, edgecolor=style.FAINT, linewidth=0.8, zorder=1.4)
+        axes.fill_between(
+            along, highest, bottom, facecolor=BEHIND_COLOUR, edgecolor=style.FAINT, linewidth=0.8, zorder=1.4
+        )
     axes.fill_between(along, cut, bottom, **HATCH, zorder=1.57)
     axes.plot(along, cut, color=style.GROUND_EDGE, linewidth=1.6, zorder=1.58)
 
 
 def draw_heights(axes: Axes, panel: ViewPanel, ground: SceneTerrain) -> None:
-    """Lines of height, and in the title how far apart they are."""
+    """Draw contour lines of terrain, and write their distance into the title."""
     low, high = np.nanmin(ground.z, initial=np.inf), np.nanmax(ground.z, initial=-np.inf)
     if not high - low > 1e-9 * max(abs(high), abs(low)):
         return
-    levels = MaxNLocator(LINES, steps=[1, 2, 5, 10]).tick_values(low, high)
+    levels = MaxNLocator(MAX_CONTOURS, steps=[1, 2, 5, 10]).tick_values(low, high)
     turned = panel.view.right == 1
     x, y, z = (ground.y, ground.x, ground.z.T) if turned else (ground.x, ground.y, ground.z)
     axes.contourf(x, y, z, levels=levels, cmap=SHADES, zorder=1.4)
@@ -76,7 +77,7 @@ def draw_heights(axes: Axes, panel: ViewPanel, ground: SceneTerrain) -> None:
 
 
 def draw_planes(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Scene) -> None:
-    """The solid side of every plane that is seen from its edge, cut at the middle of the motion's depth."""
+    """Draw the solid side of each plane seen from its edge, cut at the middle of the motion's depth."""
     depth = float(np.median(trajectory.position[..., panel.view.depth]))
     middle, size = (panel.low + panel.high) / 2, float(np.linalg.norm(panel.span))
     for plane in scene.planes:

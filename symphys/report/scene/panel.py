@@ -16,7 +16,7 @@ from symphys.types import Array
 
 LEFT, RIGHT, BOTTOM, TOP, GAP = 0.62, 0.15, 0.5, 0.5, 0.62
 """[in] margins of the figure and between its panels"""
-LEAST = 1.1
+MIN_PANEL_SIZE = 1.1
 """[in] smallest width or height of a panel"""
 
 
@@ -30,12 +30,12 @@ class ViewPanel:
 
     @property
     def span(self) -> Array:
-        """(2,) [m]: width and height."""
+        """Return width and height (2,) [m]."""
         return self.high - self.low
 
 
 def make_panel(view: View, trajectory: Trajectory, scene: Scene, guess: Trajectory | None) -> ViewPanel:
-    """The rectangle that holds every body, nearby static surfaces, and the guess unless it goes far away."""
+    """Return the rectangle that holds every body, nearby static surfaces, and the guess unless it goes far away."""
     sizes = np.array([reach(trajectory, scene, body) for body in range(len(trajectory.body_names))])[:, None]
     flat = view.flat(trajectory.position)
     low, high = style.apart((flat - sizes).min(axis=(0, 1)), (flat + sizes).max(axis=(0, 1)))
@@ -64,14 +64,14 @@ def include(plane: ScenePlane, view: View, low: Array, high: Array, room: float)
 
 
 def of_fixture(fixture: SceneFixture) -> Array:
-    """(2, 3) [m]: the lowest and highest coordinates of a fixture."""
+    """Return the lowest and the highest coordinates (2, 3) [m] of a fixture."""
     solid = fixture.solid
     around = solid.centre + corners(np.array(UPRIGHT), solid)
     return np.array([around.min(axis=0) - solid.radius, around.max(axis=0) + solid.radius])
 
 
 def of_terrain(ground: SceneTerrain) -> Array:
-    """(2, 3) [m]: how low and high terrain goes, in the middle of its sides: a picture need not show all of it."""
+    """Return the lowest and the highest point (2, 3) [m] of terrain, in the middle of its sides."""
     middle = [(ground.x[0] + ground.x[-1]) / 2, (ground.y[0] + ground.y[-1]) / 2]
     known = ground.z[np.isfinite(ground.z)]
     return np.array([[*middle, z] for z in (known.min(initial=np.inf), known.max(initial=-np.inf))])
@@ -96,14 +96,14 @@ def arrange(panels: list[ViewPanel]) -> tuple[bool, float]:
 
 def widen(panel: ViewPanel, scale: float) -> ViewPanel:
     """Make room on both sides where a panel would be too thin to read."""
-    lack = np.maximum(LEAST / scale - panel.span, 0) / 2
+    lack = np.maximum(MIN_PANEL_SIZE / scale - panel.span, 0) / 2
     return ViewPanel(panel.view, panel.low - lack, panel.high + lack)
 
 
 def lay_out(
     panels: list[ViewPanel], stacked: bool, scale: float
 ) -> tuple[DataFigure, list[tuple[float, float, float, float]]]:
-    """The figure, and (left, bottom, width, height) of each panel in shares of it."""
+    """Return the figure, and (left, bottom, width, height) of each panel in shares of it."""
     sizes = [panel.span * scale for panel in panels]
     gaps = GAP * (len(panels) - 1)
     height = (sum(s[1] for s in sizes) + gaps if stacked else max(s[1] for s in sizes)) + BOTTOM + TOP

@@ -48,7 +48,7 @@ class Panel {
     this.top = top + TOP;
     this.width = width - (this.left - left) - GAP - (data.bars ? 60 : 0);
     this.xs = (data.x || []).map(numbers);
-    this.lines = (data.lines || []).map((line) => ({ ...line, y: numbers(line.y), x: this.xs[line.x] }));
+    this.lines = (data.lines || []).map((line) => ({ ...line, l: (line.l || "").split(" "), y: numbers(line.y), x: this.xs[line.x] }));
     this.up = transform(data.scale);
     this.range();
   }
@@ -76,7 +76,8 @@ class Panel {
     line.y.forEach((value, k) => {
       const x = this.x(line.x[k]), y = this.y(value);
       if (value === null || line.x[k] === null || !Number.isFinite(x) || !Number.isFinite(y)) { pen = "M"; return; }
-      if (line.l === "steps" && pen === "L") text += `H${x.toFixed(1)}V${y.toFixed(1)}`;
+      if (line.l.includes("steps") && pen === "L") text += `H${x.toFixed(1)}V${y.toFixed(1)}`;
+      else if (line.l.includes("middles") && pen === "L") text += `H${((x + this.x(line.x[k - 1])) / 2).toFixed(1)}V${y.toFixed(1)}H${x.toFixed(1)}`;
       else text += `${pen}${x.toFixed(1)} ${y.toFixed(1)}`;
       pen = "L";
     });
@@ -84,12 +85,13 @@ class Panel {
   }
 
   drawn(line) {
-    if (line.l === "dots" || line.l === "rings") {
+    const has = (word) => line.l.includes(word);
+    if (has("dots") || has("rings")) {
       const spots = line.y.map((v, k) => `<circle cx="${this.x(line.x[k]).toFixed(1)}" cy="${this.y(v).toFixed(1)}" r="4"/>`);
-      return `<g fill="${line.l === "dots" ? line.c : "#fff"}" stroke="${line.c}">${spots.join("")}</g>`;
+      return `<g fill="${has("dots") ? line.c : "#fff"}" stroke="${line.c}">${spots.join("")}</g>`;
     }
-    const look = { dashed: 'stroke-dasharray="4 3"', pale: 'stroke-opacity="0.25"' }[line.l] || "";
-    const few = line.y.length <= 40 && line.l !== "dashed" && line.l !== "pale";
+    const look = has("dashed") ? 'stroke-dasharray="4 3"' : has("dotted") ? 'stroke-dasharray="1 2"' : has("pale") ? 'stroke-opacity="0.25"' : "";
+    const few = line.y.length <= 40 && !["dashed", "dotted", "pale", "plain"].some(has);
     const mark = few ? line.y.map((v, k) => (v === null ? "" : `M${this.x(line.x[k]).toFixed(1)} ${this.y(v).toFixed(1)}h0`)).join("") : "";
     const dots = few ? `<path d="${mark}" stroke-width="5" stroke-linecap="round"/>` : "";
     return `<g fill="none" stroke="${line.c}" ${look}><path d="${this.path(line)}" stroke-width="${line.w}"/>${dots}</g>`;
@@ -105,11 +107,26 @@ class Panel {
     }
     if (data.along) out.push(`<text x="${left + width}" y="${bottom + 27}" text-anchor="end">${escaped(data.along)}</text>`);
     if (data.bars) return out.join("");
+    const clipped = (v, open) => (v === null ? open : Math.min(Math.max(this.y(v), top), bottom));
+    for (const [low, high] of data.beyond || []) {
+      const upper = clipped(high, top), lower = clipped(low, bottom);
+      out.push(`<rect x="${left}" y="${upper.toFixed(1)}" width="${width}" height="${(lower - upper).toFixed(1)}" class="beyond"/>`);
+    }
+    (data.stages || []).forEach(([from, to, text], k) => {
+      const [a, b] = [this.x(from), this.x(to)];
+      if (k % 2) out.push(`<rect x="${a.toFixed(1)}" y="${top}" width="${(b - a).toFixed(1)}" height="${height}" class="ground"/>`);
+      if (b - a > 6 * text.length) out.push(`<text x="${((a + b) / 2).toFixed(1)}" y="${top + 10}" text-anchor="middle">${escaped(text)}</text>`);
+    });
     for (const v of ticksOf(data.scale, ...this.tall)) {
       out.push(level(v, "grid"), `<text x="${left - 6}" y="${(this.y(v) + 3.5).toFixed(1)}" text-anchor="end">${written(v)}</text>`);
     }
     out.push(...(data.ticks || []).map((v) => `<path d="M${this.x(v).toFixed(1)} ${bottom}v-6" class="tick"/>`));
     out.push(...(data.edges || []).map((v) => level(v, "edge")));
+    if (data.end) {
+      const x = this.x(data.end[0]), late = x > left + width / 2;
+      out.push(`<path d="M${x.toFixed(1)} ${top}v${height}" class="end"/>`);
+      out.push(`<text x="${(x + (late ? -5 : 5)).toFixed(1)}" y="${top + 10}" text-anchor="${late ? "end" : "start"}">${escaped(data.end[1])}</text>`);
+    }
     if (data.met) out.push(`<rect x="${left}" y="${this.y(1).toFixed(1)}" width="${width}" height="${(bottom - this.y(1)).toFixed(1)}" class="met"/>`, level(1, "limit"));
     return out.join("");
   }
@@ -128,7 +145,7 @@ class Panel {
   at(x) { // the numbers below the pointer, in words; null beside the panel
     const value = this.wide[0] + ((x - this.left) / this.width) * (this.wide[1] - this.wide[0]);
     if (value < this.wide[0] || value > this.wide[1] || !this.lines.length) return null;
-    const parts = this.lines.filter((line) => line.n && !["dots", "rings"].includes(line.l)).map((line) => {
+    const parts = this.lines.filter((line) => line.n && !line.l.includes("dots") && !line.l.includes("rings")).map((line) => {
       const near = line.x.reduce((best, v, k) => (Math.abs(v - value) < Math.abs(line.x[best] - value) ? k : best), 0);
       return line.y[near] === null || line.y[near] === undefined ? "" : `${line.n} ${written(line.y[near])}`;
     });

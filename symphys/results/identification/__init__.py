@@ -1,17 +1,15 @@
 """What a folder of an identification holds: one definition for who writes and who reads."""
 
-from symphys.results.identification.parts import (
-    GlobalSearch,
-    OpenDirection,
-    ParameterEstimate,
-    PredictionErrors,
-    QuantityResiduals,
-)
 from symphys.results.identification.record import (
     ARRAYS,
     HISTORY,
     IDENTIFICATION,
+    GlobalSearch,
     Identification,
+    OpenDirection,
+    ParameterEstimate,
+    PredictionErrors,
+    QuantityResiduals,
     read_identification,
 )
 from symphys.results.identification.summary import summary

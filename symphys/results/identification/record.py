@@ -18,15 +18,142 @@ import numpy as np
 from symphys import files
 from symphys import json_values as values
 from symphys.results.archives import read_archive
-from symphys.results.identification.parts import (
-    GlobalSearch,
-    OpenDirection,
-    ParameterEstimate,
-    PredictionErrors,
-    QuantityResiduals,
-)
 from symphys.results.text_files import ReportError, read_table
 from symphys.types import Array
+
+
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """A shared number; nan is what is not known.
+
+    Attributes:
+        name, unit: as reports show them.
+        value: the estimate.
+        error: its standard error; inf where the recordings do not determine it.
+        lower, upper: of the 95 % interval from the Jacobian; nan at a bound.
+        bootstrap_lower, bootstrap_upper: of the 95 % interval from the bootstrap over recordings.
+        at_bound: "lower" or "upper" for the bound that holds it, else empty.
+        guess: where the fit began.
+        least, most: its bounds; -inf and inf are none.
+        prior_mean, prior_deviation: of its prior; a deviation of inf is none.
+    """
+
+    name: str
+    unit: str
+    value: float
+    error: float
+    lower: float
+    upper: float
+    bootstrap_lower: float
+    bootstrap_upper: float
+    at_bound: str
+    guess: float
+    least: float
+    most: float
+    prior_mean: float
+    prior_deviation: float
+
+
+@dataclass(frozen=True)
+class OpenDirection:
+    """Numbers that the recordings do not determine.
+
+    Attributes:
+        names: of the shared numbers that take part.
+        own_names: of own numbers that move along.
+        text: what is open, in words.
+        advice: which recording would determine it, in a sentence.
+        error: standard error of the least determined direction, in units of the numbers; inf: no information.
+        by_prior: whether a prior determines it.
+    """
+
+    names: tuple[str, ...]
+    own_names: tuple[str, ...]
+    text: str
+    advice: str
+    error: float
+    by_prior: bool
+
+
+@dataclass(frozen=True)
+class QuantityResiduals:
+    """The residuals that the fit leaves of a measured quantity; nan is what is not known.
+
+    Attributes:
+        name, unit: of the quantity.
+        count: of residuals.
+        noise: [unit] root mean square of the standard deviations by which they were divided.
+        noise_known: whether the noise was given; else it is estimated.
+        rms: [unit] root mean square.
+        ratio: root mean square of residuals by noise: 1 where the noise explains them.
+        mean: by noise.
+        autocorrelation: from one sample to the next, of the same component.
+        ljung_box: probability that white noise is correlated as much over ``lags`` samples.
+        lags: of that test.
+        by_time, by_impact, by_recording: share of the squares that means over the time, the time since an impact, or
+            recording by recording explain, adjusted for their number.
+        verdict: "noise", "missing effect" or "too few".
+        text: why, in words.
+    """
+
+    name: str
+    unit: str
+    count: int
+    noise: float
+    noise_known: bool
+    rms: float
+    ratio: float
+    mean: float
+    autocorrelation: float
+    ljung_box: float
+    lags: int
+    by_time: float
+    by_impact: float
+    by_recording: float
+    verdict: str
+    text: str
+
+
+@dataclass(frozen=True)
+class PredictionErrors:
+    """The errors of simulations against some recordings, in one quantity.
+
+    Attributes:
+        name, unit: of the quantity.
+        recordings: how many.
+        mean, deviation: [unit] of the recordings' mean errors; an error is the length of the difference at a sample.
+        rmse: [unit] root mean square of the errors at all samples.
+        ratio: root mean square of the differences by noise.
+    """
+
+    name: str
+    unit: str
+    recordings: int
+    mean: float
+    deviation: float
+    rmse: float
+    ratio: float
+
+
+@dataclass(frozen=True)
+class GlobalSearch:
+    """A search of the shared numbers by an evolution strategy, as a check against local minima.
+
+    Attributes:
+        merit, found: of the fit, and the lowest that the search came to.
+        lower: whether that is lower by more than one standard error makes.
+        values: (s,) where, by name.
+        evaluations: of all recordings.
+        text: what that means, in a sentence.
+    """
+
+    merit: float
+    found: float
+    lower: bool
+    values: Mapping[str, float]
+    evaluations: int
+    text: str
+
 
 IDENTIFICATION, ARRAYS = "identification.json", "identification.npz"
 FORMAT = 1
@@ -38,7 +165,7 @@ ARRAY = {"array": True}
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """What recordings say of a model: K recordings, s shared numbers, o own numbers of each recording.
+    """The estimates from K recordings: s shared numbers, and o own numbers of each recording.
 
     Attributes:
         problem, title: names.
@@ -108,7 +235,7 @@ class Identification:
     residual_impact: Array = field(repr=False, metadata=ARRAY)
 
     def __getitem__(self, name: str) -> ParameterEstimate:
-        """The estimate of a shared number; KeyError lists the names."""
+        """Return the estimate of a shared number; KeyError lists the names."""
         found = {each.name: each for each in self.parameters}
         if name not in found:
             raise KeyError(f"no shared number {name}: there are {', '.join(found)}")
@@ -125,13 +252,13 @@ class Identification:
         return {name: (float(value), float(error)) for name, value, error in pairs}
 
     def worst(self, count: int = 5) -> tuple[tuple[str, float], ...]:
-        """The recordings whose residuals are largest, and their root mean square by noise."""
+        """Return the recordings whose residuals are largest, and their root mean square by noise."""
         order = np.argsort(np.where(np.isnan(self.recording_ratio), -np.inf, -self.recording_ratio))
         known = [int(k) for k in order if not np.isnan(self.recording_ratio[k])]
         return tuple((self.recordings[k], float(self.recording_ratio[k])) for k in known[:count])
 
     def to_json(self) -> dict[str, Any]:
-        """The object of identification.json, which has all but the arrays."""
+        """Return the object of identification.json, which has all but the arrays."""
         found = {each.name: getattr(self, each.name) for each in fields(self) if not is_array(each)}
         for name in ("parameters", "open", "quantities", "fitted_errors", "held_back_errors"):
             found[name] = [vars(each) for each in found[name]]
@@ -139,7 +266,7 @@ class Identification:
         return {"format": FORMAT, **found}
 
     def write(self, folder: Path) -> None:
-        """Both files; the table last, since nothing counts without it."""
+        """Write both files; the table last, since nothing counts without it."""
         files.write_npz(
             folder / ARRAYS, {each.name: getattr(self, each.name) for each in fields(self) if is_array(each)}
         )
@@ -152,7 +279,7 @@ def is_array(each: Any) -> bool:
 
 
 def read_identification(folder: Path) -> Identification:
-    """The record in a folder.
+    """Read the record in a folder.
 
     Raises:
         ReportError: a file is missing, or is none of this kind.

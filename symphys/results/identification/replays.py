@@ -73,7 +73,7 @@ class RecordingReplay:
 
 
 def write_replays(folder: Path, replays: Sequence[RecordingReplay], scene: Scene) -> None:
-    """All of its files; the list last."""
+    """Write the files of the replays; the list last."""
     files.make_folder(folder / "replays")
     listed = []
     for k, each in enumerate(replays, 1):
@@ -90,7 +90,7 @@ def write_replays(folder: Path, replays: Sequence[RecordingReplay], scene: Scene
 
 
 def read_replays(folder: Path) -> tuple[RecordingReplay, ...]:
-    """Those in a folder; none where there is no list. Raises ReportError."""
+    """Read the replays in a folder; none where there is no list. Raises ReportError."""
     if not (folder / REPLAYS).exists():
         return ()
     listed = read_table(folder / REPLAYS).get("replays")

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from symphys.results.identification.parts import ParameterEstimate, PredictionErrors
-from symphys.results.identification.record import Identification
+from symphys.results.identification.record import Identification, ParameterEstimate, PredictionErrors
 
-STRONG = 0.9
+STRONG_CORRELATION = 0.9
 """Correlations that are named."""
 
 
@@ -33,7 +32,7 @@ def summary(found: Identification) -> str:
 
 
 def heading(found: Identification) -> str:
-    """How it ended, from how much."""
+    """Say how the fit ended, and from how much."""
     back = int(np.sum(found.held_back))
     count = f"{len(found.recordings) - back} recordings" + (f", {back} more held back" if back else "")
     work = f"{max(len(found.history) - 1, 0)} iterations, {sum(found.seconds.values()):.3g} s"
@@ -42,7 +41,7 @@ def heading(found: Identification) -> str:
 
 
 def parameter_row(each: ParameterEstimate) -> tuple[str, ...]:
-    """Name, estimate, both intervals, and what is to be said of it."""
+    """Return name, estimate, both intervals and remarks of a shared number."""
     digits = significant(each.value, each.error)
     value = f"{each.value:.{digits}g}" + (f" {each.unit}" if each.unit else "")
     open_ended = bool(np.isinf(each.error))
@@ -67,7 +66,7 @@ def significant(value: float, error: float) -> int:
 
 
 def interval(lower: float, upper: float, digits: int) -> str:
-    """``0.17 to 0.19``; empty where it is not known."""
+    """Write ``0.17 to 0.19``; empty where it is not known."""
     return "" if np.isnan(lower) or np.isnan(upper) else f"{lower:.{digits}g} to {upper:.{digits}g}"
 
 
@@ -78,7 +77,7 @@ def correlations(found: Identification) -> list[str]:
         (names[i], names[j], float(found.correlation[i, j]))
         for i in range(len(names))
         for j in range(i)
-        if abs(found.correlation[i, j]) > STRONG
+        if abs(found.correlation[i, j]) > STRONG_CORRELATION
     ]
     return [f"{a} and {b} are correlated by {value:.3f}" for a, b, value in pairs]
 
@@ -96,7 +95,7 @@ def own_lines(found: Identification) -> list[str]:
 
 
 def residuals(found: Identification) -> str:
-    """What is left, quantity by quantity."""
+    """Write a table of the residuals of each quantity."""
     rows = [
         (
             each.name,
@@ -110,7 +109,7 @@ def residuals(found: Identification) -> str:
 
 
 def predictions(what: str, errors: Sequence[PredictionErrors]) -> str:
-    """A table of how far simulations are from recordings."""
+    """Return a table of how far simulations are from recordings."""
     rows = [
         (
             each.name,
@@ -124,17 +123,17 @@ def predictions(what: str, errors: Sequence[PredictionErrors]) -> str:
 
 
 def spread(deviation: float) -> str:
-    """`` ± 0.002``; empty where one recording has none."""
+    """Write `` ± 0.002``; empty where one recording has none."""
     return "" if np.isnan(deviation) else f" ± {deviation:.3g}"
 
 
 def worst(found: Identification) -> str:
-    """The recordings whose residuals are largest."""
+    """Return the recordings whose residuals are largest."""
     return "worst recordings: " + ", ".join(f"{name} ({ratio:.3g} times the noise)" for name, ratio in found.worst())
 
 
 def with_unit(number: float, unit: str) -> str:
-    """``0.0021 m``."""
+    """Write ``0.0021 m``."""
     return f"{number:.3g} {unit}".rstrip()
 
 

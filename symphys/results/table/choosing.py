@@ -62,7 +62,7 @@ class Condition:
 
 
 def read_condition(text: str, known: Sequence[str]) -> Condition:
-    """The condition in a text, such as ``objective<0.5``.
+    """Read the condition in a text, such as ``objective<0.5``.
 
     Raises:
         BadCondition: no comparison.
@@ -78,7 +78,7 @@ def read_condition(text: str, known: Sequence[str]) -> Condition:
 
 
 def number(text: str) -> float | None:
-    """The number in a text; None for none."""
+    """Return the number in a text; None for none."""
     try:
         return float(text)
     except ValueError:
@@ -86,7 +86,7 @@ def number(text: str) -> float | None:
 
 
 def chosen(rows: Iterable[Row], conditions: Iterable[str]) -> list[Row]:
-    """The rows that meet all conditions; see ``Condition``.
+    """Return the rows that meet all conditions; see ``Condition``.
 
     Raises:
         BadCondition, UnknownColumn: see ``read_condition``.
@@ -99,7 +99,7 @@ def chosen(rows: Iterable[Row], conditions: Iterable[str]) -> list[Row]:
 
 
 def ordered(rows: Iterable[Row], key: str) -> list[Row]:
-    """The rows by a column, ``-`` before its name for the largest first; those that do not have it come last.
+    """Return the rows by a column, ``-`` before its name for the largest first; those that do not have it come last.
 
     Several columns are separated by commas, the one that counts most first: ``case,-objective``.
 
@@ -116,13 +116,13 @@ def ordered(rows: Iterable[Row], key: str) -> list[Row]:
 
 
 def sorting(key: str, known: Sequence[str]) -> tuple[str, bool]:
-    """The column that a key names, and whether its largest value comes first."""
+    """Return the column that a key names, and whether its largest value comes first."""
     key = key.strip()
     return find_column(key.removeprefix("-"), known), key.startswith("-")
 
 
 def ranked(column: str, row: Row) -> tuple[bool, Any]:
-    """By which rows are sorted that have a column."""
+    """Return the key by which rows are sorted that have a column."""
     return rank(row[column])
 
 
@@ -132,7 +132,7 @@ def rank(value: Any) -> tuple[bool, Any]:
 
 
 def best(rows: Iterable[Row], by: str = "objective", overall: bool = False) -> list[Row]:
-    """The best run of each case, or of all: by its verdict, then by a column, then by its cost in rollouts.
+    """Return the best run of each case, or of all: by its verdict, then by a column, then by its cost in rollouts.
 
     Args:
         rows: of runs; those without a result are left out.

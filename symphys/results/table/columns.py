@@ -37,7 +37,7 @@ class UnknownColumn(SymphysError):
 
 
 def setting_column(key: str) -> str:
-    """The column of a setting: its key, ``ground.friction``."""
+    """Return the column of a setting: its key, ``ground.friction``."""
     return key if "." in key and not key.startswith((OUTPUT, COST)) else SETTING + key
 
 
@@ -47,7 +47,7 @@ def numeric(column: str) -> bool:
 
 
 def columns(rows: Iterable[Mapping[str, Any]]) -> list[str]:
-    """The names of all columns of the rows, in the order of the table; those in FIXED always."""
+    """Return the names of all columns of the rows, in the order of the table; those in FIXED always."""
     others = set(chain.from_iterable(rows)) - set(FIXED)
     outputs = sorted(name for name in others if name.startswith(OUTPUT))
     costs = sorted(name for name in others if name.startswith(COST))
@@ -56,7 +56,7 @@ def columns(rows: Iterable[Mapping[str, Any]]) -> list[str]:
 
 
 def find_column(name: str, known: Sequence[str]) -> str:
-    """The column that a user means: by its name, or that of an output or a cost without what is around it.
+    """Return the column that a user means: by its name, or that of an output or a cost without what is around it.
 
     Raises:
         UnknownColumn: none or several have that name.
@@ -73,7 +73,7 @@ def find_column(name: str, known: Sequence[str]) -> str:
 
 
 def short_names(column: str) -> set[str]:
-    """What else a column may be called: ``speed [m/s]`` or ``speed`` for ``output: speed [m/s]``."""
+    """Return other names of a column: ``speed [m/s]`` or ``speed`` for ``output: speed [m/s]``."""
     for prefix in (OUTPUT, COST, SETTING):
         if column.startswith(prefix):
             bare = column.removeprefix(prefix)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -17,9 +17,10 @@ from symphys.results.file_names import CONFIG, PROBLEM, RESULT
 from symphys.results.result import VariableRecord
 from symphys.results.text_files import ReportError, read_table, read_words
 
+T = TypeVar("T")
 CONFIGURED = ("problem", "solver", "seed", "backend")
 FOUND = ("verdict", "status", "objective", "iterations", "equivalents")
-ALWAYS = ("pid", "peak_memory")
+VOLATILE = ("pid", "peak_memory")
 """Of the provenance: what differs from run to run."""
 TEXT = "problem.toml"
 """The part whose differences are lines of a unified diff."""
@@ -31,7 +32,7 @@ CONTEXT = 3
 
 @dataclass(frozen=True)
 class Difference:
-    """One thing that differs.
+    """A difference between two runs.
 
     Attributes:
         part: "asked for", "settings", "options", "problem.toml", "found", "checks", "outputs", "costs", "variables",
@@ -46,7 +47,7 @@ class Difference:
     second: Any = None
 
     def __str__(self) -> str:
-        """In a line."""
+        """Write the difference in a line."""
         if self.part == TEXT:
             return self.name
         if self.part == FILES:
@@ -56,12 +57,12 @@ class Difference:
 
     @property
     def faults(self) -> tuple[tuple[str, Any], ...]:
-        """What could not be read of which run."""
+        """Return what could not be read, by run."""
         return ("first", self.first), ("second", self.second)
 
     @property
     def change(self) -> float | None:
-        """The second number less the first; None where they are no numbers, or not finite."""
+        """Return the second number less the first; None where they are no numbers, or not finite."""
         pair = self.first, self.second
         if any(isinstance(each, bool) or not isinstance(each, int | float) for each in pair):
             return None
@@ -70,7 +71,7 @@ class Difference:
 
 
 def differences(first: Path, second: Path) -> list[Difference]:
-    """All that differs between two run folders; a file that only one of them has, or that cannot be read, is named.
+    """List what differs between two run folders, and the files that only one has or that cannot be read.
 
     Raises:
         FileError: one is no folder.
@@ -79,19 +80,25 @@ def differences(first: Path, second: Path) -> list[Difference]:
         if not folder.is_dir():
             raise FileError(f"{folder}: there is no such folder; a run folder is one as reports/ball_throw/cma-seed0")
     found: list[Difference] = []
-    configs, results = (tables(first, second, name, found) for name in (CONFIG, RESULT))
+    configs, results = (read_both(first, second, name, read_table, found) for name in (CONFIG, RESULT))
+    texts = read_both(first, second, PROBLEM, read_words, changes := list[Difference]())
     if configs:
         found += compared("asked for", *(chosen(config, CONFIGURED) for config in configs))
         for part in ("settings", "options"):
             found += compared(part, *(flat(config.get(part)) for config in configs))
-    found += text_difference(first, second)
+    if texts:
+        names = (f"{first}/{PROBLEM}", f"{second}/{PROBLEM}")
+        one, other = (text.splitlines() for text in texts)
+        lines = difflib.unified_diff(one, other, *names, lineterm="", n=CONTEXT)
+        changes = [Difference(TEXT, line) for line in lines]
+    found += changes
     if results:
         found += result_differences(*results)
     return found
 
 
 def result_differences(*results: Mapping[str, Any]) -> Iterator[Difference]:
-    """What differs between two results."""
+    """Yield what differs between two results."""
     yield from compared("found", *(chosen(result, FOUND) for result in results))
     yield from compared("checks", *(errors(result) for result in results))
     for part in ("outputs", "costs"):
@@ -99,44 +106,28 @@ def result_differences(*results: Mapping[str, Any]) -> Iterator[Difference]:
     yield from variable_differences(*results)
     yield from compared("versions", *(values.table(result.get("versions")) for result in results))
     origins = [values.table(result.get("provenance")) for result in results]
-    yield from compared("provenance", *({k: v for k, v in each.items() if k not in ALWAYS} for each in origins))
+    yield from compared("provenance", *({k: v for k, v in each.items() if k not in VOLATILE} for each in origins))
 
 
-def tables(first: Path, second: Path, name: str, found: list[Difference]) -> list[dict[str, Any]]:
-    """The objects of a file of both; empty, and the fault among those found, where one cannot be read."""
-    read: list[dict[str, Any]] = []
-    faults: list[str | None] = []
+def read_both(
+    first: Path, second: Path, name: str, read: Callable[[Path], T], found: list[Difference]
+) -> tuple[T, T] | None:
+    """Read a file of both runs; None, and the fault among those found, where one cannot be read."""
+    contents, faults = list[T](), list[str | None]()
     for folder in (first, second):
         try:
-            read.append(read_table(folder / name))
+            contents.append(read(folder / name))
             faults.append(None)
         except ReportError as error:
             faults.append(str(error))
-    if any(faults):
-        found.append(Difference(FILES, name, *faults))
-        return []
-    return read
-
-
-def text_difference(first: Path, second: Path) -> list[Difference]:
-    """The lines of a unified diff of the problems' texts."""
-    texts: list[list[str]] = []
-    faults: list[str | None] = []
-    for folder in (first, second):
-        try:
-            texts.append(read_words(folder / PROBLEM).splitlines())
-            faults.append(None)
-        except ReportError as error:
-            faults.append(str(error))
-    if any(faults):
-        return [Difference(FILES, PROBLEM, *faults)]
-    names = (f"{first}/{PROBLEM}", f"{second}/{PROBLEM}")
-    lines = difflib.unified_diff(texts[0], texts[1], *names, lineterm="", n=CONTEXT)
-    return [Difference(TEXT, line) for line in lines]
+    if len(contents) == 2:
+        return contents[0], contents[1]
+    found.append(Difference(FILES, name, *faults))
+    return None
 
 
 def compared(part: str, first: Mapping[str, Any], second: Mapping[str, Any]) -> list[Difference]:
-    """The entries of two tables that are not the same."""
+    """Return the entries of two tables that are not the same."""
     names = dict.fromkeys([*first, *second])
     return [
         Difference(part, name, first.get(name), second.get(name))
@@ -152,12 +143,12 @@ def same(first: Any, second: Any) -> bool:
 
 
 def chosen(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
-    """Some entries of a table."""
+    """Return some entries of a table."""
     return {name: table.get(name) for name in names}
 
 
 def flat(table: object, before: str = "") -> dict[str, Any]:
-    """The entries of a table and of those inside by dotted keys."""
+    """Return the entries of a table and of those inside by dotted keys."""
     found: dict[str, Any] = {}
     for key, value in values.table(table).items():
         found |= flat(value, f"{before}{key}.") if isinstance(value, dict) else {before + key: value}
@@ -165,13 +156,13 @@ def flat(table: object, before: str = "") -> dict[str, Any]:
 
 
 def errors(result: Mapping[str, Any]) -> dict[str, Any]:
-    """The error of every check by its kind and name."""
+    """Return the error of every check by its kind and name."""
     checks = values.tables(result.get("checks"))
     return {f"{check.get('kind', 'check')}: {check.get('name', '')}": check.get("error") for check in checks}
 
 
 def variable_differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> Iterator[Difference]:
-    """Of every variable the component that differs most."""
+    """Yield the component that differs most of every variable."""
     read = [
         {name: VariableRecord.from_json(entry).value for name, entry in values.table(each.get("z")).items()}
         for each in (first, second)
@@ -190,7 +181,7 @@ def variable_differences(first: Mapping[str, Any], second: Mapping[str, Any]) ->
 
 
 def shown(value: Any, other: Any) -> str:
-    """A value in short, but with all of its digits where the other reads the same in short."""
+    """Return a value in short, but with all of its digits where the other reads the same in short."""
     if value is None:
         return "-"
     if isinstance(value, float):

@@ -34,7 +34,7 @@ BODY = len(MARK) + 10
 """Where that begins."""
 TEXTS = frozenset(FIXED) - NUMBERS - {"solved"}
 """Columns that hold texts."""
-ALWAYS = ("problem", "case", "solver", "verdict")
+REQUIRED = ("problem", "case", "solver", "verdict")
 """Those that every row has, beside "solved"."""
 INFINITE = ("inf", "-inf")
 """Numbers that JSON has no other way to write; what is nan has no entry."""
@@ -58,7 +58,7 @@ class Journal:
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Return the file."""
         return self.out / NAME
 
     def add(self, folder: Path, written: tuple[dict[str, Any], dict[str, Any]] | None = None) -> None:
@@ -96,7 +96,7 @@ class Journal:
             os.close(handle)
 
     def read(self) -> tuple[dict[str, Kept], int]:
-        """The last row of every run, and how many lines the file has.
+        """Return the last row of every run, and how many lines the file has.
 
         Rows that it does not give, as the file is missing, damaged or cannot be read, are read from the folders.
         """
@@ -119,12 +119,12 @@ class Journal:
 
 
 def stamp_of(status: os.stat_result) -> Stamp:
-    """By which a changed file is recognised."""
+    """Return the stamp by which a changed file is recognised."""
     return status.st_mtime_ns, status.st_size
 
 
 def line(place: str, kept: Kept) -> bytes:
-    """A line with its end."""
+    """Return a line with its end."""
     content = {"rows": ROWS, "run": place, "stamp": kept.stamp, "row": kept.row}
     try:
         text = json.dumps(content, separators=(",", ":"), allow_nan=False)
@@ -135,7 +135,7 @@ def line(place: str, kept: Kept) -> bytes:
 
 
 def entry(text: bytes) -> Iterable[tuple[str, Kept]]:
-    """The run and its row in a line; nothing for one that is damaged. What a torn line was glued to is found."""
+    """Return the run and its row in a line; nothing for one that is damaged. What a torn line was glued to is found."""
     text = text[max(text.rfind(MARK), 0) :].rstrip(b"\n")
     body = text[BODY:]
     if not text.startswith(MARK) or text[len(MARK) : BODY] != b'%08x",' % zlib.crc32(body):
@@ -164,4 +164,4 @@ def sound(row: Mapping[str, Any]) -> bool:
         if odd or UNPRINTABLE.search(column):
             return False
     own = "run" in row or "fault" in row
-    return not own and type(row.get("solved")) is bool and all(row.get(column) for column in ALWAYS)
+    return not own and type(row.get("solved")) is bool and all(row.get(column) for column in REQUIRED)

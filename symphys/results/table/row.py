@@ -13,21 +13,20 @@ from pathlib import Path
 from typing import Any
 
 from symphys import json_values as values
-from symphys.files import check_regular, emptied, strict
+from symphys.files import strict
 from symphys.findings.verdict import NOT_SOLVED
 from symphys.results.case_name import case_name
 from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.result import CheckRecord, Result
+from symphys.results.run import is_result, read_or_note
 from symphys.results.table.columns import COST, MOST_EXACT, OUTPUT, UNFINISHED, UNREADABLE, Row, setting_column
-from symphys.results.text_files import ReportError, reason
+from symphys.results.text_files import ReportError, read_light_table
 
-HEAVY = ("z", "trust")
-"""Tables of result.json that no row needs."""
 WAITING = "there is no result yet: the run goes on, or was stopped before its end"
 
 
 def read_row(folder: Path) -> Row:
-    """The row of a run folder, without its "run" and without what is not known.
+    """Read the row of a run folder, without its "run" and without what is not known.
 
     Never fails: "fault" says what could not be read. A run without result.json is "unfinished"; one whose result.json
     cannot be read is "unreadable".
@@ -36,40 +35,40 @@ def read_row(folder: Path) -> Row:
 
 
 def row_of(folder: Path, config: dict[str, Any], result: dict[str, Any]) -> Row:
-    """``read_row`` of a run whose config.json and result.json hold this."""
+    """Return the row of a run whose config.json and result.json hold this, as ``read_row`` does."""
     row = make_row(folder, config, result, [])
     return {column: value for column, value in row.items() if value is not None and value != ""}
 
 
 def whole_row(folder: Path) -> Row:
-    """The row with None and empty texts for what is not known."""
+    """Return the row with None and empty texts for what is not known."""
     faults: list[str] = []
-    config = read_or_note(folder / CONFIG, faults)
+    config = read_or_note(folder / CONFIG, faults, read_light_table)
     try:
-        result = read_light(folder / RESULT)
-    except FileNotFoundError:
-        return without_result(folder, config, UNFINISHED, WAITING, faults)
+        result = read_light_table(folder / RESULT)
     except ReportError as error:
+        if not (folder / RESULT).exists():
+            return without_result(folder, config, UNFINISHED, WAITING, faults)
         return without_result(folder, config, UNREADABLE, str(error), [str(error), *faults])
-    if not ("solver" in result and "problem" in result):
-        why = f"{RESULT}: not a result of symphys (it names no problem and solver)"
-        return without_result(folder, config, UNREADABLE, why, [why, *faults])
+    wrong: list[str] = []
+    if not is_result(result, wrong):
+        return without_result(folder, config, UNREADABLE, wrong[0], [*wrong, *faults])
     try:
         return make_row(folder, config, result, faults)
     except (OSError, ValueError, RecursionError) as error:
-        why = f"{RESULT}: cannot be ruled on ({values.name(str(error))})"
+        why = f"{RESULT}: cannot be judged ({values.name(str(error))})"
         return without_result(folder, config, UNREADABLE, why, [why, *faults])
 
 
 def make_row(folder: Path, config: Mapping[str, Any], result: Mapping[str, Any], faults: Sequence[str] = ()) -> Row:
-    """The row of a run by the objects of its files."""
-    ruled = result if result.get("verdict") else whole_result(folder)
+    """Return the row of a run by the objects of its files."""
+    judged = result if result.get("verdict") else whole_result(folder)
     seconds, provenance, backend = (table(result.get(key)) for key in ("seconds", "provenance", "backend"))
     return {
         **asked(folder, config, result),
-        "verdict": values.name(ruled.get("verdict")) or NOT_SOLVED,
+        "verdict": values.name(judged.get("verdict")) or NOT_SOLVED,
         "status": values.name(result.get("status")),
-        "solved": ruled.get("solved") is True,
+        "solved": judged.get("solved") is True,
         "objective": number(result.get("objective")),
         "worst": worst(result.get("checks")),
         **named(OUTPUT, result.get("outputs")),
@@ -83,13 +82,13 @@ def make_row(folder: Path, config: Mapping[str, Any], result: Mapping[str, Any],
         "backend": values.name(backend.get("name")),
         "host": values.name(provenance.get("host")),
         "when": values.name(result.get("when")),
-        "why": why_not(ruled, result),
+        "why": why_not(judged, result),
         "fault": "; ".join(faults),
     }
 
 
 def without_result(folder: Path, config: Mapping[str, Any], word: str, why: str, faults: Sequence[str]) -> Row:
-    """The row of a folder in which no result can be read."""
+    """Return the row of a folder in which no result can be read."""
     known = asked(folder, config, {})
     return {**known, "verdict": word, "status": word, "solved": False, "why": why, "fault": "; ".join(faults)}
 
@@ -114,12 +113,12 @@ def named(prefix: str, numbers: object) -> Row:
 
 
 def table(value: object) -> Mapping[str, Any]:
-    """A JSON object; empty for anything else."""
+    """Return a JSON object; empty for anything else."""
     return value if isinstance(value, dict) else {}
 
 
 def number(value: object) -> float | int | None:
-    """A number, whole where it is; None for what is not known."""
+    """Return a number, whole where it is; None for what is not known."""
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) < MOST_EXACT:
         return value
     read = values.number(value)
@@ -127,7 +126,7 @@ def number(value: object) -> float | int | None:
 
 
 def plain(value: object) -> bool | float | int | str | None:
-    """A setting as it is; a list or table as JSON text."""
+    """Return a setting as it is; a list or table as JSON text."""
     if isinstance(value, bool) or value is None:
         return value
     if isinstance(value, int | float):
@@ -136,7 +135,7 @@ def plain(value: object) -> bool | float | int | str | None:
 
 
 def worst(checks: object) -> float | int | None:
-    """The largest error / tolerance, inf where one is not known; None without checks."""
+    """Return the largest error / tolerance, inf where one is not known; None without checks."""
     asked = [check for check in checks if isinstance(check, dict)] if isinstance(checks, list) else []
     if not asked:
         return None
@@ -145,47 +144,15 @@ def worst(checks: object) -> float | int | None:
     return max(math.inf if ratio is None else ratio for ratio in found)
 
 
-def why_not(ruled: Mapping[str, Any], result: Mapping[str, Any]) -> str:
-    """Why a run is not to be trusted, or what its solver says; empty for one that is solved."""
-    doubts = values.names(ruled.get("doubts"))
+def why_not(judged: Mapping[str, Any], result: Mapping[str, Any]) -> str:
+    """Say why a run is not to be trusted, or what its solver says; empty for one that is solved."""
+    doubts = values.names(judged.get("doubts"))
     if doubts:
         return values.name("; ".join(doubts))
-    return "" if ruled.get("solved") is True else values.name(result.get("advice"))
+    return "" if judged.get("solved") is True else values.name(result.get("advice"))
 
 
 def whole_result(folder: Path) -> dict[str, Any]:
-    """Verdict, solved and doubts of a file that is older than verdicts: it is ruled on anew, which needs all of it."""
+    """Judge a file that is older than verdicts anew, which needs all of it; return verdict, solved and doubts."""
     found = Result.from_json(json.loads((folder / RESULT).read_bytes()))
     return {"verdict": found.verdict, "solved": found.solved, "doubts": list(found.doubts)}
-
-
-def read_or_note(path: Path, faults: list[str]) -> dict[str, Any]:
-    """The object in a file; empty, with a clause in ``faults``, where there is none."""
-    try:
-        return read_light(path)
-    except FileNotFoundError:
-        faults.append(f"{path.name}: there is no such file")
-    except ReportError as error:
-        faults.append(str(error))
-    return {}
-
-
-def read_light(path: Path) -> dict[str, Any]:
-    """The JSON object in a file without the tables in HEAVY.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ReportError: names the file and says why it cannot be read.
-    """
-    try:
-        check_regular(path)
-        found = json.loads(emptied(path.read_bytes(), HEAVY))
-    except FileNotFoundError:
-        raise
-    except OSError as error:
-        raise ReportError(f"{path.name}: {reason(error)}") from error
-    except (ValueError, RecursionError) as error:
-        raise ReportError(f"{path.name}: not valid JSON, perhaps half written ({values.name(str(error))})") from error
-    if not isinstance(found, dict):
-        raise ReportError(f"{path.name}: a JSON object is expected, this is a {type(found).__name__}")
-    return found

@@ -12,21 +12,21 @@ from symphys.results.file_names import CONFIG, FIGURES, PROBLEM, RESULT
 from symphys.results.table.columns import Row, numeric
 from symphys.results.table.journal import NAME, Journal, Kept, Stamp, stamp_of
 
-Tell = Callable[[int, int], None]
-"""Is called with how many folders are read, of how many that must be."""
+Progress = Callable[[int, int], None]
+"""A function of the number of folders that are read, and of those that must be read."""
 ANCESTORS = 2
 """How far above a folder its journal may lie: that of a run is two above."""
-WORTH = 100
+MIN_UNKEPT = 100
 """A journal is begun where so many folders had to be read: fewer take no time."""
-AT_ONCE = 500
+ROWS_PER_WRITE = 500
 """Rows that are kept by one write, so that an interruption loses few."""
-STALE = 2
+MAX_LINE_RATIO = 2
 """A journal with so many times as many lines as runs is written anew."""
 
 
 @dataclass
 class Rows:
-    """All runs below a folder, by problem, case, solver and seed.
+    """The runs below a folder, by problem, case, solver and seed.
 
     Attributes:
         rows: one for each run folder.
@@ -41,7 +41,7 @@ class Rows:
 
 @dataclass
 class Scan:
-    """What lies below a folder.
+    """The run folders and journals below a folder.
 
     Attributes:
         runs: the stamp of the result of every run folder by its place; None where there is no result.
@@ -54,12 +54,12 @@ class Scan:
     faults: list[str] = field(default_factory=list)
 
 
-def read_rows(root: Path, tell: Tell | None = None) -> Rows:
-    """The rows of all runs at or below a folder; what was read is kept in its journal where that can be written.
+def read_rows(root: Path, tell: Progress | None = None) -> Rows:
+    """Read the rows of all runs at or below a folder; what was read is kept in its journal where that can be written.
 
     Args:
         root: the folder, or one run folder.
-        tell: see ``Tell``.
+        tell: a ``Progress``, called for each folder.
 
     Raises:
         FileError: there is no such folder.
@@ -78,7 +78,7 @@ def read_rows(root: Path, tell: Tell | None = None) -> Rows:
         row = fresh[place] if place in fresh else kept[place].row
         found.rows.append({"run": place, **{column: restored(column, value) for column, value in row.items()}})
     found.rows.sort(key=usual_order)
-    if lines > WORTH and lines > STALE * len(kept):
+    if lines > MIN_UNKEPT and lines > MAX_LINE_RATIO * len(kept):
         tidy(journal)
     return found
 
@@ -106,7 +106,7 @@ def scanned(root: Path) -> Scan:
 
 
 def stamp(entry: os.DirEntry[str] | None) -> Stamp | None:
-    """Of a result.json; None where there is none, or only a link that leads nowhere."""
+    """Return the stamp of a result.json; None where there is none, or only a link that leads nowhere."""
     try:
         return stamp_of(entry.stat()) if entry else None
     except OSError:
@@ -114,7 +114,7 @@ def stamp(entry: os.DirEntry[str] | None) -> Stamp | None:
 
 
 def journal_of(root: Path) -> Journal:
-    """That of the folder, or of the nearest above it that has one: of its own where there is none."""
+    """Return the journal of the folder, or of the nearest above it that has one; its own where there is none."""
     here = root.resolve()
     for folder in (here, *here.parents[:ANCESTORS]):
         if (folder / NAME).is_file():
@@ -123,18 +123,18 @@ def journal_of(root: Path) -> Journal:
 
 
 def below(out: Path, root: Path) -> str:
-    """What comes before the places of runs below ``root`` in the journal of ``out``: empty, or it ends in a slash."""
+    """Return what precedes the places of runs below ``root`` in the journal of ``out``: empty, or with a slash."""
     place = root.resolve().relative_to(out).as_posix()
     return "" if place == "." else f"{place}/"
 
 
 def joined(prefix: str, place: str) -> str:
-    """The place of a run in a journal whose folder lies higher."""
+    """Return the place of a run in a journal whose folder lies higher."""
     return (f"{prefix}{place}" if place != "." else prefix.removesuffix("/")) or "."
 
 
 def kept_rows(root: Path, journal: Journal, prefix: str, scan: Scan) -> tuple[dict[str, Kept], int]:
-    """The rows of all journals by place below ``root``, and how many lines the first of them has."""
+    """Return the rows of all journals by place below ``root``, and how many lines the first of them has."""
     own, lines = journal.read()
     found = {place: own[name] for place in scan.runs if (name := joined(prefix, place)) in own}
     for folder in filter(None, scan.journals):
@@ -165,21 +165,21 @@ class Keeper:
         if stamp is None or "fault" in row:
             return
         self.waiting[joined(self.prefix, place)] = Kept(stamp, row)
-        if len(self.waiting) >= AT_ONCE:
+        if len(self.waiting) >= ROWS_PER_WRITE:
             self.flush()
 
     def flush(self) -> None:
         """Append what waits."""
-        worth = self.expected >= WORTH or self.journal.path.exists()
+        worth = self.expected >= MIN_UNKEPT or self.journal.path.exists()
         if self.waiting and worth and not self.refused:
             self.refused = not self.journal.append(self.waiting)
         self.waiting.clear()
 
 
 def read_missing(
-    root: Path, missing: list[str], scan: Scan, keeper: Keeper, tell: Tell | None
+    root: Path, missing: list[str], scan: Scan, keeper: Keeper, tell: Progress | None
 ) -> Iterator[tuple[str, Row]]:
-    """The rows of folders; what is read is kept, also where Ctrl-C ends it."""
+    """Yield the rows of folders; what is read is kept, also where Ctrl-C ends it."""
     from symphys.results.table.row import read_row  # late: whoever finds all rows in journals needs none of that
 
     try:
@@ -194,12 +194,12 @@ def read_missing(
 
 
 def restored(column: str, value: object) -> object:
-    """A value of a row as JSON has it, with "inf" as the number that it stands for."""
+    """Return a value of a row as JSON has it, with "inf" as the number that it stands for."""
     return float(value) if isinstance(value, str) and numeric(column) else value
 
 
 def usual_order(row: Row) -> tuple[str, str, str, float, str]:
-    """By problem, case, solver and seed."""
+    """Return the key of a row in the usual order: problem, case, solver and seed."""
     return row.get("problem", ""), row.get("case", ""), row.get("solver", ""), row.get("seed", -1), row["run"]
 
 

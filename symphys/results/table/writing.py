@@ -13,7 +13,7 @@ from symphys import files
 from symphys.errors import SymphysError
 from symphys.results.table.choosing import best, chosen, ordered
 from symphys.results.table.columns import FIXED, Row, columns, numeric
-from symphys.results.table.rows import Rows, Tell, read_rows
+from symphys.results.table.rows import Progress, Rows, read_rows
 
 CSV, PARQUET = "runs.csv", "runs.parquet"
 """The names of the files, in the folder that `symphys solve --out` names."""
@@ -24,7 +24,7 @@ class MissingPackage(SymphysError):
     """A package that need not be there is needed; says how to get it."""
 
 
-def write_table(out: Path, tell: Tell | None = None) -> list[Path]:
+def write_table(out: Path, tell: Progress | None = None) -> list[Path]:
     """Write the rows of all runs below a folder as runs.csv, and as runs.parquet where pyarrow is installed.
 
     Args:
@@ -104,26 +104,7 @@ def parquet_bytes(rows: Sequence[Row], names: Sequence[str]) -> bytes:
 
 
 def frame(folder: str | Path, where: str | Sequence[str] = (), sort: str = "") -> Any:
-    """All runs below a folder as a pandas.DataFrame, a row each. Also called as ``symphys.results``.
-
-    Args:
-        folder: what `symphys solve --out` has written, or any folder above or below.
-        where: conditions that a run must meet, such as ``"objective<0.5"`` or ``["solver=cma", "seed>3"]``.
-        sort: the column to sort by, ``-`` before it for the largest first; by problem, case, solver and seed if empty.
-
-    Returns:
-        The columns are those of `symphys ls`; ``attrs["faults"]`` lists the folders that could not be read.
-
-    Raises:
-        SymphysError: no such folder, a condition that cannot be read, an unknown column, or no pandas.
-
-    Example:
-        >>> import symphys
-        >>> solution = symphys.solve("ball_throw", "least_squares", backend="casadi", folder="reports")
-        >>> table = symphys.results("reports", where="problem=ball_throw")
-        >>> list(table["verdict"]), int(table["seed"].max())
-        (['solved'], 0)
-    """
+    """Read all runs below a folder into a pandas.DataFrame, as ``symphys.results.runs`` does."""
     found = read_rows(Path(folder))
     rows = chosen(found.rows, [where] if isinstance(where, str) else where)
     return framed(ordered(rows, sort) if sort else rows, found)
@@ -136,7 +117,7 @@ def best_frame(folder: str | Path, by: str = "objective", overall: bool = False)
 
 
 def framed(rows: Sequence[Row], found: Rows) -> Any:
-    """Some of the rows that were found as a pandas.DataFrame with all of their columns."""
+    """Return some of the rows that were found as a pandas.DataFrame with all of their columns."""
     try:
         import pandas as pd  # late, as above
     except ImportError:

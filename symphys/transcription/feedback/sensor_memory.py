@@ -1,14 +1,15 @@
-"""What sensors need to know of the step before: commands and velocities, stored behind the world's state."""
+"""What sensors need to know of the step before: inputs and parts of the state, stored behind the world's state."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
 
-from symphys.dynamics.observation import accelerometer_bodies
+from symphys.dynamics.observation import named_sensors
+from symphys.expression import Formula
 from symphys.model.state_layout import Layout, input_columns, input_sizes
 from symphys.model.world import World
 from symphys.problem import ALIVE, Constraint, Cost, Output, Problem, Target
@@ -22,20 +23,22 @@ class SensorMemory:
     Attributes:
         world: what is simulated.
         inputs: names of the inputs that are remembered.
-        bodies: names of the bodies whose velocity is remembered.
+        states: names of the parts of the state that are remembered, such as ``torso.velocity``.
         terminates: whether the last column is ``alive``: 1 until the termination, 0 from then on; ``after`` omits it.
     """
 
     world: World
     inputs: tuple[str, ...] = ()
-    bodies: tuple[str, ...] = ()
+    states: tuple[str, ...] = ()
     terminates: bool = False
 
     @cached_property
     def columns(self) -> dict[str, slice]:
-        """Map inputs by name and velocities such as ``torso.velocity`` to their columns of the whole state."""
-        sizes, start, found = input_sizes(self.world), Layout(self.world).size, dict[str, slice]()
-        lengths = [(name, sizes[name]) for name in self.inputs] + [(f"{body}.velocity", 3) for body in self.bodies]
+        """Map inputs and remembered parts of the state by name to their columns of the whole state."""
+        layout, sizes = Layout(self.world), input_sizes(self.world)
+        start, found = layout.size, dict[str, slice]()
+        lengths = [(name, sizes[name]) for name in self.inputs]
+        lengths += [(name, layout[name].stop - layout[name].start) for name in self.states]
         lengths += [(ALIVE, 1)] * self.terminates
         for name, length in lengths:
             found[name] = slice(start, start + length)
@@ -51,27 +54,30 @@ class SensorMemory:
         """The whole state at t = 0, when no command has been given and nothing has been accelerated."""
         layout = Layout(self.world)
         commands = [type(x).zeros(input_sizes(self.world)[name]) for name in self.inputs]
-        velocities = [x[layout[f"{body}.velocity"]] for body in self.bodies]
-        return ca.vertcat(x, *commands, *velocities, *([type(x)(1)] if self.terminates else []))
+        states = [x[layout[name]] for name in self.states]
+        return ca.vertcat(x, *commands, *states, *([type(x)(1)] if self.terminates else []))
 
     def after(self, x: Expr, u: Expr, inputs: Sequence[str]) -> Expr:
         """(memory,) what is remembered of a step from state x with the inputs u, which stacks ``inputs``."""
         layout, columns = Layout(self.world), input_columns(self.world, inputs)
         sizes = input_sizes(self.world)
         given = [u[columns[name]] if name in columns else type(x).zeros(sizes[name]) for name in self.inputs]
-        return ca.vertcat(type(x)(0, 1), *given, *(x[layout[f"{body}.velocity"]] for body in self.bodies))
+        return ca.vertcat(type(x)(0, 1), *given, *(x[layout[name]] for name in self.states))
 
-    def velocities(self, x: Expr) -> dict[str, Expr]:
-        """Return the velocity of each body one step before."""
-        return {body: x[self.columns[f"{body}.velocity"]] for body in self.bodies}
+    def before(self, x: Expr) -> dict[str, Expr]:
+        """Return the parts of the state and the inputs one step before by name."""
+        return {name: x[self.columns[name]] for name in (*self.inputs, *self.states)}
 
     def commands(self, x: Expr) -> dict[str, Expr]:
         """Return the inputs of the step before by name."""
         return {name: x[self.columns[name]] for name in self.inputs}
 
 
-def memory_of(problem: Problem, world: World) -> SensorMemory:
-    """Collect the memory that the sensors of a problem need."""
+def memory_of(problem: Problem, world: World, inputs: Sequence[str], more: Iterable[Formula] = ()) -> SensorMemory:
+    """Collect the memory that the sensors of a problem need.
+
+    ``inputs``: names of those that may act. ``more``: formulas that are read beside those of the problem.
+    """
     sensed = frozenset[str]().union(*(formula.names for sensor in problem.sensors for formula in sensor.formulas))
     objectives: list[Cost | Target | Constraint | Output] = [
         *problem.costs,
@@ -79,8 +85,13 @@ def memory_of(problem: Problem, world: World) -> SensorMemory:
         *problem.constraints,
         *problem.outputs,
     ]
-    asked = frozenset[str]().union(*(each.formula.needed for each in objectives))
-    inputs = tuple(name for name in input_sizes(world) if name in sensed)
+    asked = frozenset[str]().union(*(each.formula.needed for each in objectives), *(each.needed for each in more))
     margin = problem.termination.margin.names if problem.termination else frozenset[str]()
-    bodies = accelerometer_bodies(world, sensed | asked | margin)
-    return SensorMemory(world, inputs, bodies, problem.termination is not None)
+    wanted = sensed | asked | margin
+    needed = dict.fromkeys(
+        part for name, sensor in named_sensors(world).items() if name in wanted for part in sensor.before(world)
+    )
+    given = sensed | (needed.keys() & set(inputs))
+    states = tuple(name for name in needed if name in Layout(world))
+    remembered = tuple(name for name in input_sizes(world) if name in given)
+    return SensorMemory(world, remembered, states, problem.termination is not None)

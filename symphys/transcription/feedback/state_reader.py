@@ -45,8 +45,7 @@ class StateReader:
             count = len(joint.kind.coordinates)
             places = [at.get(f"{joint.name}.coordinate[{k}]") for k in range(count)]
             if count and None not in places:
-                value = "angle" if joint.kind.coordinates[0].turns else "position"
-                for which, key in enumerate((value, "rate")):
+                for which, key in enumerate((joint.kind.quantity, "rate")):
                     kind = "coordinate" if which == 0 else "rate"
                     into = [at[f"{joint.name}.{kind}[{k}]"] for k in range(count)]
                     self._joints[f"{joint.name}.{key}"] = which, list(range(column, column + count)), into

@@ -20,6 +20,8 @@ from symphys.types import Array
 Indices = NDArray[np.intp]
 MOST_WEIGHTS = 4096
 """Of a net that is computed within the compiled step, where every lane holds weights of its own."""
+MOST_WITHIN = 100_000
+"""The same where only the step itself can have the net, as in exported code: the compiler takes half a minute."""
 
 
 def is_large(controller: FeedbackController) -> bool:
@@ -38,8 +40,14 @@ def large_nets(problem: Problem) -> tuple[FeedbackController, ...]:
 
 
 def require_small_nets(problem: Problem, what: str) -> None:
-    """ProblemError if there are large nets, from what cannot deal with them."""
-    refuse_large(problem, large_nets(problem), MOST_WEIGHTS, what)
+    """Refuse nets that are too large for a compiled step by a ProblemError; ``what`` compiles it."""
+    issues = [
+        Issue(f'controller "{net.name}".net', f"has {count} weights; {what} takes up to {MOST_WITHIN}")
+        for net in large_nets(problem)
+        if (count := net.law.sizes["weights"]) > MOST_WITHIN
+    ]
+    if issues:
+        raise ProblemError(problem.file, issues)
 
 
 @dataclass(frozen=True)
@@ -133,16 +141,6 @@ def _weights(problem: Problem, controller: FeedbackController) -> Weights:
                 of_z.append(np.arange(first, last))
                 of_net.append(np.array(slot.components, int))
     return Weights(controller.numbers["weights"], np.concatenate(of_z), np.concatenate(of_net))
-
-
-def refuse_large(problem: Problem, nets: Sequence[FeedbackController], most: int, what: str) -> None:
-    """ProblemError if there are any, from what cannot deal with them."""
-    issues = [
-        Issue(f'controller "{net.name}".net', f"has {net.law.sizes['weights']} weights; {what} takes up to {most}")
-        for net in nets
-    ]
-    if issues:
-        raise ProblemError(problem.file, issues)
 
 
 def refuse_formulas(problem: Problem, names: Sequence[str]) -> None:

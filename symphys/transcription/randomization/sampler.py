@@ -82,7 +82,7 @@ class SampledHinge:
         placed, pivot = placed_frames(joint, initial)
         still = rotations(initial[f"{self.base}.orientation"]).inv()
         (coordinate,) = joint.kind.coordinates
-        self.axis = still.apply(np.asarray(coordinate.axis(placed), float).ravel())
+        self.axis = still.apply(np.asarray(coordinate.direction(placed), float).ravel())
         self.pivot = still.apply(pivot - initial[f"{self.base}.position"])
 
     def bend(self, angles: Array, state: State) -> None:

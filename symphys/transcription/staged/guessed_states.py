@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics.observation import joint_quantities, joint_turn
+from symphys.dynamics.observation import SensedState, joint_turn, named_sensors, sensor_readings
 from symphys.model.state_layout import Layout
 from symphys.problem import DURATION, GuessedMotion
 from symphys.problem.guess.motion import is_orientation, turn_between
@@ -68,7 +68,8 @@ def _quantities(stages: RolloutStages, guess: GuessedMotion, states: Array, z: A
     x, p = ca.SX.sym("x", layout.size), ca.SX.sym("p", int(rollout.p.shape[0]))
     owners = {name.rpartition(".")[0] for name in guess.columns}
     found = {name: x[layout[name]] for name in layout.names() if name.rpartition(".")[0] in owners}
-    found |= {n: v for n, v in joint_quantities(world, x).items() if n.rpartition(".")[0] in owners}
+    of_joints = (n for n, s in named_sensors(world).items() if s.kind.owner == "joint" and s.owner.name in owners)
+    found |= sensor_readings(SensedState(world, x), frozenset(of_joints))
     for joint in ball_joints(world):
         if joint.name in owners:
             bodies = [world.bodies[i].name for i in joint.bodies]

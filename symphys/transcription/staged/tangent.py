@@ -280,7 +280,7 @@ class Tangent:
             bodies = chart.tree.bodies
             poses, moving = ({i: self._pair(old, i, fields) for i in bodies} for fields in (POSES, VELOCITIES))
             rates = chart.rates(poses, moving)
-            fit, moved = chart.velocities(poses, rates), chart.rebuilt(poses, known(chart.held(poses)))
+            fit, moved = chart.velocities(poses, rates), chart.rebuilt(poses, known(chart.held(poses, old)))
             after = chart.velocities(moved, known(rates))
             for i in bodies:
                 off = (known(now - then) for now, then in zip(moving[i], fit[i], strict=True))

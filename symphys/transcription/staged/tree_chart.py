@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from symphys.dynamics.articulated import spatial
 from symphys.dynamics.articulated.forward_kinematics import HERE, JointStart, final_poses
 from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames_at
 from symphys.maths import rotation
@@ -98,8 +97,7 @@ class TreeChart:
                 velocity, spin = moving[body]
                 linear += sign * (velocity + ca.cross(spin, arm))
                 angular += sign * spin
-            for slide, turn in spatial.free_motions_of(joint, placed):
-                found.append(ca.dot(slide, linear) + ca.dot(turn, angular))
+            found += joint.kind.rates(placed, linear, angular)
         return ca.vertcat(ca.SX(0, 1), *found)
 
     def velocities(self, poses: Mapping[int, Pose], rates: Expr) -> dict[int, Moving]:
@@ -115,20 +113,26 @@ class TreeChart:
             above, mine = (arms[1], arms[0]) if link.sign > 0 else arms
             velocity, spin = (ca.SX.zeros(3), ca.SX.zeros(3)) if link.parent is None else found[link.parent]
             linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
-            for k, (slide, turn) in enumerate(spatial.free_motions_of(joint, frames.placed(NOW))):
+            for k, (slide, turn) in enumerate(joint.kind.motions(frames.placed(NOW))):
                 linear, angular = linear + own[k] * slide, angular + own[k] * turn
             after = spin + link.sign * angular
             at = velocity + ca.cross(spin, above) + link.sign * linear
             found[link.body] = at - ca.cross(after, mine), after
         return found
 
-    def held(self, poses: Mapping[int, Pose]) -> Expr:
-        """(7 a joint,) how the frames of each joint lie to each other: rotation (4), place in the second (3) [m]."""
+    def held(self, poses: Mapping[int, Pose], angles: Mapping[str, Expr]) -> Expr:
+        """Return how frames of joints lie to each other (7 a joint,): rotation (4), place in the second (3) [m].
+
+        For a screw its coordinate follows, and the place is that at coordinate 0. ``angles``: see ``coordinates``.
+        """
         found = []
         for _, joint in self._links():
             if joint is not None:
                 (first, a), (second, b) = self._sides(joint, poses)
                 found += [rotation.multiply(inverse(b), a), rotation.rotate(inverse(b), first - second)]
+                if joint.kind.screws:
+                    found.append(self.coordinates(joint, poses, angles))
+                    found[-2] = found[-2] - _along(joint, found[-1])
         return ca.vertcat(ca.SX(0, 1), *found)
 
     def rebuilt(self, poses: Mapping[int, Pose], held: Expr) -> dict[int, Pose]:
@@ -139,6 +143,10 @@ class TreeChart:
                 found[link.body] = poses[link.body]
                 continue
             turn, apart = held[row : row + 4], held[row + 4 : row + 7]
+            row += 7
+            if joint.kind.screws:
+                apart = apart + _along(joint, held[row : row + link.count])
+                row += link.count
             own, other = joint.frames if link.sign > 0 else joint.frames[::-1]
             parent = HOME if link.parent is None else found[link.parent]
             place, q = _frame(parent, other)
@@ -149,7 +157,6 @@ class TreeChart:
                 place = place - rotation.rotate(q, apart)
             q = rotation.multiply(q, inverse(ca.vertcat(*own.orientation)))
             found[link.body] = place - rotation.rotate(q, ca.vertcat(*own.point)), q
-            row += 7
         return found
 
     def _sides(self, joint: Joint, poses: Mapping[int, Pose]) -> tuple[Pose, Pose]:
@@ -168,11 +175,8 @@ class TreeChart:
         """The joint as it is: what it is off is part of how its sides are apart."""
         frames = self._frames(joint, poses)
         placed, arms = frames.placed(NOW), tuple(arm.at(NOW) for arm in frames.arms)
-        turning = [c.turns for c in joint.kind.coordinates] or [True] * link.count
-        free = spatial.free_motions_of(joint, placed)
-        axes = [turn if turns else slide for turns, (slide, turn) in zip(turning, free, strict=True)]
         ordered = (arms[1], arms[0]) if link.sign > 0 else (arms[0], arms[1])
-        return JointStart(ordered, placed.apart, ca.horzcat(ca.SX(3, 0), *axes), HERE.turn)
+        return JointStart(ordered, placed.apart, joint.kind.axes(placed), HERE.turn)
 
     def _turned(self, link: Link, before: Mapping[int, Pose], after: Mapping[int, Pose]) -> Expr:
         """(3,) rotation vector of a ball joint's first side against its second; see ``final_poses``."""
@@ -181,6 +185,12 @@ class TreeChart:
             parent = rotation.multiply(after[link.parent][1], inverse(before[link.parent][1]))
             own = rotation.multiply(inverse(parent), own)
         return link.sign * rotation.logarithm(own)
+
+
+def _along(joint: Joint, values: Expr) -> Expr:
+    """Return how far coordinates (count,) displace the first frame, (3,) [m], second frame."""
+    axes = ca.DM.eye(3)[:, [each.axis for each in joint.kind.coordinates]]
+    return joint.kind.transform(axes, values)[1]
 
 
 def _frame(pose: Pose, frame: JointFrame) -> Pose:

@@ -10,7 +10,7 @@ from worlds.linkage import chain, hanging
 
 from symphys.dynamics.articulated.forward_kinematics import final_poses, joint_starts
 from symphys.dynamics.collision.predicted_path import PredictedPath
-from symphys.dynamics.joints.joint_frames import errors, joint_frames_at
+from symphys.dynamics.joints.joint_frames import joint_frames_at
 from symphys.maths import rotation
 from symphys.model.joints import kinematic_trees
 
@@ -33,7 +33,7 @@ def test_joints_fit_where_the_coordinates_lead() -> None:
         before, now = (
             joint_frames_at(joint, tuple(places[i] for i in joint.bodies)).placed(ca.SX(0)) for places in (poses, after)
         )
-        assert numbers(errors(joint, now)) == pytest.approx(0, abs=1e-12)
+        assert numbers(joint.kind.errors(now)) == pytest.approx(0, abs=1e-12)
         (coordinate,) = joint.kind.coordinates
         turned = float(numbers(coordinate.value(now) - coordinate.value(before)))
         assert np.exp(1j * turned) == pytest.approx(np.exp(1j * TURNS[joint.first]))

@@ -12,19 +12,20 @@ from tools.repeats import thorough
 from worlds.heaps import heap
 
 import symphys
-from symphys import Body, Law, Layout, Plane, Scheme, initial_state, make_world, step_function
+from symphys import step_function
 from symphys.dynamics.collision import broad_phase
 from symphys.dynamics.collision.broad_phase import near_pairs
 from symphys.dynamics.context import StepContext, make_context
+from symphys.model import Body, Law, Layout, Plane, Scheme, initial_state, make_world
 from symphys.model.shapes import Box, Capsule
 
 
-def world_of(places: list[tuple[float, float, float]]) -> symphys.World:
+def world_of(places: list[tuple[float, float, float]]) -> symphys.model.World:
     balls = [Body.ball(f"b{i}", 0.1, 1.0, position=place) for i, place in enumerate(places)]
     return make_world(balls, [Plane.ground()], Law(0.5, 0.5))
 
 
-def near(world: symphys.World, smoothing: float = 0.0, velocity: tuple[float, ...] = (0, 0, 0)) -> dict[str, int]:
+def near(world: symphys.model.World, smoothing: float = 0.0, velocity: tuple[float, ...] = (0, 0, 0)) -> dict[str, int]:
     context = make_context(world, Scheme(dt=0.01), (), ca.SX(0, 1), ca.SX(smoothing))
     layout, x = Layout(world), initial_state(world, {"b0.velocity": velocity})
     found = near_pairs(context, {name: ca.SX(x[layout[name]]) for name in layout.names()})
@@ -44,7 +45,7 @@ def test_speed_brings_pairs_near() -> None:
     assert {name for name, each in found.items() if each} == {"b0-ground", "b0-b1"}
 
 
-def rods(places: list[tuple[float, float, float]]) -> symphys.World:
+def rods(places: list[tuple[float, float, float]]) -> symphys.model.World:
     """Upright capsules, 0.4 m from end to end."""
     rod = Body("rod", 1.0, (0.02, 0.02, 0.005), (Capsule(0.05, 0.15),))
     bodies = [replace(rod, name=f"b{i}", start={"position": place}) for i, place in enumerate(places)]
@@ -81,8 +82,8 @@ def test_a_frame_without_mass_brings_nothing_near() -> None:
     bodies = [Body.ball(f"b{i}", 0.1, 1.0, position=place) for i, place in enumerate(LINE)]
     frame = Body.frame("frame", position=(9.0, 0.0, 1.0))
     bob = Body.ball("bob", 0.1, 1.0, position=(9.0, 0.0, 1.0))
-    along = symphys.Slider("along", ("world", "frame"), axis=(1, 0, 0))
-    up = symphys.Slider("up", ("frame", "bob"), axis=(0, 0, 1))
+    along = symphys.model.Slider("along", ("world", "frame"), axis=(1, 0, 0))
+    up = symphys.model.Slider("up", ("frame", "bob"), axis=(0, 0, 1))
     world = make_world([*bodies, frame, bob], [Plane.ground()], Law(0.5, 0.5), joints=[along, up])
     found = near(world)
     assert (found["b0-ground"], found["b0-b1"]) == (1, 0)

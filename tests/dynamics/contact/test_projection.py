@@ -13,6 +13,7 @@ from worlds.contacts import contact_of, momenta_of, numbers, terms_of
 from symphys.dynamics.contact.constraint import ZERO, ContactImpulse, known_before
 from symphys.dynamics.contact.coupling import coupling_of
 from symphys.dynamics.contact.effective_mass import mobilities
+from symphys.dynamics.contact.friction import Disc
 from symphys.model.world import Law
 
 MANY = 200
@@ -25,7 +26,7 @@ def test_a_contact_obeys_its_law(seed: int, coupled: bool) -> None:
     rng = np.random.default_rng(seed)
     terms, momenta, mu = terms_of(rng), momenta_of(rng), 0.4
     normal, target = ca.SX([0, 0, 1]), 0.3 * rng.normal()
-    coupling = coupling_of(mobilities(terms, False)[0], normal, Law(mu), ca.SX(0)) if coupled else None
+    coupling = coupling_of(mobilities(terms, False)[0], normal, Disc(mu), ca.SX(0)) if coupled else None
     contact = contact_of(terms, Law(friction=mu), target=ca.SX(target), coupling=coupling)
     impulse = ZERO
     for _ in range(MANY):

@@ -14,10 +14,12 @@ from tools.repeats import thorough
 from worlds.linkage import momenta
 
 from symphys.dynamics.observation.joint_coordinates import reading_function
-from symphys.model.joints import KINDS, Joint, JointFrame
+from symphys.model.joints import KINDS as PLAIN
+from symphys.model.joints import Joint, JointFrame, helical
 from symphys.model.world import Body, Scheme, World
 from symphys.types import Array
 
+KINDS = {**PLAIN, "helical": helical(-0.3)}
 ROOTS = (None, *KINDS)
 TURN = tuple(Rotation.from_euler("xyz", [0.4, -0.7, 0.9]).as_quat(scalar_first=True))
 """Of frames, so that no axis is a body's."""

@@ -10,21 +10,9 @@ import pytest
 from tools.repeats import few
 
 import symphys
-from symphys import (
-    AffineMotor,
-    Body,
-    Hinge,
-    Problem,
-    Scheme,
-    Servo,
-    Spring,
-    Trajectory,
-    UniversalJoint,
-    initial_state,
-    make_world,
-    step_function,
-)
+from symphys import Problem, Trajectory, step_function
 from symphys.dynamics.observation import reading_function
+from symphys.model import AffineMotor, Body, Hinge, Scheme, Servo, Spring, UniversalJoint, initial_state, make_world
 
 RADIUS = np.sqrt(0.025)
 """[m] of a ball of 1 kg with an inertia of 0.01 kg m^2."""
@@ -201,7 +189,7 @@ def test_several_turns_in_a_step_count(spin: float) -> None:
 def test_angles_wind_where_impacts_cut_steps() -> None:
     """A wheel that may meet two others, of which one falls onto the other: steps are cut at impacts."""
     below = [ball(name, position=(2, 0, z)) for name, z in (("first", 0.2), ("second", 0.7))]
-    bodies, ground = [ball("wheel", (0, 20, 0)), *below], symphys.Plane("ground", (0, 0, 1), -1.0)
+    bodies, ground = [ball("wheel", (0, 20, 0)), *below], symphys.model.Plane("ground", (0, 0, 1), -1.0)
     world = make_world(bodies, [ground], joints=[axle()])
     found = symphys.simulate(Problem.from_world(world, duration=1.0, dt=0.01))
     np.testing.assert_allclose(found["axle.angle"].ravel(), 20 * found.time, atol=1e-9)

@@ -10,22 +10,22 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symphys import (
+from symphys import Problem, SymphysError
+from symphys.dynamics.observation import readings
+from symphys.model import (
     BallJoint,
     Body,
     FixedJoint,
+    HelicalJoint,
     Hinge,
     Law,
     Plane,
-    Problem,
     Slider,
-    SymphysError,
     UniversalJoint,
     World,
     initial_state,
     make_world,
 )
-from symphys.dynamics.observation import readings
 
 HINGE: dict[str, Any] = {"axis": (0, 1, 0), "point": (0, 0, 1)}
 
@@ -53,6 +53,8 @@ def test_every_kind_begins_where_it_says() -> None:
         (Hinge("j", ("a", "b"), axis=(1, 2, 3), point=(0, 0, 0.6), start=0.7), [0.7]),
         (Hinge("j", ("b", "a"), axis=(1, 2, 3), point=(0, 0, 0.6), start=0.7), [0.7]),
         (Slider("j", ("a", "b"), axis=(1, 2, 3), start=-0.2), [-0.2]),
+        (HelicalJoint("j", ("a", "b"), axis=(1, 2, 3), pitch=0.3, point=(0, 0, 0.6), start=8.0), [8.0]),
+        (HelicalJoint("j", ("b", "a"), axis=(1, 2, 3), pitch=-0.3, point=(0, 0, 0.6), start=8.0), [8.0]),
         (
             UniversalJoint("j", ("a", "b"), axes=((0, 1, 0), (1, 0, 0)), point=(0, 0, 0.6), start=(0.5, -0.3)),
             [0.5, -0.3],

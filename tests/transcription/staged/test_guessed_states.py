@@ -11,8 +11,9 @@ import pytest
 import symphys
 from symphys import Problem
 from symphys.model.state_layout import Layout
+from symphys.problem import load_problem
 from symphys.problem.guess.recorded import recorded_guess
-from symphys.transcription import guessed
+from symphys.transcription import guessed, transcribe
 from symphys.transcription.staged.staged_problem import RolloutStages
 
 TICKS = np.array([1, 10, 50, 100])
@@ -22,7 +23,7 @@ TIMES = TICKS * 0.02
 def stages(**guess: object) -> tuple[RolloutStages, np.ndarray, np.ndarray]:
     """Of the acrobot: its stages, a decision vector, and the guessed states at TICKS."""
     problem = symphys.load("acrobot").set({"simulation.dt": 0.02, "guess": guess})
-    shooting = symphys.transcribe(problem, backend="casadi").shooting
+    shooting = transcribe(problem, backend="casadi").shooting
     assert shooting.staged is not None and shooting.guessed_states is not None
     made, z = shooting.staged(), np.linspace(-20, 20, shooting.n)
     assert isinstance(made, RolloutStages)
@@ -97,7 +98,7 @@ def test_a_body_on_its_own() -> None:
     there = problem.set(
         "guess", {"states": [{"at": 0.0, "ball.position": [0, 0, 1]}, {"at": 1.0, "ball.position": [2, 0, 1]}]}
     )
-    shooting = symphys.transcribe(there, backend="casadi").shooting
+    shooting = transcribe(there, backend="casadi").shooting
     assert shooting.staged is not None and shooting.guessed_states is not None
     tick = round(0.5 / there.simulation.dt)
     made, x = shooting.staged(), shooting.guessed_states(shooting.start(0), np.array([tick]), 0.0)
@@ -171,8 +172,8 @@ def rotated(q: np.ndarray, vector: np.ndarray) -> np.ndarray:
 def spun(text: str, tmp_path: Path, **guess: object) -> dict[str, np.ndarray]:
     """The guessed state at 0.4 s by quantities."""
     (tmp_path / "top.toml").write_text(text, encoding="utf-8")
-    problem = symphys.load_problem(tmp_path / "top.toml", {"guess": guess})
-    shooting = symphys.transcribe(problem, backend="casadi").shooting
+    problem = load_problem(tmp_path / "top.toml", {"guess": guess})
+    shooting = transcribe(problem, backend="casadi").shooting
     assert shooting.guessed_states is not None
     x, layout = shooting.guessed_states(shooting.start(0), np.array([4]), 0.0)[0], Layout(problem.world())
     return {name: x[layout[name]] for name in layout.names()}
@@ -225,11 +226,11 @@ def test_a_ball_joint_turns_on_the_geodesic(tmp_path: Path) -> None:
 def test_a_recorded_motion_is_met(tmp_path: Path) -> None:
     """Of a body on its own and of one that hangs on its ball joint, from another start: all places and velocities."""
     (tmp_path / "top.toml").write_text(TOP + ARM, encoding="utf-8")
-    problem = symphys.load_problem(tmp_path / "top.toml")
+    problem = symphys.load(tmp_path / "top.toml")
     motion = symphys.simulate(problem, spin=[1.0, -2.0, 3.0])
     recorded = {name: motion[name] for name in motion.units if len(motion[name]) == len(motion.time)}
     there = replace(problem, guess=recorded_guess(problem.world(), motion.time, recorded))
-    shooting = guessed(symphys.transcribe(problem, backend="casadi"), there).shooting
+    shooting = guessed(transcribe(problem, backend="casadi"), there).shooting
     assert shooting.guessed_states is not None
     ticks, layout = np.array([1, 4, 10]), Layout(problem.world())
     for x, tick in zip(shooting.guessed_states(shooting.start(0), ticks, 0.0), ticks.tolist(), strict=True):

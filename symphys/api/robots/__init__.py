@@ -1,1 +1,0 @@
-"""Robots of other programs in Python."""

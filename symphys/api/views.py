@@ -1,0 +1,194 @@
+"""A solution as figures, tables and markup: what its methods, terminals and notebooks show.
+
+matplotlib is imported when a figure is drawn; pandas and xarray need not be installed.
+"""
+
+from __future__ import annotations
+
+import html as markup
+import io
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from symphys.errors import SymphysError
+from symphys.findings.writing import show
+from symphys.results.file_names import GUESS, SCENE, TRAJECTORY
+from symphys.results.run import Run
+from symphys.results.text_files import ReportError
+from symphys.results.trace import Trace
+from symphys.results.trajectories import read_trajectory
+from symphys.suggest import hint, quote
+from symphys.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+TRACE = "trace."
+"""Prefix of the names of columns of the trace."""
+COMPONENTS = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
+"""Names of the components of vectors and quaternions."""
+
+
+def components(size: int) -> tuple[str, ...]:
+    """Name the components of a quantity of this size; numbers where it is neither a vector nor a quaternion."""
+    return COMPONENTS.get(size, tuple(map(str, range(size))))
+
+
+# Figures
+
+
+def draw_run(folder: Path, motion: Trajectory) -> Figure:
+    """Draw the motion of a run folder from the side and from above, together with its guess."""
+    from symphys.report.figures import style
+    from symphys.report.scene.motion import draw_motion
+    from symphys.results.scene import read_scene
+
+    guess = folder / GUESS
+    with style.paper():
+        guessed = read_trajectory(guess) if guess.exists() else None
+        return draw_motion(motion, read_scene(folder / SCENE), guessed)
+
+
+def plot(motion: Trajectory, trace: Trace, names: Sequence[str]) -> Figure:
+    """Plot quantities of a motion and columns of a trace, a panel for each, one below the other."""
+    from matplotlib.figure import Figure
+
+    from symphys.report.figures import style
+
+    with style.paper():
+        figure = Figure(figsize=(style.WIDTH * 0.7, 0.6 + 1.8 * len(names)), layout="constrained")
+        grid = figure.subplots(len(names), 1, squeeze=False)[:, 0]
+        for axes, name in zip(grid, names, strict=True):
+            if name.startswith(TRACE):
+                plot_column(axes, trace, name.removeprefix(TRACE))
+            else:
+                plot_quantity(axes, motion, name)
+    return figure
+
+
+def plot_column(axes: Axes, trace: Trace, name: str) -> None:
+    """Plot a column of the trace against the iteration."""
+    from symphys.report.figures import style
+
+    if name not in trace.columns:
+        raise SymphysError(f"the trace has no {quote(name)}; {hint(name, trace.columns)}")
+    axes.plot(trace["iteration"], trace[name], color=style.BLUE)
+    axes.set_xlabel("iteration")
+    axes.set_title(name)
+
+
+def plot_quantity(axes: Axes, motion: Trajectory, name: str) -> None:
+    """Plot a quantity against time, a line for each component."""
+    from symphys.report.figures import style
+
+    if name not in motion.units:
+        raise SymphysError(f"the motion has no {quote(name)}; {hint(name, motion.units)}")
+    values, unit = motion[name], motion.units[name]
+    lines = values.reshape(len(values), -1)
+    labels = components(lines.shape[1]) if lines.shape[1] > 1 else ("",)
+    for line, label, colour in zip(lines.T, labels, (*style.AXES, style.GREY)[: len(labels)], strict=False):
+        axes.plot(motion.time[: len(line)], line, label=label, color=colour)
+    if len(labels) > 1:
+        axes.legend(ncols=len(labels), loc="best")
+    axes.set_xlabel("time [s]")
+    axes.set_title(f"{name} [{unit}]" if unit else name)
+    axes.margins(x=0.01)
+
+
+# Tables of pandas and xarray
+
+
+def trace_frame(trace: Trace) -> Any:
+    """Return a pandas.DataFrame with a row for each iteration."""
+    return library("pandas").DataFrame(dict(trace.columns)).set_index("iteration")
+
+
+def motion_frame(motion: Trajectory) -> Any:
+    """Return a pandas.DataFrame with a row for each time and a column for each number, ``ball.position.x``."""
+    pandas = library("pandas")
+    found = {}
+    for name in motion.units:
+        values = padded(motion[name], len(motion.time))
+        if name == "time":
+            continue
+        if values.ndim == 1:
+            found[name] = values
+            continue
+        found |= {f"{name}.{each}": values[:, k] for k, each in enumerate(components(values.shape[1]))}
+    return pandas.DataFrame(found, index=pandas.Index(motion.time, name="time"))
+
+
+def motion_dataset(motion: Trajectory) -> Any:
+    """Return an xarray.Dataset with a variable for each quantity over "time"."""
+    xarray = library("xarray")
+    found = {}
+    for name, unit in motion.units.items():
+        values = padded(motion[name], len(motion.time))
+        if name != "time":
+            dims = ("time",) if values.ndim == 1 else ("time", {3: "axis", 4: "quaternion"}.get(values.shape[1], name))
+            found[name] = (dims, values, {"units": unit})
+    axes = {"axis": list(COMPONENTS[3]), "quaternion": list(COMPONENTS[4])}
+    return xarray.Dataset(found, coords={"time": ("time", motion.time, {"units": "s"}), **axes})
+
+
+def padded(values: Any, count: int) -> Any:
+    """Append a row of nan to what acts during a step, which has one row less than there are instants."""
+    missing = np.full((count - len(values), *values.shape[1:]), np.nan)
+    return np.concatenate([values, missing])
+
+
+def library(name: str) -> Any:
+    """Import an optional package; SymphysError says how to install it."""
+    try:
+        return import_module(name)
+    except ImportError:
+        raise SymphysError(f"this needs {name}: pip install {name}") from None
+
+
+# Terminals and notebooks
+
+
+def line(run: Run) -> str:
+    """Write a run in a line: ``<Solution of ball_throw by least_squares: solved, objective 1.2e-06>``."""
+    words = run.verdict.replace("_", " ")
+    return f"<Solution of {run.problem} by {run.solver}: {words}, objective {show(run.objective)}>"
+
+
+def html(run: Run) -> str:
+    """Write the verdict, the checks and the motion of a run as HTML that needs no other file."""
+    words = run.verdict.replace("_", " ")
+    head = f"<b>{markup.escape(run.title)}</b>: {words} by {markup.escape(run.solver)}, seed {run.seed}"
+    lines = [f"<p>{head}; objective {show(run.objective)}, {show(run.seconds.get('solve', 0))} s</p>"]
+    if run.checks:
+        cells = [
+            (each.kind, each.name, show(each.error), show(each.tolerance), "met" if each.met else "missed")
+            for each in run.checks
+        ]
+        lines.append(html_table(("", "name", "error", "tolerance", ""), cells))
+    if not run.solved and run.advice:
+        lines.append(f"<p>{markup.escape(run.advice)}</p>")
+    return "\n".join([*lines, picture(run.folder)])
+
+
+def html_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    """Write texts as an HTML table."""
+    head = "".join(f"<th>{markup.escape(text)}</th>" for text in header)
+    body = "".join(f"<tr>{''.join(f'<td>{markup.escape(text)}</td>' for text in row)}</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def picture(folder: Path) -> str:
+    """Draw the motion of a run folder as SVG; empty where there is no motion."""
+    try:
+        figure = draw_run(folder, read_trajectory(folder / TRAJECTORY))
+    except ReportError:
+        return ""
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg")
+    _, start, drawing = buffer.getvalue().partition("<svg")
+    return f'{start} style="max-width: 100%; height: auto"{drawing}'

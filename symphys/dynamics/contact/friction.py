@@ -1,0 +1,361 @@
+"""The law of friction of a contact: which impulses across its normal a load admits, and which of them it gives.
+
+A load l, the normal impulse, admits a convex set of friction impulses, which grows in proportion to l. A projection
+gives the impulse of the set that is nearest to the one that would stop the slip. What converges then is the impulse
+that takes most power from the slip: the principle of maximal dissipation (Moreau, 1974).
+
+With one coefficient the set is a disc, with two, along and across a direction, an ellipse. All that the step knows of
+friction is here: constraints, Newton's method before the sweeps, the local solver of strongly coupled contacts and late
+impulses of soft ones ask a ``Friction``. Its coefficients, and how those of two surfaces make one, are fields of
+``Law``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import hypot
+from typing import Protocol
+
+import casadi as ca
+
+from symphys.dynamics.contact.body_term import Motions
+from symphys.maths.smoothing import TINY_SQUARE, length, onto_disc, positive
+from symphys.model.world import Law
+from symphys.types import Expr
+
+UPRIGHT = 0.05
+"""[rad] from the normal of a contact, within which a direction of friction fades out."""
+TINY_LEAN = 1e-8
+"""Added to the square of a direction's part across the normal, so that its slope is finite where there is none."""
+STEPS = 5
+"""Of Newton's method towards the nearest impulse of an ellipse, which is then off by 1e-13 of its size at most."""
+TINY_LOAD = 1e-24
+"""[N s] added to loads that divide."""
+
+Slope = Callable[[Expr, Expr], Expr]
+"""The slope of ``positive`` of an impulse [N s] over a width [N s]."""
+
+
+@dataclass(frozen=True)
+class FrictionStep:
+    """A contact at which Newton's method linearises the projection of friction.
+
+    Attributes:
+        normal: (3,) unit vector.
+        old: (3,) friction impulse so far [N s].
+        wanted: (3,) friction impulse that would stop the slip [N s].
+        load: normal impulse [N s].
+        mass: effective mass across the normal [kg].
+        smoothing: s [m/s].
+        softness: compliance that Newton's method gives rigid contacts, times ``mass``.
+        centre: 1 if what is given at that softness counts from 0, 0 if from ``old``.
+        slope: of the bound.
+    """
+
+    normal: Expr
+    old: Expr
+    wanted: Expr
+    load: Expr
+    mass: Expr
+    smoothing: Expr
+    softness: Expr
+    centre: float
+    slope: Slope
+
+
+class Friction(Protocol):
+    """The law of friction at one contact. Implementations are frozen dataclasses.
+
+    On the edge of its cone a contact with load l and heading d, a unit vector (3,) across the normal, gives the impulse
+    l ``largest`` ``shaped(d)``, which takes most power from a slip v whose ``shaped(v)`` is opposite to d.
+    """
+
+    @property
+    def largest(self) -> Expr:
+        """The largest friction impulse per unit of load."""
+        ...
+
+    def shaped(self, vector: Expr) -> Expr:
+        """(3,): a vector across the normal, shortened where friction is less than the largest."""
+        ...
+
+    def heading(self, wanted: Expr, load: Expr) -> Expr:
+        """(3,) unit vector: heading of the impulse on the edge that is nearest to ``wanted`` (3,) [N s]."""
+        ...
+
+    def nearest(self, wanted: Expr, load: Expr, width: Expr, smoothing: Expr) -> Expr:
+        """(3,) [N s]: the admissible impulse nearest to ``wanted`` (3,), across the normal.
+
+        Args:
+            wanted: friction impulse that would stop the slip [N s].
+            load: normal impulse [N s].
+            width: over which the smoothed law bends [N s].
+            smoothing: s [m/s]; 0 is the exact law.
+        """
+        ...
+
+    def against(self, slip: Expr) -> Expr:
+        """(3,): friction impulse per unit of load against a ``slip`` (3,) across the normal [m/s]."""
+        ...
+
+    def admits(self, impulse: Expr, load: Expr) -> Expr:
+        """1 if the law admits a friction impulse (3,) [N s] across the normal at this load [N s], else 0."""
+        ...
+
+    def beyond(self, impulse: Expr, load: Expr, share: float) -> Expr:
+        """1 if a friction impulse (3,) [N s] is more than this share of what its load admits in its direction."""
+        ...
+
+    def linearised(self, at: FrictionStep) -> tuple[Expr, Expr, Expr]:
+        """(a (3,), g (3,), B (3, 3)): friction changes by a + g dl - B dv with the load l and the slip v."""
+        ...
+
+
+def friction_at(law: Law, normal: Expr, motions: Motions, t: Expr) -> Friction:
+    """The law of friction at a contact.
+
+    Args:
+        law: of the contact.
+        normal: (3,) unit vector, world frame.
+        motions: of the contact's bodies, with which directions that are fixed in a body turn.
+        t: instant within the step [s].
+    """
+    if law.friction_direction is None or not isinstance(law.friction, tuple):
+        return Disc(law.friction)
+    size = hypot(*law.friction_direction)
+    unit = [number / size for number in law.friction_direction]
+    direction = ca.SX(unit) if law.friction_side is None else motions[law.friction_side].arm(unit).at(t)
+    leaning = direction - normal * ca.dot(normal, direction)
+    square = ca.dot(leaning, leaning)
+    along, across = law.friction
+    # a direction that is nearly normal to the contact says nothing: friction is that across it
+    counts = ca.fmin(square / UPRIGHT**2, 1)
+    return Ellipse(across + (along - across) * counts, ca.SX(across), leaning / ca.sqrt(square + TINY_LEAN**2))
+
+
+@dataclass(frozen=True)
+class Disc:
+    """Coulomb's law with one coefficient mu: |friction impulse| <= mu load. The same of torques, with a radius [m].
+
+    Attributes:
+        coefficient: mu.
+    """
+
+    coefficient: Expr
+
+    @property
+    def largest(self) -> Expr:
+        """See ``Friction``."""
+        return self.coefficient
+
+    def shaped(self, vector: Expr) -> Expr:
+        """See ``Friction``."""
+        return vector
+
+    def heading(self, wanted: Expr, load: Expr) -> Expr:
+        """See ``Friction``."""
+        del load
+        return wanted / length(wanted)
+
+    def nearest(self, wanted: Expr, load: Expr, width: Expr, smoothing: Expr) -> Expr:
+        """See ``Friction``."""
+        return onto_disc(wanted, self.coefficient * load, width, smoothing)
+
+    def against(self, slip: Expr) -> Expr:
+        """See ``Friction``."""
+        return self.coefficient * slip / length(slip)
+
+    def admits(self, impulse: Expr, load: Expr) -> Expr:
+        """See ``Friction``."""
+        return ca.dot(impulse, impulse) <= (self.coefficient * load) ** 2
+
+    def beyond(self, impulse: Expr, load: Expr, share: float) -> Expr:
+        """See ``Friction``."""
+        return ca.sqrt(ca.dot(impulse, impulse) + TINY_SQUARE) > share * (self.coefficient * load)
+
+    def linearised(self, at: FrictionStep) -> tuple[Expr, Expr, Expr]:
+        """See ``Friction``. What points along ``wanted`` is stretched or cut, what lies across it is turned."""
+        wanted, gives = at.wanted, at.softness
+        radius, size, width = self.coefficient * at.load, length(wanted), at.mass * at.smoothing
+        smooth = at.smoothing > 0
+        reach = ca.if_else(smooth, radius + positive(size - radius, width) + 1e-30, ca.fmax(size, radius))
+        falls = at.slope(size - radius, width)
+        share, along = radius / reach, wanted / size
+        stretch = share * (1 - size * falls / reach)
+        grows = self.coefficient * size / reach * (1 - radius * (1 - falls) / reach)
+        counted = gives * at.centre
+        change = share * wanted - at.old
+        ahead = along * ca.dot(along, change - counted * stretch * at.old) / (1 - stretch + gives)
+        beside = change - counted * share * at.old
+        beside = (beside - along * ca.dot(along, beside)) / (1 - share + gives)
+        line = ca.mtimes(along, along.T)
+        plane = ca.SX.eye(3) - ca.mtimes(at.normal, at.normal.T) - line
+        sliding = at.mass * (stretch / (1 - stretch + gives) * line + share / (1 - share + gives) * plane)
+        return ahead + beside, grows / (1 - stretch + gives) * along, sliding
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """Coulomb's law with two coefficients: (f1 / mu1)^2 + (f2 / mu2)^2 <= load^2 of friction impulses f.
+
+    A slip v meets -load M^2 v / |M v|, M the diagonal matrix of the coefficients: the impulse that takes most power
+    from it, which is not opposite to it. With mu1 = mu2 it is that of ``Disc``.
+
+    The impulse x of the ellipse that is nearest to y outside has x_i = b_i y_i / (b_i + T) with b_i = mu_i^2 load and
+    T > 0 the root of |s| = 1, s_i = mu_i y_i / (b_i + T): then y - x = T M^-2 x / load is normal to the ellipse.
+    1 / |s| is concave in T and nearly linear (as in More and Sorensen, Computing a trust region step, SIAM J. Sci.
+    Stat. Comput. 4, 1983); for a disc it is linear. So Newton's method converges fast from a guess of the right size.
+
+    The smoothed law has positive(T, width (mu1 + mu2) / 2) in place of T, which is that of ``Disc`` if mu1 = mu2.
+
+    Attributes:
+        along, across: mu1, mu2.
+        direction: (3,) unit vector across the normal, for which mu1 holds; 0 where it does not matter.
+    """
+
+    along: Expr
+    across: Expr
+    direction: Expr
+
+    @property
+    def largest(self) -> Expr:
+        """See ``Friction``."""
+        return ca.fmax(self.along, self.across)
+
+    def shaped(self, vector: Expr) -> Expr:
+        """See ``Friction``."""
+        largest = self.largest + TINY_LOAD
+        return self._times(vector, self.along / largest, self.across / largest)
+
+    def heading(self, wanted: Expr, load: Expr) -> Expr:
+        """See ``Friction``."""
+        root = self._root(wanted, load)
+        one, two = self._shares(load, ca.fmax(root, 0))
+        scaled = self._times(wanted, self.along * one, self.across * two)
+        return scaled / length(scaled)
+
+    def nearest(self, wanted: Expr, load: Expr, width: Expr, smoothing: Expr) -> Expr:
+        """See ``Friction``."""
+        smooth, root = smoothing > 0, self._root(wanted, load)
+        one, two = self._shares(load, ca.if_else(smooth, positive(root, width * self._mean), ca.fmax(root, 0)))
+        found = self._times(wanted, self.along**2 * load * one, self.across**2 * load * two)
+        size = length(self._times(wanted, self.along * one, self.across * two))
+        return found / ca.if_else(smooth, 1, ca.fmax(size, 1))  # what is left of the error does not leave the ellipse
+
+    def against(self, slip: Expr) -> Expr:
+        """See ``Friction``."""
+        scaled = self._times(slip, self.along, self.across)
+        return self._times(scaled, self.along, self.across) / length(scaled)
+
+    def admits(self, impulse: Expr, load: Expr) -> Expr:
+        """See ``Friction``."""
+        first, rest = self._split(impulse)
+        within = ca.logic_and(first**2 <= (self.along * load) ** 2, ca.dot(rest, rest) <= (self.across * load) ** 2)
+        return ca.logic_and(within, self._gauge(impulse) <= load**2)
+
+    def beyond(self, impulse: Expr, load: Expr, share: float) -> Expr:
+        """See ``Friction``."""
+        return ca.sqrt(self._gauge(impulse) + TINY_SQUARE) > share * load
+
+    def linearised(self, at: FrictionStep) -> tuple[Expr, Expr, Expr]:
+        """See ``Friction``.
+
+        Along the axes, with b, s, T of ``Ellipse``, r = mu_i s_i / (b_i + T) and Q = sum s_i^2 / (b_i + T) at the edge:
+        dT / dy = r / Q, dT / dload = -sum mu_i r_i s_i / Q, dx / dy = diag(b_i / (b_i + T)) - load r (dT / dy)^T.
+        """
+        basis, mu = ca.horzcat(self.direction, ca.cross(at.normal, self.direction)), ca.vertcat(self.along, self.across)
+        y, old, squares = ca.mtimes(basis.T, at.wanted), ca.mtimes(basis.T, at.old), mu * mu
+        smooth, root, width = at.smoothing > 0, self._root(at.wanted, at.load), at.mass * at.smoothing
+        t = ca.if_else(smooth, positive(root, width * self._mean), ca.fmax(root, 0))
+        falls = at.slope(root / (self._mean + TINY_LOAD), width)
+
+        # slopes of T: those of the root, times that of the bound
+        share = ca.vertcat(*self._shares(at.load, ca.fmax(root, 0)))
+        s = mu * share * y
+        s = s / length(s)
+        by_wanted = falls * mu * share * s / (ca.dot(s, s * share) + TINY_LOAD)
+        by_load = -ca.dot(mu * s, by_wanted)
+
+        # slopes of x
+        share = ca.vertcat(*self._shares(at.load, t))
+        by_t = squares * at.load * share * share * y
+        slope = ca.diag(squares * at.load * share) - ca.mtimes(by_t, by_wanted.T)
+        widens = squares * share * share * t * y - by_t * by_load
+
+        # what the projection answers, since a change of the impulse is wanted again
+        change = squares * at.load * share * y - old
+        answer = ca.inv_minor((1 + at.softness) * ca.SX.eye(2) - slope)
+        counted = at.softness * at.centre * ca.mtimes(slope, old)
+        sliding = at.mass * ca.mtimes(answer, slope)
+        first, grows = (ca.mtimes(basis, ca.mtimes(answer, each)) for each in (change - counted, widens))
+        return first, grows, ca.mtimes(ca.mtimes(basis, sliding), basis.T)
+
+    @property
+    def _mean(self) -> Expr:
+        return (self.along + self.across) / 2
+
+    def _split(self, vector: Expr) -> tuple[Expr, Expr]:
+        """(the component along the direction, the rest (3,)) of a vector across the normal."""
+        first = ca.dot(self.direction, vector)
+        return first, vector - self.direction * first
+
+    def _times(self, vector: Expr, one: Expr, two: Expr) -> Expr:
+        """(3,): the part of a vector along the direction times ``one``, and the rest times ``two``."""
+        first, rest = self._split(vector)
+        return self.direction * (one * first) + two * rest
+
+    def _shares(self, load: Expr, t: Expr) -> tuple[Expr, Expr]:
+        """1 / (b_i + T)."""
+        return 1 / (self.along**2 * load + t + TINY_LOAD), 1 / (self.across**2 * load + t + TINY_LOAD)
+
+    def _gauge(self, impulse: Expr) -> Expr:
+        """The square of the least load that admits an impulse; a direction without friction does not count."""
+        first, rest = self._split(impulse)
+        one, two = (mu / (mu**2 + TINY_LOAD) for mu in (self.along, self.across))
+        return (first * one) ** 2 + ca.dot(rest, rest) * two**2
+
+    def _root(self, wanted: Expr, load: Expr) -> Expr:
+        """T of the impulse nearest to ``wanted`` where that lies outside the ellipse, a number below 0 where inside."""
+        first, rest = self._split(wanted)
+        c1, c2 = self.along * ca.fabs(first), self.across * length(rest)
+        b1, b2 = self.along**2 * load, self.across**2 * load
+
+        # inside: how far from the edge, continued from outside with the same slope
+        one, two = self._shares(load, ca.SX(0))
+        square, size = _square(c1 * one, c2 * two)
+        middle = self._mean**2 * load + TINY_LOAD
+        within = (size - 1) / ((c1 * one) ** 2 * one + (c2 * two) ** 2 * two + ca.fmax(1 - square, 0) / middle)
+
+        # a lower bound of the root, and a guess: what lies across the long axis falls off first
+        wide = b1 > b2
+        longer, shorter = ca.fmax(b1, b2), ca.fmin(b1, b2)
+        ahead, beside = ca.if_else(wide, c1, c2), ca.if_else(wide, c2, c1)
+        low = ca.fmax(ca.fmax(ca.fmax(c1 - b1, c2 - b2), ca.sqrt(c1**2 + c2**2 + TINY_SQUARE) - longer), 0)
+        scale = ca.fmax(ahead, longer) + TINY_LOAD
+        cube = scale * _cube_root(beside**2 / (2 * scale**2) + TINY_SQUARE)
+        left = ca.sqrt(ca.fmax(1 - (ahead / (longer + TINY_LOAD)) ** 2, 0) + TINY_SQUARE)
+        t = ca.fmax(low, ca.fmin(cube, beside / left) - shorter)
+
+        # Newton's method for 1 / |s| = 1
+        for _ in range(STEPS):
+            one, two = self._shares(load, t)
+            square, size = _square(c1 * one, c2 * two)
+            fall = (c1 * one) ** 2 * one + (c2 * two) ** 2 * two + TINY_LOAD
+            t = ca.fmax(t + square * (size - 1) / fall, low)
+        return ca.if_else(within > 0, t, within)
+
+
+def _square(one: Expr, two: Expr) -> tuple[Expr, Expr]:
+    """The square of the length of a vector, and the length."""
+    square = one**2 + two**2
+    return square, ca.sqrt(square + TINY_SQUARE)
+
+
+def _cube_root(x: Expr) -> Expr:
+    """About the cube root of a number in (0, 1], by square roots: x^(1/4 + 1/16 + 1/64)."""
+    found, power = ca.SX(1), x
+    for _ in range(3):
+        power = ca.sqrt(ca.sqrt(power))
+        found = found * power
+    return found

@@ -1,0 +1,206 @@
+"""Pages of runs: each made whole or not at all, here or side by side in worker processes.
+
+A page depends on its folder alone, so it does not matter which process makes it.
+"""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import signal
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from time import monotonic
+
+from symphys import files
+from symphys.interrupts import Interrupts, ignoring_interrupts
+from symphys.report.making.stamps import FULL, LIGHT
+from symphys.report.pages.run import PAGE, write_light_report, write_run_report
+from symphys.results.text_files import ReportError
+
+AUTO = "auto"
+PAGE_KINDS = (AUTO, FULL, LIGHT)
+MOST_FULL = 50
+"""With "auto", so many pages made at once are full at most; of more all are light."""
+
+
+@dataclass(frozen=True)
+class PageFault:
+    """A page that could not be made, and why."""
+
+    page: Path
+    reason: str
+
+    def __str__(self) -> str:
+        """Return the page and the reason, in a line."""
+        return f"{self.page} could not be made: {self.reason}"
+
+
+def is_light(kind: str, count: int) -> bool:
+    """Whether ``count`` pages that are made at once are light; ReportError for a kind that there is not."""
+    if kind not in PAGE_KINDS:
+        raise ReportError(f"there are no pages of the kind {kind!r}; there are {', '.join(PAGE_KINDS)}")
+    return kind == LIGHT or (kind == AUTO and count > MOST_FULL)
+
+
+def fitting_kinds(kind: str, count: int) -> tuple[str, ...]:
+    """Return the kinds of a page that need not be made again, of ``count`` at once."""
+    if kind == AUTO:
+        return (FULL, LIGHT) if is_light(kind, count) else (FULL,)
+    return (LIGHT,) if is_light(kind, count) else (FULL,)
+
+
+def make_run_page(folder: Path, light: bool) -> PageFault | None:
+    """Make the page of a run folder; why it could not be made, if it was not."""
+    return attempt(folder / PAGE, lambda: write_light_report(folder) if light else write_run_report(folder))
+
+
+def attempt(page: Path, make: Callable[[], object]) -> PageFault | None:
+    """Call what makes a page; any failure but an interruption becomes a fault."""
+    try:
+        make()
+    except (ReportError, files.FileError) as error:
+        return PageFault(page, str(error))
+    except Exception as error:
+        return PageFault(page, f"{type(error).__name__}: {error}" if str(error) else type(error).__name__)
+    return None
+
+
+DIED = "the process that made it died: killed from outside, out of memory, or a crash in compiled code"
+SLOW = "it was not made within {:g} s"
+STOP_TIMEOUT = 20.0
+"""[s] that a worker has for the end of its page once it is asked to stop."""
+MIN_PAGES_PER_WORKER = {False: 4, True: 80}
+"""A worker takes a second to start: it is started for so many pages at least, full ones and (True) light ones."""
+
+Done = Callable[[Path, PageFault | None], None]
+"""Receives each folder whose page was made, or could not be."""
+
+
+def make_run_pages(folders: Sequence[Path], light: bool, jobs: int, done: Done, limit: float = math.inf) -> None:
+    """Make the page of every folder, here or in up to ``jobs`` worker processes.
+
+    ``limit``: [s] that a page may take; there is always a worker where there is one.
+
+    KeyboardInterrupt ends it: pages that are begun in workers are finished, and every page is whole or as it was.
+    """
+    count = min(jobs, len(folders) // MIN_PAGES_PER_WORKER[light])
+    left = deque(folders)
+    if count > 1 or limit < math.inf:
+        PagePool(left, light, done, limit).run(max(count, 1))
+    with Interrupts().listening() as interrupted:  # a KeyboardInterrupt in the middle of a figure may be lost there
+        while left:
+            done(left[0], make_run_page(left[0], light))
+            left.popleft()
+            if interrupted():
+                raise KeyboardInterrupt
+
+
+@dataclass
+class PageWorker:
+    """A worker process; ``folder``: whose page it makes, None before it is ready; ``until``: [s] when it has to be."""
+
+    process: BaseProcess
+    pipe: Connection
+    folder: Path | None = None
+    until: float = math.inf
+    ended: bool = False
+
+    def stop(self) -> None:
+        """Let it end after its page."""
+        with suppress(OSError):
+            self.pipe.send(None)
+
+
+@dataclass
+class PagePool:
+    """Worker processes and the pages that are left for them."""
+
+    left: deque[Path]
+    light: bool
+    done: Done
+    limit: float = math.inf
+
+    def run(self, count: int) -> None:
+        """Make all pages; some are left over only where no process can be started."""
+        workers: list[PageWorker] = []
+        try:
+            with ignoring_interrupts():
+                workers += [start(self.light) for _ in range(count)]
+            while workers:
+                ready = wait([worker.pipe for worker in workers], self.end_slow(workers))
+                for worker in [each for each in workers if each.pipe in ready]:
+                    self.receive(worker, workers)
+        finally:
+            end(workers)
+
+    def end_slow(self, workers: Sequence[PageWorker]) -> float | None:
+        """Kill those that take too long; how long to wait for the others [s], None for ever."""
+        now = monotonic()
+        for worker in workers:
+            if now >= worker.until and not worker.ended:
+                worker.ended = True
+                worker.process.kill()
+        until = min((worker.until for worker in workers if not worker.ended), default=math.inf)
+        return None if until == math.inf else max(until - now, 0.0)
+
+    def receive(self, worker: PageWorker, workers: list[PageWorker]) -> None:
+        """Take what a worker has made, and give it the next page; replace one that died over a page."""
+        try:
+            fault: PageFault | None = worker.pipe.recv()
+        except (EOFError, OSError):
+            workers.remove(worker)
+            worker.process.join()
+            if worker.folder is not None:
+                why = SLOW.format(self.limit) if worker.ended else DIED
+                self.done(worker.folder, PageFault(worker.folder / PAGE, why))
+                if self.left:
+                    with ignoring_interrupts():
+                        workers.append(start(self.light))
+            return
+        if worker.folder is not None:
+            self.done(worker.folder, fault)
+        if self.left:
+            worker.folder, worker.until = self.left.popleft(), monotonic() + self.limit
+            with suppress(OSError):  # one that died meanwhile is heard of as such
+                worker.pipe.send(worker.folder)
+        else:
+            workers.remove(worker)
+            end([worker])
+
+
+def start(light: bool) -> PageWorker:
+    """Return a new worker process."""
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=work, args=(there, light), daemon=True)
+    process.start()
+    there.close()
+    return PageWorker(process, here)
+
+
+def end(workers: Sequence[PageWorker]) -> None:
+    """Let workers end after their pages, and wait for that."""
+    with ignoring_interrupts():
+        for worker in workers:
+            worker.stop()
+        for worker in workers:
+            worker.process.join(STOP_TIMEOUT)
+            if worker.process.is_alive():
+                worker.process.terminate()
+                worker.process.join()
+            worker.pipe.close()
+
+
+def work(pipe: Connection, light: bool) -> None:
+    """Make pages in a worker process until there are no more, or until its parent has gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with suppress(EOFError, OSError):
+        pipe.send(None)
+        while (folder := pipe.recv()) is not None:
+            pipe.send(make_run_page(folder, light))
