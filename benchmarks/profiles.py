@@ -1,108 +1,103 @@
-"""Which method to take when: every method on the shipped problems from many starts, as data profiles and tables.
-
-    python benchmarks/profiles.py [FOLDER] [--instances N] [--seconds S] [--work W] [--problems A,B] [--methods A,B]
+"""Which method to take when: how often and how soon does each solve the shipped problems from many starts?
 
 Problems are those of the catalogue that have no scenarios and no net to learn, and whose gradient takes at most 50 ms.
 Each is built and compiled once; instance 0 starts from its guess, the others from one perturbed by its spread. Solves
-are lines of files in FOLDER/runs. A command that was ended goes on where it was; another budget needs another folder.
-Tables and advice are printed, the figure is FOLDER/profiles.svg.
+are lines of files in ``--folder``. A run that was ended goes on where it was; another budget needs another folder.
 """
 
 from __future__ import annotations
 
-import argparse
 import subprocess
-import sys
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from time import perf_counter
 
-from symphys import threads
+from bench import Row, in_process
+from profile_runs import Budget, Cases, Profiles, advice, ratios, read, read_lines, running_times, shares
 
-threads.limit()
+from symphys.problems import catalogue
 
-from profile_figures import write_profiles  # noqa: E402
-from profile_runs import Budget, Cases, read_lines  # noqa: E402
-from profile_tables import AXES, advice, class_table, problem_table, read  # noqa: E402
-
-from symphys.problems import catalogue  # noqa: E402
-
-PATIENCE = 3.0
-"""A problem whose solves take so many times their budget, and ten minutes more, is given up."""
-BUILDING = 600.0
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Do what is missing, and print the tables; the exit code."""
-    asked = parsed(arguments)
-    runs = asked.folder / "runs"
-    budget = Budget(asked.work, asked.seconds)
-    if asked.only:
-        Cases(asked.only, runs, budget).run(asked.instances, asked.methods)
-        return 0
-    began = perf_counter()
-    with ThreadPoolExecutor(asked.jobs) as pool:
-        lost = [line for line in pool.map(lambda name: worked(name, asked), asked.problems or catalogue()) if line]
-    print(f"{perf_counter() - began:.0f} s for what was missing, {asked.jobs} processes")
-    if asked.report:
-        report(asked.folder)
-    print("\n".join(lost))
-    return 1 if lost else 0
+COLUMNS = {
+    "class": "of problems",
+    "problem": "one of the class; none: all of them",
+    "method": "a solver with its default options",
+    "at_0.1": "share of starts that converge at this tolerance",
+    "at_0.001": "share of starts that converge at this tolerance",
+    "at_1e-05": "share of starts that converge at this tolerance",
+    "all_met": "share of starts from which everything is met",
+    "rollouts": "expected work until a success; of a class, relative to the best method, geometric mean",
+    "seconds": "expected seconds until a success; of a class, relative to the best method, geometric mean",
+}
+SHARES = tuple(COLUMNS)[3:7]
+PATIENCE, BUILDING = 3.0, 600.0
+"""A problem is given up after so many times the budget of its solves, and so many seconds more."""
 
 
-def parsed(arguments: list[str] | None) -> argparse.Namespace:
-    """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("build/profiles"))
-    parser.add_argument("--instances", type=int, default=15, help="starts of each problem")
-    parser.add_argument("--seconds", type=float, default=Budget.seconds, help="of the processor, for each solve")
-    parser.add_argument("--work", type=float, default=Budget.work, help="rollouts for each solve")
-    parser.add_argument("--jobs", type=int, default=2, help="worker processes")
-    parser.add_argument("--problems", type=names, default=(), help="instead of the catalogue")
-    parser.add_argument("--methods", type=names, default=(), help="of those that apply")
-    parser.add_argument("--no-report", dest="report", action="store_false", help="solve, and print no tables")
-    parser.add_argument("--only", help=argparse.SUPPRESS)
-    return parser.parse_args(arguments)
+def rows(
+    quick: bool = False,
+    folder: str = "build/profiles",
+    instances: int = 15,
+    seconds: float = Budget.seconds,
+    work: float = Budget.work,
+    jobs: int = 2,
+    problems: tuple[str, ...] = (),
+    methods: tuple[str, ...] = (),
+) -> Iterator[Row]:
+    """Do the solves that are missing; yield a row for each class and method, then for each problem and method.
+
+    Args:
+        quick: one start of one problem by two methods.
+        folder: where solves are kept.
+        instances: starts of each problem.
+        seconds: of the processor, for each solve.
+        work: rollouts for each solve.
+        jobs: worker processes.
+        problems: none: the catalogue.
+        methods: of those that apply; none: all.
+    """
+    if quick:
+        instances, problems, methods, folder = 1, ("free_kick",), ("gradient", "least_squares"), f"{folder}/quick"
+    solve = partial(worked, folder=folder, instances=instances, work=work, seconds=seconds, methods=methods)
+    with ThreadPoolExecutor(jobs) as pool:
+        lost = list(filter(None, pool.map(solve, problems or catalogue())))
+    recorded = read(Path(folder))
+    yield from tabled(recorded)
+    print("\n".join(["", *advice(recorded), *lost]))
+    print("\n".join(f"left out: {name}: {why}" for name, why in recorded.left_out.items()))
 
 
-def names(text: str) -> tuple[str, ...]:
-    """Names between commas."""
-    return tuple(filter(None, text.split(",")))
-
-
-def worked(name: str, asked: argparse.Namespace) -> str:
-    """Solve one problem in a process of its own; a line where that process failed."""
-    command = [sys.executable, __file__, str(asked.folder), f"--only={name}", f"--instances={asked.instances}"]
-    command += [f"--seconds={asked.seconds}", f"--work={asked.work}", f"--methods={','.join(asked.methods)}"]
-    solves = asked.instances * (len(asked.methods) or 8)
+def worked(name: str, folder: str, instances: int, work: float, seconds: float, methods: tuple[str, ...]) -> str:
+    """Solve one problem in a process of its own; returns a line where that process failed."""
+    limit = BUILDING + PATIENCE * instances * (len(methods) or 8) * seconds
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, check=False, timeout=BUILDING + PATIENCE * solves * asked.seconds
-        )
+        in_process(solves, name, folder, instances, work, seconds, methods, timeout=limit)
     except subprocess.TimeoutExpired:
         return f"{name}: given up, it takes too long"
-    print(f"{name}: {max(len(read_lines(asked.folder / 'runs' / f'{name}.jsonl')) - 1, 0)} solves", flush=True)
-    return f"{name}: {done.stderr.strip().splitlines()[-1]}" if done.returncode else ""
+    except RuntimeError as error:
+        return f"{name}: {error}"
+    return ""
 
 
-def report(folder: Path) -> None:
-    """Print the tables, and draw the figure."""
-    recorded = read(folder / "runs")
-    count = len(recorded.solves)
-    print(
-        f"{count} solves of {len(recorded.problems)} problems; at most {recorded.budget.work:g} rollouts and ", end=""
-    )
-    print(
-        f"{recorded.budget.seconds:g} s each, {sum(s.ends['seconds'] for s in recorded.solves) / 3600:.2f} h in all\n"
-    )
+def solves(name: str, folder: str, instances: int, work: float, seconds: float, methods: list[str]) -> int:
+    """Solve one problem in this process; returns how many solves there are."""
+    Cases(name, Path(folder), Budget(work, seconds)).run(instances, tuple(methods))
+    return len(read_lines(Path(folder) / f"{name}.jsonl")) - 1
+
+
+def tabled(recorded: Profiles) -> Iterator[Row]:
+    """Yield the rows of recorded solves."""
+    work, seconds = (running_times(recorded, axis) for axis in ("work", "seconds"))  # type: ignore[arg-type]
     for group in recorded.groups:
-        print(class_table(recorded, group), end="\n\n")
-    for axis in AXES:
-        print(problem_table(recorded, axis), end="\n\n")
-    print("\n".join(advice(recorded)), end="\n\n")
-    print("\n".join(f"left out: {name}: {why}" for name, why in recorded.left_out.items()))
-    write_profiles(recorded, folder / "profiles.svg")
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+        problems = [each for each in recorded.problems if recorded.group(each) == group]
+        by_work, by_seconds = ratios(work, problems), ratios(seconds, problems)
+        for method in recorded.methods:
+            if any(recorded.of(problem, method) for problem in problems):
+                found = dict(zip(SHARES, shares(recorded, group, method).values(), strict=True))
+                row: Row = {"class": group, "problem": None, "method": method, **found}
+                yield row | {"rollouts": by_work.get(method), "seconds": by_seconds.get(method)}
+    for problem in recorded.problems:
+        for method in recorded.methods:
+            if recorded.of(problem, method):
+                row = {"class": recorded.group(problem), "problem": problem, "method": method}
+                yield row | {"rollouts": work[problem][method], "seconds": seconds[problem][method]}

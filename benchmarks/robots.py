@@ -1,4 +1,4 @@
-"""Jointed robots for both engines: a quadruped, a chain, and consistent states of them from coordinates and rates."""
+"""Jointed robots for both engines: a quadruped and a chain, and their states from coordinates and rates."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ HIPS = {"left front": (1, 1), "right front": (1, -1), "left hind": (-1, 1), "rig
 STANDING = 0.65
 """Height of the trunk's centre above the ground with straight legs [m]."""
 HOLD = Spring(stiffness=60.0, damping=2.0)
-"""What holds a leg in place, where motors do not."""
+"""Spring of each hinge of a leg without motors."""
 SERVO = Servo(20.0, 30.0, 8.0)
 HELD: dict[str, tuple[Motor | None, str]] = {"springs": (None, "Euler"), "servos": (SERVO, "implicitfast")}
-"""What may hold the legs, and MuJoCo's fastest integrator that is stable with it."""
+"""The motor of each hinge, if any, and MuJoCo's fastest integrator that is stable with it."""
 
 
 def block(mass: float, *sizes: float) -> tuple[float, ...]:
-    """Principal moments of a box [kg m^2] with these edges [m]."""
+    """Return the principal moments of a box [kg m^2] with these edges [m]."""
     squares = np.square(sizes)
     return tuple(float(m) for m in mass / 12 * (squares.sum() - squares))
 
 
 def quadruped(motor: Motor | None = None, spring: Spring | None = None, ground: bool = True) -> World:
-    """A trunk on four legs of four links: 17 bodies, 16 hinges, 24.4 kg; only its feet touch the ground.
+    """Return a trunk on four legs of four links: 17 bodies, 16 hinges, 24.4 kg; only its feet touch the ground.
 
     Each leg turns about z, x and y at its hip, and about y at its knee. No published table robot has its masses stated.
     """
@@ -56,14 +56,14 @@ def quadruped(motor: Motor | None = None, spring: Spring | None = None, ground: 
 
 
 def leg(name: str) -> list[Body]:
-    """Two rings of a hip, a thigh, a shank with its foot."""
+    """Return the bodies of a leg: two rings of a hip, a thigh, a shank with its foot."""
     rings = [Body(f"{name} {part}", 1.0, block(1.0, 0.1, 0.1, 0.1)) for part in ("ring", "fork")]
     thigh = Body(f"{name} thigh", 1.0, block(1.0, 0.06, 0.06, 0.3))
     return [*rings, thigh, Body(f"{name} shank", 0.6, block(0.6, 0.05, 0.05, 0.3), (Sphere(0.05, (0, 0, -0.15)),))]
 
 
 def chain(count: int = 8, length: float = 0.15, spring: Spring | None = None, motor: Motor | None = None) -> World:
-    """Rods of 0.5 kg that hang on the world by hinges about y, x, y, ... in turn; straight down at coordinates 0."""
+    """Return rods of 0.5 kg that hang on the world by hinges about y, x, y, ...; straight down at coordinates 0."""
     bodies = [Body(f"rod{k}", 0.5, block(0.5, 0.03, 0.03, length)) for k in range(count)]
     joints = []
     for k in range(count):
@@ -83,12 +83,12 @@ class Pose:
     spin: Array
 
     def point(self, arm: Any) -> tuple[Array, Array]:
-        """Where a point of the body's frame is, and how fast it moves."""
+        """Return the position and the velocity of a point of the body's frame."""
         lever = self.turn.apply(arm)
         return self.place + lever, self.velocity + np.cross(self.spin, lever)
 
     def values(self, name: str) -> Values:
-        """By the names of a state."""
+        """Return the pose by the names of a state."""
         q = self.turn.as_quat(scalar_first=True)
         fields = {"position": self.place, "orientation": q, "velocity": self.velocity, "angular_velocity": self.spin}
         return {f"{name}.{field}": value for field, value in fields.items()}
@@ -98,7 +98,7 @@ REST = Pose(Rotation.identity(), np.zeros(3), np.zeros(3), np.zeros(3))
 
 
 def turns_of(joint: Joint, q: Sequence[float]) -> Rotation:
-    """From the first side's frame to the second's, at coordinates (n,); of a ball joint they are a rotation vector."""
+    """Return the rotation from the first side's frame to the second's; (n,) of a ball joint is a rotation vector."""
     if joint.kind.name == "ball":
         return Rotation.from_rotvec(q)
     axes = {"hinge": "X", "universal": "YX", "slider": "", "fixed": ""}[joint.kind.name]
@@ -106,13 +106,13 @@ def turns_of(joint: Joint, q: Sequence[float]) -> Rotation:
 
 
 def state_of(world: World, coordinates: Mapping[str, Any], rates: Mapping[str, Any], root: Pose = REST) -> Values:
-    """Poses and velocities of every body of trees, from coordinates and rates of joints by name; 0 where not given.
+    """Return poses and velocities of every body of trees, from coordinates and rates of joints by name.
 
     Args:
         world: its joints make trees.
-        coordinates: [rad] or [m]; a rotation vector (3,) for a ball joint.
-        rates: likewise; of ball joints none.
-        root: of each tree that floats.
+        coordinates: [rad] or [m]; a rotation vector (3,) for a ball joint; 0 where not given.
+        rates: [rad/s] or [m/s]; ball joints have none.
+        root: pose of the root of each tree that floats.
     """
     poses: dict[int, Pose] = {}
     for link in (link for tree in kinematic_trees(world.joints) for link in tree.links):
@@ -128,7 +128,7 @@ def state_of(world: World, coordinates: Mapping[str, Any], rates: Mapping[str, A
 
 
 def held(joint: Joint, link: Link, parent: Pose, q: Array, speed: Array) -> Pose:
-    """The pose of a link from its parent's."""
+    """Return the pose of a link from the pose of its parent."""
     own, other = joint.frames if link.sign > 0 else joint.frames[::-1]
     at = parent.turn * of_frame(other)
     turn = turns_of(joint, q)
@@ -145,12 +145,12 @@ def held(joint: Joint, link: Link, parent: Pose, q: Array, speed: Array) -> Pose
 
 
 def of_frame(frame: JointFrame) -> Rotation:
-    """From the frame's axes to the body's."""
+    """Return the rotation from the frame's axes to the body's."""
     return Rotation.from_quat(frame.orientation, scalar_first=True)
 
 
 def swung(joint: Joint, second: Rotation, q: Array, speed: Array) -> Iterator[tuple[float, Array]]:
-    """Rates of rotations and their axes, world frame."""
+    """Yield rates of rotations and their axes, world frame."""
     if joint.kind.name == "hinge":
         yield speed[0], second.apply([1, 0, 0])
     if joint.kind.name == "universal":
@@ -160,12 +160,12 @@ def swung(joint: Joint, second: Rotation, q: Array, speed: Array) -> Iterator[tu
 
 @dataclass(frozen=True)
 class JointedScene:
-    """A robot and a batch of initial states; for ``consistency.Here`` and ``mujoco_robots``.
+    """A robot and a batch of initial states.
 
     Attributes:
         name: of the scene.
         robot: bodies, joints, ground.
-        start: (batch,) values by name.
+        start: (batch,) initial states by name.
     """
 
     name: str
@@ -173,22 +173,22 @@ class JointedScene:
     start: tuple[Values, ...]
 
     def world(self, restitution: float = 0.0) -> World:
-        """With this restitution everywhere."""
+        """Return the world with this restitution in all contacts."""
         pairs = tuple(replace(p, law=replace(p.law, restitution=restitution)) for p in self.robot.pairs)
         return replace(self.robot, pairs=pairs)
 
     def states(self, world: World) -> Array:
-        """(batch, nx)."""
+        """Return the initial states (batch, nx)."""
         return np.array([np.array(ca.DM(initial_state(world, values))).ravel() for values in self.start])
 
     def places(self, world: World, X: Array) -> Array:
-        """(..., bodies, 3) the centres."""
+        """Return the centres (..., bodies, 3) of states (..., nx)."""
         layout = Layout(world)
         return np.stack([X[..., layout[f"{body.name}.position"]] for body in world.bodies], axis=-2)
 
 
 def standing(motor: Motor | None = None, batch: int = 128) -> JointedScene:
-    """The quadruped on its four feet, pushed: its trunk and all that hangs on it moves at about 0.3 m/s."""
+    """Return the quadruped on its four feet, pushed: all of it moves at about 0.3 m/s."""
     rng, robot = np.random.default_rng(0), quadruped(motor, None if motor else HOLD)
     place = np.array([0, 0, STANDING])
     roots = [Pose(Rotation.identity(), place, rng.normal(0, 0.3, 3), np.zeros(3)) for _ in range(batch)]
@@ -196,7 +196,7 @@ def standing(motor: Motor | None = None, batch: int = 128) -> JointedScene:
 
 
 def swinging(count: int = 8, batch: int = 8) -> JointedScene:
-    """The chain, let go from a bend; its hinges are damped a little."""
+    """Return the chain, let go from a bend; its hinges are damped a little."""
     rng, robot = np.random.default_rng(7), chain(count, spring=Spring(damping=0.002))
     names = [joint.name for joint in robot.joints]
     starts = (dict(zip(names, rng.normal(0, 0.4, count), strict=True)) for _ in range(batch))

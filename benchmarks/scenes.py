@@ -1,4 +1,4 @@
-"""Scenes of boxes and capsules for both engines: a world here, a model there, and the same initial states."""
+"""Scenes of boxes, capsules and balls for both engines, with a batch of initial states."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from symphys.model.world import Body, Law, World, make_world
 from symphys.types import Array
 
 KINDS = ("sphere", "capsule", "box")
-"""By how many sizes they have."""
+"""MuJoCo's names of solids with one, two and three sizes."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Solid:
 
     @property
     def inertia(self) -> tuple[float, ...]:
-        """Principal moments about the centre [kg m^2], uniform density."""
+        """Return the principal moments about the centre [kg m^2] for uniform density."""
         if len(self.sizes) == 3:
             squares = np.square(self.sizes)
             return tuple(float(m) for m in self.mass / 3 * (squares.sum() - squares))
@@ -45,12 +45,12 @@ class Solid:
         return across, across, (m / 2 + 0.4 * n) * radius**2
 
     def body(self) -> Body:
-        """For this engine."""
+        """Return the body for this engine."""
         shapes = {1: lambda r: Sphere(r), 2: Capsule, 3: lambda *sizes: Box(sizes)}
         return Body(self.name, self.mass, self.inertia, (shapes[len(self.sizes)](*self.sizes),))
 
     def xml(self, contact: str) -> str:
-        """For MuJoCo, with the same mass and inertia."""
+        """Return the body for MuJoCo, with the same mass and inertia."""
         kind, sizes = KINDS[len(self.sizes) - 1], " ".join(map(str, self.sizes))
         moments = " ".join(map(str, self.inertia))
         return (
@@ -65,11 +65,10 @@ class Scene:
 
     Attributes:
         name: of the scene.
-        solids: what may fall.
+        solids: the bodies.
         start: (batch, solids, 13) position, orientation w x y z, velocity, angular velocity (world frame).
-        friction: of everything.
+        friction: coefficient of all contacts.
         gravity: downwards [m/s^2].
-        lean: gravity along x, as on an incline; this engine only.
     """
 
     name: str
@@ -77,19 +76,18 @@ class Scene:
     start: Array
     friction: float = 0.5
     gravity: float = 9.81
-    lean: float = 0.0
 
     def world(self, restitution: float = 0.0) -> World:
-        """For this engine."""
+        """Return the world for this engine."""
         bodies, law = [solid.body() for solid in self.solids], Law(self.friction, restitution)
-        return make_world(bodies, [Plane.ground()], law, (self.lean, 0, -self.gravity))
+        return make_world(bodies, [Plane.ground()], law, (0, 0, -self.gravity))
 
     def states(self, world: World) -> Array:
-        """(batch, nx) the initial states for this engine."""
+        """Return the initial states (batch, nx) for this engine."""
         return np.array([np.array(ca.DM(initial_state(world, self.values(row)))).ravel() for row in self.start])
 
     def values(self, row: Any) -> dict[str, Any]:
-        """An initial state by name, from (solids, 13) numbers or, for one solid, a casadi column of 13."""
+        """Return an initial state by name, from (solids, 13) numbers or, for one solid, a casadi column of 13."""
         row = row if isinstance(row, np.ndarray) else [row]
         parts = {"position": slice(0, 3), "orientation": slice(3, 7)}
         parts |= {"velocity": slice(7, 10), "angular_velocity": slice(10, 13)}
@@ -97,19 +95,19 @@ class Scene:
         return {f"{solid.name}.{name}": body[part] for solid, body in pairs for name, part in parts.items()}
 
     def places(self, world: World, X: Array) -> Array:
-        """(..., solids, 3) the centres, from states (..., nx) of this engine."""
+        """Return the centres (..., solids, 3) of states (..., nx) of this engine."""
         layout = Layout(world)
         return np.stack([X[..., layout[f"{solid.name}.position"]] for solid in self.solids], axis=-2)
 
 
 def turned(rng: np.random.Generator, count: int) -> Array:
-    """(count, 4) random orientations."""
+    """Return random orientations (count, 4)."""
     q = rng.standard_normal((count, 4))
     return q / np.linalg.norm(q, axis=1, keepdims=True)
 
 
 def tumbling_box(batch: int = 8) -> Scene:
-    """A flat box thrown on the ground, turning."""
+    """Return a flat box that is thrown on the ground, turning."""
     rng = np.random.default_rng(1)
     start = np.zeros((batch, 1, 13))
     start[:, 0, :3] = [0, 0, 0.6]
@@ -120,7 +118,7 @@ def tumbling_box(batch: int = 8) -> Scene:
 
 
 def heap_of_capsules(side: int = 2, batch: int = 8) -> Scene:
-    """``side`` cubed capsules in a grid, each turned at random, dropped on the ground and each other."""
+    """Return ``side`` cubed capsules in a grid, turned at random, that fall on the ground and on each other."""
     rng, step = np.random.default_rng(2), 0.26
     grid = np.stack(np.meshgrid(*3 * [np.arange(side) * step], indexing="ij"), axis=-1).reshape(-1, 3)
     count = len(grid)

@@ -1,140 +1,299 @@
-"""How well are real impacts predicted? 570 recorded tosses of a cube, and 379 of two boxes on a hinge.
+"""How well are recorded impacts of a real cube predicted?
 
-    python benchmarks/tosses.py FOLDER [--object cube] [--only a/symphys,b/mujoco] [--evaluations 600] [--out FOLDER]
-    python benchmarks/tosses.py FOLDER --study flights,ablations,splits,limits [--object cube] [--evaluations 200]
-
-FOLDER has cube_fit.npz, cube_check.npz, elbow_fit.npz and elbow_check.npz; see docs/results/tosses.md. Both engines are
-fitted to the fit files by the same search, CMA-ES on the published measure with the same number of evaluations, and
-scored on the check files: simulated open loop from the start, (a) as measured in the first frame, (b) as the frames
-before the first contact say; means over frames, then over tosses. What has been found is kept in --out and not searched
-again. --study asks what flights alone say, what each part of the cube's model is worth, and what limits the prediction.
+570 tosses of an acrylic cube onto a table (ContactNets, see docs/results/tosses.md); ``--data FOLDER`` has cube_fit.npz
+and cube_check.npz. Tosses of the check file are simulated open loop from their first frame, with the numbers that
+CMA-ES found on the fit file. The measure is that of Acosta, Yang and Posa (2022): means over frames, then over tosses,
+of the error of the position by the width of the cube, and of the angle between orientations. Then the flights before
+the first impact are identified with a start of each toss: gravity in the lengths of the recordings, and the centre of
+mass. Without data a few tosses of the engine itself are predicted and identified, whose errors are those of rounding.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
 from typing import Any
 
 import numpy as np
-from tosses_data import CUBE, ELBOW, Tossed, Tosses, read
-from tosses_flights import flights_of, starts_of
-from tosses_limits import ABLATIONS, SPLITS, ablated, limits, split
-from tosses_mujoco import MujocoSimulator
-from tosses_mujoco import numbers_of as numbers_of_mujoco
-from tosses_search import kept, search
-from tosses_symphys import CUBE_NUMBERS, ELBOW_NUMBERS, Simulator
+from bench import Row
+from scipy.spatial.transform import Rotation
 
-from symphys.results.identification import summary
-from symphys.types import Array
+import symphys
+from symphys.prediction.residuals import RecordingResiduals, residuals_of
+from symphys.results.identification import Identification
+from symphys.types import Array, Ints
 
-PARTS = ("fit", "check")
-ENGINES, CASES = ("symphys", "mujoco"), ("a", "b")
-
-
-def first_of(folder: Path, out: Path, tossed: Tossed, case: str) -> list[dict[str, Array]]:
-    """Where the tosses of both parts start."""
-    parts = [read(folder, tossed, part) for part in PARTS]
-    return [each.first() for each in parts] if case == "a" else starts_of(tossed, parts, out / "work")
-
-
-def simulator(engine: str, tossed: Tossed, tosses: Tosses, first: Mapping[str, Array], path: Path) -> Any:
-    """Of an engine, with its numbers."""
-    if engine == "mujoco":
-        return MujocoSimulator(tossed, tosses, numbers_of_mujoco(tossed), first)
-    return Simulator(tossed, tosses, CUBE_NUMBERS if tossed is CUBE else ELBOW_NUMBERS, path.absolute(), first)
-
-
-def fitted(folder: Path, out: Path, tossed: Tossed, case: str, engine: str, evaluations: int) -> dict[str, Any]:
-    """Fit, then score."""
-    print(f"{tossed.name}, ({case}), {engine}")
-    firsts = first_of(folder, out, tossed, case)
-    both = [
-        simulator(engine, tossed, read(folder, tossed, part), first, out / "work" / f"{tossed.name}_{case}_{part}.npz")
-        for part, first in zip(PARTS, firsts, strict=True)
-    ]
-    found, spent = search(both[0].numbers, both[0].errors, evaluations)
-    errors = {part: each.errors(found).tolist() for part, each in zip(PARTS, both, strict=True)}
-    return {"numbers": found, "evaluations": spent, "errors": errors}
-
-
-def table(tossed: Tossed, results: Mapping[tuple[str, str], Mapping[str, Any]]) -> str:
-    """Errors of both engines, mean and standard deviation over the tosses of the check file."""
-    units = {"position": "position [%]", "orientation": "rotation [deg]", "angle": "hinge [deg]"}
-    lines = ["| | " + " | ".join(units[each] for each in tossed.measures) + " | processor time |"]
-    lines.append("|---" * (len(tossed.measures) + 2) + "|")
-    for (case, engine), found in results.items():
-        cells = mean_and_spread(found["errors"]["check"])
-        lines.append(f"| ({case}) {engine} | {cells} | {found['processor_seconds']:.0f} s |")
-    return "\n".join(lines)
-
-
-def mean_and_spread(errors: list[list[float]]) -> str:
-    """Cells of a table: mean and standard deviation over tosses."""
-    found = np.array(errors)
-    return " | ".join(f"{m:.2f} ± {s:.1f}" for m, s in zip(found.mean(axis=0), found.std(axis=0), strict=True))
-
-
-def study_flights(folder: Path, out: Path, tossed: Tossed) -> None:
-    """Print what flights say."""
-    starts_of(tossed, [read(folder, tossed, part) for part in PARTS], out / "work")
-    print(summary(flights_of(tossed, out / "work")))
-
-
-def study(folder: Path, out: Path, what: str, evaluations: int) -> None:
-    """Print what the parts of the cube's model are worth, or what limits it."""
-    case = "a" if what == "ablations" else "b"
-    found = json.loads((out / f"cube_{case}_symphys.json").read_text())["numbers"]
-    work = out / "work"
-    if what == "ablations":
-        for name in ABLATIONS:
-            path = out / f"cube_without_{re.sub('[^a-z]+', '_', name)}.json"
-            got = kept(path, lambda name=name: ablated(folder, work, found, name, evaluations))
-            print(f"| {name} | {mean_and_spread(got['errors']['fit'])} | {mean_and_spread(got['errors']['check'])} |")
-    elif what == "splits":
-        for name in SPLITS:
-            path = out / f"cube_split_{re.sub('[^a-z]+', '_', name)}.json"
-            got = kept(path, lambda name=name: split(folder, work, found, name, evaluations))
-            for key in ("together", "alone"):
-                print(f"| {name} | {key} | {mean_and_spread(got['one'][key] + got['other'][key])} |")
-            print(
-                *[{each: round(value, 4) for each, value in got[half]["numbers"].items()} for half in ("one", "other")]
-            )
-    else:
-        got = kept(out / "cube_limits.json", lambda: limits(folder, work, found, evaluations))
-        for name in (name for name, each in got.items() if isinstance(each, list)):
-            print(f"| {name} | {mean_and_spread(got[name])} |")
+Tables = dict[str, Any]
+COLUMNS = {
+    "what": "is predicted or identified",
+    "tosses": "of the recordings",
+    "position": "mean error [% of the width]",
+    "position_spread": "standard deviation over tosses [%]",
+    "rotation": "mean error [degrees]",
+    "rotation_spread": "standard deviation over tosses [degrees]",
+    "value": "that is identified [m/s^2, m]",
+    "lower": "end of its 95 % interval",
+    "upper": "end of its 95 % interval",
+    "seconds": "of the clock",
+}
+RATE = 148.0
+"""Frames of the recordings a second."""
+MEASURED = ("position", "orientation", "velocity", "angular_velocity")
+"""Columns of the cube's frame [m, w x y z, m/s, rad/s], world axes."""
+NEAR = 0.02
+"""A toss is no longer a flight with a corner so near to the table [m]."""
+WIDTH, HALF = 0.1048, 0.0513
+"""By which errors of positions are divided, and half an edge of the cube in the lengths of the recordings [m]."""
+GRAVITY, MASS, MOMENT = 9.601, 0.37, 8.1e-4
+"""Gravity that flights give [m/s^2]; published mass [kg] and moment of inertia [kg m^2]."""
+NOISE = {"position": 1e-4, "orientation": 5e-4}
+"""About what fits of flights leave [m, rad]."""
+LEAST = 5
+"""Frames that a flight has at least, so that its start is told from noise."""
+LAW = ("friction", "torsion", "rolling", "frequency", "damping")
+GUESS = {
+    "friction": 0.18,
+    "torsion": 0.003,
+    "rolling": 0.0005,
+    "frequency": 60.0,
+    "damping": 0.5,
+    "edge": 0.004,
+    "size": 2 * HALF,
+    "height": 0.0,
+    **{f"moment{k}": MOMENT / 2 for k in range(3)},
+    **{"com0": 0.0, "com1": 0.0, "com2": 0.005},
+}
+"""Torsion and rolling of contacts [m], frequency of a soft contact [Hz] and its damping ratio, radius of the cube's
+edges, length of an edge and height of the table [m], second moments along each axis [kg m^2], centre of mass [m]."""
+FITTED = {
+    "friction": 0.1827,
+    "torsion": 4e-5,
+    "rolling": 5.5e-4,
+    "frequency": 74.8,
+    "damping": 0.0113,
+    "edge": 0.0018,
+    "size": 0.10234,
+    "height": 9.6e-4,
+    "moment0": 5.03e-4,
+    "moment1": 4.98e-4,
+    "moment2": 5.24e-4,
+    "com0": -4.5e-4,
+    "com1": 4e-5,
+    "com2": 0.0059,
+}
+"""Numbers that a search on the fit file finds with starts as measured."""
+TRUE = {"com0": 0.001, "com1": -0.002, "com2": 0.004, "friction": 0.2}
+"""Numbers of the engine's own tosses."""
 
 
-def main() -> None:
-    """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--object", default="cube,elbow")
-    parser.add_argument("--only", default=",".join(f"{case}/{engine}" for case in CASES for engine in ENGINES))
-    parser.add_argument("--evaluations", type=int, default=600)
-    parser.add_argument("--out", type=Path, default=Path("build/tosses"))
-    parser.add_argument("--study", default="", help="flights, ablations, splits, limits")
-    given = parser.parse_args()
-    if given.study:
-        for what in given.study.split(","):
-            for tossed in (each for each in (CUBE, ELBOW) if each.name in given.object.split(",")):
-                if what == "flights":
-                    study_flights(given.folder, given.out, tossed)
-                elif tossed is CUBE:
-                    study(given.folder, given.out, what, given.evaluations)
-        return
-    for tossed in (each for each in (CUBE, ELBOW) if each.name in given.object.split(",")):
-        results = {}
-        for case, engine in (each.split("/") for each in given.only.split(",")):
-            path = given.out / f"{tossed.name}_{case}_{engine}.json"
-            arguments = (given.folder, given.out, tossed, case, engine, given.evaluations)
-            results[case, engine] = kept(path, lambda of=arguments: fitted(*of))
-        print(table(tossed, results))
+def rows(quick: bool = False, data: str = "") -> Iterator[Row]:
+    """Yield errors of predicted tosses, and what flights tell.
+
+    Args:
+        quick: one toss of the engine itself.
+        data: folder with the recordings.
+    """
+    with TemporaryDirectory() as place:
+        if data and not quick:
+            recorded = {part: read(Path(data), part) for part in ("fit", "check")}
+            name, numbers = "recorded tosses, check file", FITTED
+        else:
+            recorded, name, numbers = {"check": simulated(1 if quick else 3, Path(place))}, "own tosses", TRUE
+        check, began = recorded["check"], perf_counter()
+        errors = Simulator(check, Path(place, "check.npz"), check.first()).errors(numbers)
+        (position, rotation), spread = errors.mean(axis=0).tolist(), errors.std(axis=0).tolist()
+        row: Row = {"what": name, "tosses": len(check), "position": position, "position_spread": spread[0]}
+        yield row | {"rotation": rotation, "rotation_spread": spread[1], "seconds": perf_counter() - began}
+        began, parts = perf_counter(), list(recorded.values())
+        found = fly(parts, Path(place, "flights.npz"))
+        for key in ("g", *(f"com[{k}]" for k in range(3))):
+            row = {"what": f"{key} from flights", "tosses": sum(map(len, parts)), "value": found[key].value}
+            row |= {"lower": found[key].lower, "upper": found[key].upper}
+            yield row | {"seconds": perf_counter() - began}
 
 
-if __name__ == "__main__":
-    main()
+@dataclass(frozen=True)
+class Tosses:
+    """Tosses one after the other.
+
+    Attributes:
+        start: (K + 1,) first rows of the tosses, and the number of all rows.
+        columns: (n, ...) by name, see ``MEASURED``.
+    """
+
+    start: Ints
+    columns: Mapping[str, Array]
+
+    def __len__(self) -> int:
+        """Return K."""
+        return len(self.start) - 1
+
+    def rows(self, toss: int) -> slice:
+        """Return the rows of a toss."""
+        return slice(int(self.start[toss]), int(self.start[toss + 1]))
+
+    def first(self) -> dict[str, Array]:
+        """Return the first row (K, ...) of each toss."""
+        return {name: values[self.start[:-1]] for name, values in self.columns.items()}
+
+    def cut(self, lengths: Ints) -> Tosses:
+        """Return the first rows of the tosses, so many of each."""
+        kept = np.concatenate([first + np.arange(n) for first, n in zip(self.start, lengths, strict=False)])
+        start = np.concatenate([[0], np.cumsum(lengths)])
+        return Tosses(start, {name: values[kept] for name, values in self.columns.items()})
+
+
+def read(folder: Path, part: str) -> Tosses:
+    """Read the part "fit" or "check" of a folder's tosses."""
+    with np.load(folder / f"cube_{part}.npz") as found:
+        columns = {name: found[name].astype(float) for name in MEASURED}
+        return Tosses(found["start"].astype(np.int64), columns)
+
+
+def write(path: Path, tosses: Tosses, first: Mapping[str, Array]) -> None:
+    """Write tosses and their starts (K, ...), which may differ from the first frame."""
+    columns = dict(tosses.columns)
+    for name, values in first.items():
+        columns[f"start_{name}"] = np.repeat(values, np.diff(tosses.start), axis=0)
+    np.savez(path, start=tosses.start, **columns)  # type: ignore[arg-type]
+
+
+def joined(parts: list[Tosses]) -> Tosses:
+    """Return all tosses one after the other."""
+    columns = {name: np.concatenate([each.columns[name] for each in parts]) for name in parts[0].columns}
+    return Tosses(np.concatenate([[0], np.cumsum(np.concatenate([np.diff(each.start) for each in parts]))]), columns)
+
+
+def simulated(count: int, folder: Path) -> Tosses:
+    """Return tosses of a cube whose centre of mass is off its middle, as this engine simulates them."""
+    rng, lengths = np.random.default_rng(0), np.resize([70, 60, 80], count)
+    first = {
+        "position": np.array([0, 0, 0.3]) + rng.normal(0, 0.02, (count, 3)),
+        "orientation": Rotation.random(count, rng=rng).as_quat(scalar_first=True),
+        "velocity": rng.normal(0, 0.5, (count, 3)),
+        "angular_velocity": rng.normal(0, 4, (count, 3)),
+    }
+    empty = Tosses(
+        np.concatenate([[0], np.cumsum(lengths)]),
+        {name: np.repeat(values, lengths, axis=0) for name, values in first.items()},
+    )
+    motions = Simulator(empty, folder / "empty.npz", first).motions(TRUE)
+    columns = {name: np.concatenate([each[k] for each in motions]) for k, name in enumerate(NOISE)}
+    return Tosses(empty.start, dict(empty.columns) | columns)
+
+
+def clearance(tosses: Tosses) -> Array:
+    """Return the height (n,) of the lowest corner as measured [m]."""
+    turn = Rotation.from_quat(tosses.columns["orientation"], scalar_first=True)
+    return np.asarray(tosses.columns["position"][:, 2] - HALF * np.abs(turn.as_matrix()[:, 2]).sum(axis=1))
+
+
+def flights(tosses: Tosses, most: int = 24) -> Ints:
+    """Return how many frames (K,) of each toss are a flight, at most so many."""
+    low = clearance(tosses) < NEAR
+    found = [low[tosses.rows(k)] for k in range(len(tosses))]
+    return np.array([min(int(np.argmax(each)) if each.any() else len(each), most) for each in found])
+
+
+def tables_of(numbers: Mapping[str, float]) -> Tables:
+    """Return a cube above a table, without recordings; its frame lies in its middle, its centre of mass beside it."""
+    m = [numbers[f"moment{k}"] for k in range(3)]
+    shape = {"box": {"size": [numbers["size"]] * 3, "edge": numbers["edge"]}}
+    body = {"name": "cube", "shape": shape, "mass": MASS, "position": [0, 0, 0.5]}
+    body["inertia"] = [sum(m) - each for each in m]
+    return {
+        "body": [body],
+        "site": [{"name": "origin", "body": "cube"}],
+        "contact": {name: numbers[name] for name in LAW},
+        "ground": {"height": 0.0},
+        "world": {"gravity": [0, 0, -GRAVITY]},
+        "simulation": {"dt": 1 / RATE},
+    }
+
+
+def recording_of(path: Path, noise: Mapping[str, float]) -> Tables:
+    """Return the recordings of a file that ``write`` made."""
+    values = {"position": "origin.position", "orientation": "cube.orientation"}
+    measured = [{"value": value, "columns": name, "noise": noise[name]} for name, value in values.items()]
+    start = {f"cube.{name}": f"start_{name}" for name in MEASURED}
+    return {"name": "toss", "files": str(path), "rows": "start", "rate": RATE, "measured": measured, "start": start}
+
+
+@dataclass
+class Simulator:
+    """Simulates tosses for any numbers.
+
+    Attributes:
+        tosses: recorded ones.
+        path: of a file that is written for the engine.
+        first: (K, ...) where tosses start.
+    """
+
+    tosses: Tosses
+    path: Path
+    first: Mapping[str, Array]
+
+    @cached_property
+    def residuals(self) -> RecordingResiduals:
+        """Return the residuals of the problem, whose variables set all numbers."""
+        write(self.path, self.tosses, self.first)
+        variables = [{"name": f"v{k}", "sets": sets} for k, sets in enumerate(assigned(GUESS))]
+        recording = recording_of(self.path.absolute(), dict.fromkeys(NOISE, 1.0))
+        return residuals_of(symphys.load(tables_of(GUESS) | {"variable": variables, "recording": [recording]}), 1)
+
+    def motions(self, values: Mapping[str, float]) -> list[tuple[Array, Array]]:
+        """Return positions (n, 3) [m] and orientations (n, 4) of the frames of each toss."""
+        K = len(self.tosses)
+        sampled = self.residuals.predictor.values(shared(values), np.zeros((K, 0)), list(range(K)))
+        return [(each.values[:, :3], each.values[:, 3:7]) for each in sampled]
+
+    def errors(self, values: Mapping[str, float]) -> Array:
+        """Return the measure (K, 2) of each toss [%, degrees]."""
+        K, found = len(self.tosses), []
+        for residuals in self.residuals.residuals(shared(values), np.zeros((K, 0)), np.arange(K)):
+            position, rotation = np.linalg.norm(residuals.reshape(2, -1, 3), axis=2).mean(axis=1)
+            found.append((100 * position / WIDTH, np.degrees(rotation)))
+        return np.array(found)
+
+
+def assigned(numbers: Mapping[str, float]) -> dict[str, list[float]]:
+    """Return what of a problem variables set, and to which values."""
+    moments, com = ([numbers[f"{key}{k}"] for k in range(3)] for key in ("moment", "com"))
+    found = {f"contact.{name}": [numbers[name]] for name in LAW}
+    found |= {"ground.offset": [numbers["height"]], "cube.edge": [numbers["edge"]]}
+    return found | {"cube.size": [numbers["size"]] * 3, "cube.second_moments": moments, "cube.centre_of_mass": com}
+
+
+def shared(values: Mapping[str, float]) -> Array:
+    """Return the shared numbers (s,) of a problem in the order of its variables."""
+    return np.concatenate(list(assigned(GUESS | dict(values)).values()))
+
+
+def fly(parts: list[Tosses], path: Path, **settings: Any) -> Identification:
+    """Identify all flights at once, those of the last of several parts held back; each flight has its own start."""
+    flying = [each.cut(np.maximum(flights(each), LEAST)) for each in parts]
+    tosses = joined(flying)
+    write(path, tosses, tosses.first())
+    tables = tables_of(GUESS)
+    del tables["body"][0]["inertia"]  # follows the mass
+    variables = [{"name": "g", "sets": "gravity[2]"}, {"name": "com", "sets": "cube.centre_of_mass"}]
+    variables += [{"name": f"start_{name}", "sets": f"cube.{name}", "each": "recording"} for name in MEASURED]
+    held_back = list(range(len(flying[0]), len(tosses))) or False
+    recording = recording_of(path.absolute(), NOISE) | {"held_back": held_back}
+    problem = symphys.load(tables | {"variable": variables, "recording": [recording]})
+    return symphys.identify(problem, loss="huber", **settings)
+
+
+def starts(parts: list[Tosses], found: Identification) -> list[dict[str, Array]]:
+    """Return by part where tosses start (K, ...), as their flights say."""
+    measured, own = joined(parts).first(), np.asarray(found.own)
+    where = {name: own[:, 3 * k : 3 * k + 3] for k, name in enumerate(MEASURED)}
+    turn = Rotation.from_quat(measured["orientation"], scalar_first=True) * Rotation.from_rotvec(where["orientation"])
+    where["orientation"] = turn.as_quat(scalar_first=True)
+    ends = np.cumsum([0, *map(len, parts)])
+    return [{key: values[a:b] for key, values in where.items()} for a, b in pairwise(ends)]

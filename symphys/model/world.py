@@ -137,7 +137,7 @@ class Law:
         return MujocoFriction(directions, (first, second, self.torsion, self.rolling, self.rolling), departure)
 
     def _turns_in_mujoco(self, normal: Vector | None) -> bool | None:
-        """Whether the direction of friction is MuJoCo's second tangent, not the first; None if it is neither."""
+        """Tell whether the direction of friction is MuJoCo's second tangent, not the first; None if it is neither."""
         if not isinstance(self.friction, tuple) or self.friction_direction is None:
             return False
         if normal is None or self.friction_side is not None:
@@ -208,7 +208,7 @@ class MujocoFriction:
 
 
 def contradictions(names: Sequence[str], stated: Statements) -> Iterator[tuple[str, str]]:
-    """What cannot hold at once for two surfaces: the coefficient that is at fault, and a message with the remedy."""
+    """Return contradictions of a law for two surfaces: the coefficient at fault, and a message with the remedy."""
     law, both = Law.of(stated), " and ".join(sorted(names)) + ": " * bool(names)
     if law.soft and law.restitution:
         text = f"a contact is either soft (frequency {law.frequency:g} Hz) or has restitution ({law.restitution:g})"

@@ -11,9 +11,22 @@ from typing import Any
 
 import numpy as np
 import pytest
-from profile_runs import Budget, Cases, RecordingEvaluator, append, read_lines
-from profile_tables import WORST, Profiles, RecordedSolve, advice, costs, ratios, read, running_times
-from profiles import main
+from bench import main
+from profile_runs import (
+    WORST,
+    Budget,
+    Cases,
+    Profiles,
+    RecordedSolve,
+    RecordingEvaluator,
+    advice,
+    append,
+    costs,
+    ratios,
+    read,
+    read_lines,
+    running_times,
+)
 
 from symphys.errors import SymphysError
 from symphys.problem import load_problem
@@ -98,17 +111,20 @@ def test_a_small_table_is_whole_goes_on_where_it_was_and_has_the_judges_numbers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The budget of work ends the solves, on whatever machine."""
-    asked = [str(tmp_path), f"--methods={','.join(METHODS)}", f"--seconds={BUDGET.seconds}", f"--work={BUDGET.work:g}"]
-    assert main([*asked, "--problems=free_kick", "--instances=1", "--no-report"]) == 0
-    file = tmp_path / "runs" / "free_kick.jsonl"
+    asked = ["profiles", f"--folder={tmp_path}", "--methods", *METHODS]
+    asked += [f"--seconds={BUDGET.seconds}", f"--work={BUDGET.work:g}"]
+    assert main([*asked, "--problems", "free_kick", "--instances=1"]) == 0
+    file = tmp_path / "free_kick.jsonl"
     first = file.read_bytes()
     file.write_bytes(first[:-40])  # as a process that was killed leaves it
-    assert main([*asked, f"--problems={','.join(PROBLEMS)}", "--instances=2"]) == 0
+    assert main([*asked, "--problems", *PROBLEMS, "--instances=2", f"--out={tmp_path / 'rows.json'}"]) == 0
     assert file.read_bytes().startswith(first[: first.rfind(b"\n", 0, -1) + 1])
-    found = read(tmp_path / "runs")
+    found = read(tmp_path)
     cases = {(each.problem, each.method, each.instance) for each in found.solves}
     assert cases == {(problem, method, instance) for problem in PROBLEMS for method in METHODS for instance in (0, 1)}
-    assert "expected seconds" in capsys.readouterr().out and (tmp_path / "profiles.svg").exists()
+    assert "take " in capsys.readouterr().out
+    rows = json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]
+    assert {(row["problem"], row["method"]) for row in rows if row["problem"]} == {case[:2] for case in cases}
     made = transcribe(load_problem(find("free_kick")), backend="casadi")
     lines = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
     for line in lines[1:]:
@@ -116,4 +132,4 @@ def test_a_small_table_is_whole_goes_on_where_it_was_and_has_the_judges_numbers(
         assert line["start"] == pytest.approx(start.objective, rel=1e-9)
         assert line["solved"] and line["trace"][-1][2] == pytest.approx(line["objective"], rel=1e-6, abs=1e-12)
     with pytest.raises(SymphysError, match="another budget"):
-        Cases("free_kick", tmp_path / "runs", Budget(2000, 1000.0)).run(1)
+        Cases("free_kick", tmp_path, Budget(2000, 1000.0)).run(1)

@@ -44,7 +44,7 @@ def test_a_quadruped_stands_on_its_feet() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("compiled")
 def test_engines_agree_without_contact() -> None:
-    from robot_agreement import differences, flung
+    from consistency import differences, flung
 
     errors = np.median(differences(flung("chain", chain(2, spring=Spring(0.5, 0.01)), 1.0, 2), (0.01, 0.005)), axis=1)
     assert 3 < errors[0] / errors[1] < 5
@@ -54,8 +54,7 @@ def test_engines_agree_without_contact() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("compiled")
 def test_errors_against_oneself_fall_with_the_step() -> None:
-    from consistency import errors_of
-    from robot_consistency import engines
+    from consistency import engines, errors_of
 
     for engine in engines(swinging(2, 2), "Euler", "RK4"):
         errors = errors_of(engine, 0.16, (0.02, 0.01), 0.00125, 0.08)
@@ -65,15 +64,11 @@ def test_errors_against_oneself_fall_with_the_step() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("compiled")
-def test_steps_and_derivatives_are_timed(capsys: pytest.CaptureFixture[str]) -> None:
-    from robot_against_mujoco import here, measure, report, there
+def test_steps_and_derivatives_are_timed() -> None:
+    from speed import compared, here, there
 
     scene: JointedScene = swinging(2, 8)
-    candidates = [here(scene, 5, 8), there(scene, "Euler", "elliptic")]
-    times = measure(candidates)
-    assert (times > 0).all() and times.shape[1:] == (2, 2)
-    report("chain", candidates, times, [1e-3, 2e-3])
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[-1].startswith("| MuJoCo, Euler, elliptic |")
-    assert lines[-1].count("| 1 (1) |") == 2
-    assert lines[-1].endswith("| 2.0e-03 |")
+    ours, theirs = compared("chain", [here(scene, 5, 8, steps=5), there(scene, "Euler", "elliptic", steps=5)], 2)
+    assert theirs["engine"] == "MuJoCo, Euler, elliptic"
+    assert theirs["times_steps"] == theirs["times_derivatives"] == 1
+    assert min(ours["times_steps"], ours["thousand_derivatives_s"]) > 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from identify_coverage import BOUNCES, recorded
+from identify import BOUNCES, recorded
 from worlds.toys import require
 
 from symphys.cli.app import main

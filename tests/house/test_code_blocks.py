@@ -25,6 +25,7 @@ from typing import Any
 import click
 import pytest
 from tools import run_blocks
+from tools.makefile import targets
 from tools.markdown_pages import ROOT, Block, blocks, needs, of, pages
 
 import symphys
@@ -121,8 +122,7 @@ def fault_of(words: list[str]) -> str | None:
     if words[0] == "symphys":
         return usage_fault(words[1:])
     if words[0] == "make":
-        targets = re.findall(r"^([a-z][a-z0-9-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
-        missing = [word for word in words[1:] if "=" not in word and word not in targets]
+        missing = [word for word in words[1:] if "=" not in word and word not in targets()]
         return f"the Makefile has no {missing[0]}" if missing else None
     return None if words[0] in PLAIN_COMMANDS else f"{words[0]} is no command that these tests know"
 

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from tools.makefile import benchmarks, targets
 
 ROOT = Path(__file__).parents[2]
 MADE = {"build/kernels"}
@@ -81,13 +82,14 @@ def test_names_that_documents_name_are_those_of_the_code(name: str) -> None:
     assert [found for found in named if not words_of_the_code().issuperset(found.split("."))] == []
 
 
-def test_results_name_every_benchmark_and_only_what_exists() -> None:
-    """Scripts and targets of make; a script that prints results is on some page."""
-    texts = {page: page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs" / "results").glob("*.md"))}
-    whole = "\n".join(texts.values())
-    scripts = set(re.findall(r"benchmarks/(\w+\.py)", whole))
-    targets = set(re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
-    files = {file.name: file.read_text(encoding="utf-8") for file in (ROOT / "benchmarks").glob("*.py")}
-    assert scripts - set(files) == set()
-    assert {name for name, text in files.items() if "\ndef main(" in text} - scripts == set()
-    assert set(re.findall(r"`make ([a-z][\w-]*)", whole)) - targets == set()
+def test_results_name_every_benchmark_and_note_and_only_what_exists() -> None:
+    """Scripts, notes of closed studies and targets of make."""
+    pages = sorted((ROOT / "docs" / "results").glob("*.md"))
+    whole = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    made = set(re.findall(r"(?:`|^)make\s([a-z][\w-]*)", whole, re.MULTILINE))
+    assert made - targets() == set()
+    assert benchmarks() - made == set()
+    files = {file.name for file in (ROOT / "benchmarks").glob("*.py")}
+    assert set(re.findall(r"benchmarks/(\w+\.py)", whole)) - files == set()
+    notes = {note.name for note in (ROOT / "benchmarks" / "notes").glob("*.md")} - {"README.md"}
+    assert set(re.findall(r"benchmarks/notes/(\w+\.md)", whole)) == notes

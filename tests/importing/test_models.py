@@ -1,4 +1,4 @@
-"""Models of gymnasium after import: MuJoCo's masses, mass matrices and free motion; rest and slopes by statics."""
+"""Models of gymnasium after import: MuJoCo's masses, mass matrices and free motion."""
 
 from __future__ import annotations
 
@@ -9,11 +9,8 @@ import pytest
 
 mujoco = pytest.importorskip("mujoco")
 
-from imported_model import Imported, begin, grounded, imported  # noqa: E402
-from imported_statics import held, rest, slopes  # noqa: E402
-from robot_matching import Match, matched  # noqa: E402
-from robot_models import gymnasium_model  # noqa: E402
-from robot_motion import agreement_after  # noqa: E402
+from imported_models import Imported, Match, gymnasium_model, imported, matched  # noqa: E402
+from imports import agreement_after  # noqa: E402
 from tools.repeats import first  # noqa: E402
 
 pytestmark = pytest.mark.skipif(not gymnasium_model("ant").path.is_file(), reason="gymnasium is not installed")
@@ -47,16 +44,3 @@ def test_free_motion_is_of_second_order(name: str) -> None:
     assert found.steps[-1] == 0.001
     assert found.errors[-1] < 1e-5
     assert found.order == pytest.approx(2, abs=0.1)
-
-
-@pytest.mark.thorough
-def test_ant_stands_by_statics() -> None:
-    imported_ant, match = robot("ant")
-    found, x = rest(match, begin(match, imported_ant), grounded(gymnasium_model("ant"), imported_ant), seconds=1.0)
-    assert abs(found.support) < 1e-6
-    assert found.speed < 1e-6
-    # MuJoCo's contacts act from the margins of the geoms on, 2 cm above the ground
-    assert found.height - found.sunk_there == pytest.approx(found.height_there, abs=2e-3)
-    below, above = slopes(held(match.world), x, (0.95, 1.05))
-    assert abs(below.acceleration) < 0.1 * above.expected
-    assert above.acceleration == pytest.approx(above.expected, rel=0.01)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from identify_coverage import A_RATIO, NO_EFFECT, covered, named
+from identify import A_RATIO, NO_EFFECT, covered, named
 from tools.repeats import thorough
 
 

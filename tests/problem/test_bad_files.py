@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from mutated_texts import PROBLEM
+from data.mutated_texts import PROBLEM
 from worlds.included import MAIN, ROBOT
 from worlds.two_balls import TWO_BALLS
 

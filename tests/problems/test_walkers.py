@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from data.shipped import first_steps, shipped, short_descent
+from gradients import compared, gait
 from tools.repeats import thorough
-from walk_gradient import compared, gait
 from worlds.hops import LEGS
 
 from symphys.mpc import Controller, Plant, close_loop, record_of

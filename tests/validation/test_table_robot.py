@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from robot_growth import grown, rollout_of, visited
-from table_robot import starts, table_problem
+from measured_worlds import starts, table_problem
 
 from symphys.codegen import Kernel, compile_program
 from symphys.model.state_layout import Layout
 from symphys.problem import Problem
 from symphys.transcription import Rollout, symbolic_rollout
+from symphys.transcription.network_rollout.context import RolloutObjectives, start_function
 from symphys.transcription.program import rollout_program
 from symphys.transcription.simulation import Record, recorder, simulate
 from symphys.types import Array
@@ -18,6 +20,8 @@ from symphys.types import Array
 pytestmark = pytest.mark.slow
 
 STEPS = 50
+GROWTH_STEPS, DIRECTIONS = 300, 16
+"""Steps and random gradients of the growth of adjoints."""
 
 
 @pytest.fixture(scope="module")
@@ -98,6 +102,42 @@ def test_robots_of_a_batch_are_those_alone(problem: Problem, kernel: Kernel) -> 
     for k in (0, 3, 10):
         assert np.array_equal(kernel.forward(Z[k], [0.0])["objective"][0], together["objective"][k])
         assert np.array_equal(kernel.gradient(Z[k], [1.0], [0.0])[1][0], slopes[k])
+
+
+def rollout_of(toi: bool, cuts: int, stride: float) -> tuple[Rollout, Kernel]:
+    """Return the robot, its net without effect, and the kernel of one step."""
+    problem = table_problem([], GROWTH_STEPS, stride=stride, toi=toi)
+    simulation = replace(problem.simulation, cuts=cuts)
+    rollout = symbolic_rollout(replace(problem, simulation=simulation))
+    program = RolloutObjectives(rollout).stage(rollout, []).program(exact=False)
+    return rollout, compile_program(program, seeded=["after"], threads=1)
+
+
+def grown(rollout: Rollout, kernel: Kernel) -> Array:
+    """Return the factors (steps,) by which the longest adjoint grows in each step, the last step first."""
+    rows, layout = visited(rollout, kernel), Layout(rollout.world)
+    adjoints = np.zeros((DIRECTIONS, int(rollout.x0.shape[0])))
+    ends = np.r_[layout["torso.position"], layout["torso.velocity"]]
+    adjoints[:, ends] = np.random.default_rng(0).normal(size=(DIRECTIONS, len(ends)))
+    adjoints /= np.linalg.norm(adjoints, 2)
+    found = np.empty(len(rows))
+    for k, row in enumerate(reversed(rows)):
+        before = kernel.gradient(np.tile(row, (DIRECTIONS, 1)), adjoints, [0.0])[1][:, : adjoints.shape[1]]
+        found[k] = np.linalg.norm(before, 2)
+        adjoints = before / found[k]
+    return found
+
+
+def visited(rollout: Rollout, kernel: Kernel) -> list[Array]:
+    """Return the inputs of the kernel at each step, with weights zero and the torso pushed a little."""
+    z = np.concatenate([0 * rollout.problem.variables[0].guess, [0.02, -0.01, 0.03]])
+    x, _, p, _ = (part.full().ravel() for part in start_function(rollout, [])(z))
+    rows, still = list[Array](), np.zeros(int(rollout.given.shape[0]))
+    for k in range(GROWTH_STEPS):
+        times = np.array([k, k + 1]) * rollout.dt
+        rows.append(np.concatenate([x, still, p, times, z]))
+        x = kernel.forward(rows[-1], [0.0])["after"][0]
+    return rows
 
 
 @pytest.mark.thorough

@@ -39,7 +39,7 @@ class Branch:
     coordinates: tuple[int, ...]
 
     def of(self, parts: Sequence[Any]) -> tuple[Any, ...]:
-        """What is the branch's of something that every link of the tree has."""
+        """Select the branch's items of those of all links of the tree."""
         return tuple(parts[k] for k in self.links)
 
 
@@ -124,7 +124,7 @@ def axes_at(
 
 
 def tree_matrix(tree: Tree, inertias: Sequence[SpatialInertia]) -> TreeMatrix:
-    """Of a tree, its bodies' inertias given."""
+    """Build from a tree and the inertias of its bodies."""
     parts = tuple(
         schur_complement.branch_matrix(branch.above, branch.of(inertias), tree.axes(branch), branch.of(tree.armature))
         for branch in tree.branches
@@ -165,7 +165,7 @@ class TreeMotion:
 
 
 def tree_motion(tree: Tree, matrix: TreeMatrix, rates: TreeRates) -> TreeMotion:
-    """How all bodies move."""
+    """Return the motions of all bodies."""
     n = len(tree.seen)
     root = _root_moving(tree.seen[0], rates.r)
     turns, found = [rates.r] * n, [root] * n

@@ -91,7 +91,7 @@ def update_configuration(
     along: GeneralizedVelocities,
     by_loops: GeneralizedVelocities | None,
 ) -> tuple[tuple[FinalPose, ...], tuple[JointCorrection, ...], RotorCorrection, Columns]:
-    """Where the bodies of a tree come to, and what joints did to their displacements and to those of rotors.
+    """Return the final poses of a tree, and the joints' changes of its displacements and of its rotors'.
 
     The last result is how far the coordinates of each link moved (count,) [rad] or [m].
 
@@ -143,7 +143,7 @@ def _kept(
     beside: Sequence[Deviation],
     rotor: Expr | None,
 ) -> tuple[tuple[FinalPose, ...], tuple[Deviation, ...]]:
-    """The same without any momentum along the root's coordinates, so that what is conserved is so to rounding.
+    """Remove momentum along the root's coordinates, so that conservation holds to rounding.
 
     A tree that floats is shifted; else, and for spin, the root's share of momenta changes: of momenta only those along
     free motions count in the end (``forward_dynamics.consistent``), so it does not matter whose they are.
@@ -180,7 +180,7 @@ def _shifted(
 def _without(
     beside: Deviation, axes: Expr, total: SpatialVector, mass: Expr, floats: bool, rotor: Expr | None
 ) -> Deviation:
-    """What is conserved about axes that turn and along those that slide, at right angles to each other."""
+    """Return orthogonal directions of conserved momentum, about turning and along sliding axes."""
     if floats:
         return replace(beside, made=replace(beside.made, angular=beside.made.angular - total.parts[:3]))
     made, along = beside.made, ca.mtimes(axes.T, total.parts) + (0 if rotor is None else rotor)

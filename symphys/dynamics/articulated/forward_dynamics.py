@@ -37,7 +37,7 @@ def accelerations(
     motions: Sequence[PredictedMotion],
     wrenches: Sequence[Wrench],
 ) -> tuple[Wrench, ...]:
-    """Of the bodies of a tree, from their poses and velocities and all forces but the joints'."""
+    """Return the accelerations of a tree's bodies from poses, velocities and all forces but those of joints."""
     origin = motions[0].position
     axes = axes_at(kinematic_tree, joints, [m.predicted_path() for m in motions], NOW, origin)
     tree = Tree(kinematic_tree, axes, armature=armatures(kinematic_tree, joints))
@@ -107,7 +107,7 @@ def _counted(mass: Expr, position: Expr, origin: Expr, momentum: Momentum) -> Sp
 def _lacking(
     mass: Expr, tensor: Expr, position: Expr, origin: Expr, screw: SpatialVector, bias: SpatialVector, wrench: Wrench
 ) -> SpatialVector:
-    """What forces do beside what the motion needs as it is."""
+    """Return the forces less those that the motion as it is needs."""
     place, w = position - origin, screw.parts[:3]
     linear, angular = _at(bias.parts, screw.parts, place)
     turning = ca.mtimes(tensor, angular) + ca.cross(w, ca.mtimes(tensor, w))

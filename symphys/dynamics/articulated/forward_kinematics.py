@@ -51,7 +51,7 @@ HERE = FinalPose(ca.SX.zeros(3), ca.SX([1, 0, 0, 0]))
 def joint_starts(
     kinematic_tree: KinematicTree, joints: spatial.Joints, body_paths: Sequence[PredictedPath]
 ) -> tuple[JointStart | None, ...]:
-    """Of each link; None for a root that floats."""
+    """Return the start of the joint of each link; None for a floating root."""
     place, found = {link.body: k for k, link in enumerate(kinematic_tree.links)}, list[JointStart | None]()
     for link, joint, body_path in zip(kinematic_tree.links, joints, body_paths, strict=True):
         own = (body_path,) if link.parent is None else (body_path, body_paths[place[link.parent]])
@@ -66,7 +66,7 @@ def final_poses(
     positions: Sequence[Expr],
     along: Sequence[Expr],
 ) -> tuple[FinalPose, ...]:
-    """Of each link's body, by how far its coordinates go; those of a floating root are (6,) along the world's axes."""
+    """Return the displacement of each link's body; that of a floating root is (6,), along the world's axes."""
     place, found = {link.body: k for k, link in enumerate(kinematic_tree.links)}, list[FinalPose]()
     for link, joint, start, position, moved in zip(kinematic_tree.links, joints, starts, positions, along, strict=True):
         if joint is None or start is None:

@@ -96,12 +96,12 @@ def generalized_coordinates(
 
 
 def body_momenta(coordinates: GeneralizedCoordinates, rates: Any) -> tuple[Momentum, ...]:
-    """Of the bodies of a tree, from its generalized velocities."""
+    """Return the momenta of the bodies of a tree from its generalized velocities."""
     return tuple(_momentum(*each) for each in zip(_moving(coordinates, rates), coordinates.bodies, strict=True))
 
 
 def rotor_rates(coordinates: GeneralizedCoordinates, rates: Any) -> Rates:
-    """Of the links with rotors, from the tree's generalized velocities."""
+    """Return the rates of the links with rotors from the tree's generalized velocities."""
     numbers = apart(numbering(coordinates.tree), rates.numbers)
     return chosen(coordinates.tree, tree_motion(coordinates.tree, coordinates.matrix, numbers).rates)
 

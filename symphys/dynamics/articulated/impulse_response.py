@@ -46,7 +46,7 @@ def spread(places: Numbering, parts: Sequence[Expr], n: int | None = None) -> Ex
 
 
 def coordinate_responses(tree: Tree, matrix: TreeMatrix, acting: Sequence[bool]) -> tuple[Response | None, ...]:
-    """Of all coordinates; None for those of links along which nothing acts."""
+    """Return the responses of all coordinates; None for links along which nothing acts."""
     found, (root, *_), links = dict[int, Response](), numbering(tree), tree.kinematic_tree.links
     for k in root if acting[0] else ():
         found[k] = _root_gain(k, tree.kinematic_tree.size, matrix.root)
@@ -71,7 +71,7 @@ def _root_gain(k: int, n: int, root: Factorisation) -> Response:
 
 @traced
 def _branch_gain(k: int, matrix: BranchMatrix, root: Factorisation) -> tuple[Expr, Expr]:
-    """What a unit impulse along coordinate k of a branch does to the numbers of the root and of the branch."""
+    """Return the response of the root and of the branch to a unit impulse along coordinate ``k`` of the branch."""
     z = dense(matrix.block.solve({k: ca.SX(1)}), matrix.follows.size1())
     reaching: Expr = ca.mtimes(matrix.pushes, z)
     return solved(root, -reaching), z
@@ -106,7 +106,7 @@ def body_jacobians(
 
 @traced
 def _held(n: int, places: Numbering, see: Columns, response: Columns, inertia: Expr) -> BodyJacobian:
-    """From (6, k) of the root's and the branch's numbers, and from (k, 6), at their places."""
+    """Scatter the (6, k) and (k, 6) responses of the root and the branch to their places."""
     numbers = spread(places, response, n)
     return BodyJacobian(spread(places, [part.T for part in see], n).T, inertia, numbers[:, :3], numbers[:, 3:])
 

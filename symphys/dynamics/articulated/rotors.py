@@ -29,7 +29,7 @@ def has_rotor(joint: Joint | None) -> bool:
 
 
 def armatures(kinematic_tree: KinematicTree, joints: Joints) -> tuple[Expr | None, ...]:
-    """Of each link what is added to the diagonal of the mass matrix [kg m^2] or [kg]; None where nothing is."""
+    """Return for each link its term on the diagonal of the mass matrix [kg m^2] or [kg]; None without one."""
     return tuple(
         ca.SX(joint.armature) if joint is not None and has_rotor(joint) and link.count else None
         for link, joint in zip(kinematic_tree.links, joints, strict=True)
@@ -37,7 +37,7 @@ def armatures(kinematic_tree: KinematicTree, joints: Joints) -> tuple[Expr | Non
 
 
 def joint_rates(tree: Tree, joints: Joints, motions: Sequence[PredictedMotion]) -> Rates:
-    """Of the links with rotors, from the velocities of the bodies at the start of the motions."""
+    """Return the rates of links with rotors from the velocities of the bodies at the start of the motions."""
     place, found = {link.body: k for k, link in enumerate(tree.kinematic_tree.links)}, list[Expr | None]()
     for k, (link, joint) in enumerate(zip(tree.kinematic_tree.links, joints, strict=True)):
         if joint is None or tree.armature[k] is None:
@@ -64,5 +64,5 @@ def _rate(turning: bool, axes: Expr, own: tuple[Expr, Expr, Expr], parent: tuple
 
 
 def chosen(tree: Tree, rates: Columns) -> Rates:
-    """Those of rates of all links that have rotors."""
+    """Select the rates of links that have rotors."""
     return tuple(None if armature is None else rate for armature, rate in zip(tree.armature, rates, strict=True))

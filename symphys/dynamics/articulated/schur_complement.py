@@ -77,7 +77,7 @@ class SpatialInertia:
 
 
 def paths(above: Parents, axes: Columns) -> list[list[int]]:
-    """For each link of a branch the branch's coordinates that move it."""
+    """Return for each link of a branch the branch's coordinates that move it."""
     found: list[list[int]] = []
     start = 0
     for parent, columns in zip(above, axes, strict=True):
@@ -91,7 +91,7 @@ def paths(above: Parents, axes: Columns) -> list[list[int]]:
 def branch_matrix(
     above: Parents, inertias: Sequence[SpatialInertia], axes: MotionSubspaces, armature: tuple[Expr | None, ...]
 ) -> BranchMatrix:
-    """Of a branch, its bodies' inertias given, and of its links what is added to their coordinates' diagonal."""
+    """Build from the inertias of a branch's bodies, and what is added to the diagonal of its coordinates."""
     symmetric, (given, root_given) = axes.given is None, axes.impulses
     total, base = summed_up(above, [inertia.matrix for inertia in inertias])
     seen_of: Expr = ca.horzcat(*axes.seen)
@@ -177,7 +177,7 @@ def branch_rates(matrix: BranchMatrix, z: Expr, r: Expr) -> Expr:
 
 
 def summed_up(above: Parents, parts: Sequence[Expr]) -> tuple[list[Expr], Expr]:
-    """For each link of a branch the sum over all that hangs on it, and the sum of all."""
+    """Return for each link of a branch the sum over its subtree, and the sum of all."""
     total = list(parts)
     for k, parent in reversed(list(enumerate(above))):
         if parent is not None:

@@ -35,7 +35,7 @@ def axes_of(joint: Joint | None, sign: int, body_paths: tuple[PredictedPath, ...
 
 
 def floating(place: Expr) -> Expr:
-    """Of a root whose centre of mass is at ``place``: its velocity and angular velocity, along the world's axes."""
+    """Return the motion subspace of a root with its centre of mass at ``place``, along the world's axes."""
     unit, zero = ca.SX.eye(3), ca.SX(3, 3)
     return ca.horzcat(ca.vertcat(zero, unit), ca.vertcat(unit, cross_matrix(place)))
 

@@ -58,7 +58,7 @@ class ContactImpulse:
 
     @property
     def count(self) -> int:
-        """How many numbers load and friction have."""
+        """Return the number of components of load and friction."""
         return 4
 
     def like(self, numbers: Expr) -> ContactImpulse:
@@ -183,7 +183,7 @@ class ContactConstraint:
     rates = slip
 
     def linearised(self, momenta: tuple[Any, ...], old: ContactImpulse, by: Linearisation) -> tuple[Expr, Expr]:
-        """See ``newton_start``."""
+        """Return the projections linearised at these momenta, for ``newton_start``."""
         return linearised(self, self.slip(momenta), old, by)
 
     def project(self, momenta: tuple[Any, ...], old: ContactImpulse) -> tuple[tuple[Any, ...], ContactImpulse]:
@@ -213,7 +213,7 @@ def _forces(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> tupl
 
 @traced
 def known_before(contact: ContactConstraint) -> KnownBefore:
-    """What is known of a contact before the sweeps."""
+    """Return what a contact's projections need and is known before the sweeps."""
     n, mass = contact.normal, contact.tangent_mass
     friction = (mass * _across(each, n) for each in (contact.slip_target, contact.delassus_column))
     return KnownBefore(contact.normal_mass * contact.target, *friction)
@@ -355,7 +355,7 @@ def _turned(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Friction) -> 
 def _solve_smoothed(
     contact: ContactConstraint, coupling: Coupling, slip: Expr, old: ContactImpulse
 ) -> tuple[Expr, Expr]:
-    """The same under the smoothed law: projections in turn, the normal one shortened so that they do not cycle.
+    """Solve under the smoothed law: projections in turn, the normal one damped against cycling.
 
     Its width keeps the central path where it is without the shortening.
     """

@@ -70,7 +70,7 @@ def no_less_than_response(terms: Sequence[BodyTerm], n: Expr, column: Expr, norm
 
 
 def symmetric_mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, Expr]:
-    """Those of ``mobilities``, on trees their symmetric parts."""
+    """Return ``mobilities``, on trees their symmetric parts."""
     push, twist = mobilities(terms, same)
     if all(term.jacobian is None for term in terms):
         return push, twist

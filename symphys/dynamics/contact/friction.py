@@ -146,36 +146,36 @@ class Disc:
 
     @property
     def largest(self) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.largest``."""
         return self.coefficient
 
     def shaped(self, vector: Expr) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.shaped``."""
         return vector
 
     def heading(self, wanted: Expr, load: Expr) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.heading``."""
         del load
         return wanted / length(wanted)
 
     def nearest(self, wanted: Expr, load: Expr, width: Expr, smoothing: Expr) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.nearest``."""
         return onto_disc(wanted, self.coefficient * load, width, smoothing)
 
     def against(self, slip: Expr) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.against``."""
         return self.coefficient * slip / length(slip)
 
     def admits(self, impulse: Expr, load: Expr) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.admits``."""
         return ca.dot(impulse, impulse) <= (self.coefficient * load) ** 2
 
     def beyond(self, impulse: Expr, load: Expr, share: float) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.beyond``."""
         return ca.sqrt(ca.dot(impulse, impulse) + TINY_SQUARE) > share * (self.coefficient * load)
 
     def linearised(self, at: FrictionStep) -> tuple[Expr, Expr, Expr]:
-        """See ``Friction``. What points along ``wanted`` is stretched or cut, what lies across it is turned."""
+        """Implement ``Friction.linearised``: along ``wanted`` it is stretched or cut, across it turned."""
         wanted, gives = at.wanted, at.softness
         radius, size, width = self.coefficient * at.load, length(wanted), at.mass * at.smoothing
         smooth = at.smoothing > 0
@@ -220,23 +220,23 @@ class Ellipse:
 
     @property
     def largest(self) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.largest``."""
         return ca.fmax(self.along, self.across)
 
     def shaped(self, vector: Expr) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.shaped``."""
         largest = self.largest + TINY_LOAD
         return self._times(vector, self.along / largest, self.across / largest)
 
     def heading(self, wanted: Expr, load: Expr) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.heading``."""
         root = self._root(wanted, load)
         one, two = self._shares(load, ca.fmax(root, 0))
         scaled = self._times(wanted, self.along * one, self.across * two)
         return scaled / length(scaled)
 
     def nearest(self, wanted: Expr, load: Expr, width: Expr, smoothing: Expr) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.nearest``."""
         smooth, root = smoothing > 0, self._root(wanted, load)
         one, two = self._shares(load, ca.if_else(smooth, positive(root, width * self._mean), ca.fmax(root, 0)))
         found = self._times(wanted, self.along**2 * load * one, self.across**2 * load * two)
@@ -244,22 +244,22 @@ class Ellipse:
         return found / ca.if_else(smooth, 1, ca.fmax(size, 1))  # what is left of the error does not leave the ellipse
 
     def against(self, slip: Expr) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.against``."""
         scaled = self._times(slip, self.along, self.across)
         return self._times(scaled, self.along, self.across) / length(scaled)
 
     def admits(self, impulse: Expr, load: Expr) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.admits``."""
         first, rest = self._split(impulse)
         within = ca.logic_and(first**2 <= (self.along * load) ** 2, ca.dot(rest, rest) <= (self.across * load) ** 2)
         return ca.logic_and(within, self._gauge(impulse) <= load**2)
 
     def beyond(self, impulse: Expr, load: Expr, share: float) -> Expr:
-        """See ``Friction``."""
+        """Implement ``Friction.beyond``."""
         return ca.sqrt(self._gauge(impulse) + TINY_SQUARE) > share * load
 
     def linearised(self, at: FrictionStep) -> tuple[Expr, Expr, Expr]:
-        """See ``Friction``.
+        """Implement ``Friction.linearised``.
 
         Along the axes, with b, s, T of ``Ellipse``, r = mu_i s_i / (b_i + T) and Q = sum s_i^2 / (b_i + T) at the edge:
         dT / dy = r / Q, dT / dload = -sum mu_i r_i s_i / Q, dx / dy = diag(b_i / (b_i + T)) - load r (dT / dy)^T.

@@ -79,6 +79,6 @@ def _linear(constraints: tuple[ContactConstraint, ...], loads: tuple[Expr, ...])
 
 
 def _share(constraint: ContactConstraint, load: Expr) -> Expr:
-    """How much of a point counts, from 0 to 1: nothing of what is far, whatever its numbers are."""
+    """Return the weight of a point, from 0 to 1: 0 for a far one, whatever its numbers are."""
     near = constraint.near
     return near * ca.fmax(load - constraint.load, 0) / (ca.fmax(load, constraint.load) + (1 - near))

@@ -107,7 +107,7 @@ class Member:
 
 
 def open_groups(context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State]) -> list[Group]:
-    """Those whose loads may be open, or whose points may lie close together."""
+    """Select constraints whose loads may be undetermined, or whose points may lie close together."""
     if not context.settings.scheme.newton_start:
         return []
     members: dict[int, set[int]] = {k: {k} for k, state in enumerate(states) if state is not None}
@@ -312,7 +312,7 @@ def _answer(
 
 @traced
 def _changes(metric: tuple[Expr, ...], parts: tuple[tuple[tuple[int, ...], Expr, Expr], ...]) -> tuple[Expr, ...]:
-    """Of the velocities of each carrier."""
+    """Return the changes of the velocities of each carrier."""
     sizes = [each.shape[0] for each in metric]
     starts = [0, *accumulate(sizes)]
     matrix: Expr = ca.diagcat(*metric)
@@ -341,7 +341,7 @@ def _reach(metric: tuple[Expr, ...], states: States, missed: Expr, count: int) -
 
 @traced
 def _share(parts: tuple[tuple[Lever, Expr], ...], reach: Expr) -> Expr:
-    """Of a step, at most 1: so much that what each constraint does by itself stays within reach."""
+    """Return the length of a step, at most 1, for which each constraint's own change stays bounded."""
     energies = (ca.dot(ca.mtimes(lever.responses, x), ca.mtimes(lever.momenta, x)) for lever, x in parts)
     return ca.sqrt(reach / ca.fmax(reach, sum(energies)))
 

@@ -170,7 +170,7 @@ def _touch(
 
 
 def _delay(touch: _Touch, landing: Expr, lasts: Expr, half: Expr, terms: tuple[BodyTerm, ...]) -> Expr:
-    """How late the contact acts [s]. Lasting ones on trees: see docs/joints.md, "Feet that stand"."""
+    """Return how late the contact acts [s]; for lasting ones on trees see docs/joints.md, "Feet that stand"."""
     delay = touch.hit * (touch.time + (1 - touch.leaving) * (landing - touch.time))
     return ca.if_else(lasts, half, delay) if any(term.jacobian is not None for term in terms) else delay
 
@@ -187,7 +187,7 @@ def closes_fast(settings: StepSettings, contact: Contact) -> Expr:
 
 
 def width_of(settings: StepSettings, contact: Contact) -> Expr:
-    """Of the smoothed projection [m/s]: the smoothing at rest, nothing for an impact."""
+    """Return the width of the smoothed projection [m/s]: the smoothing at rest, 0 for an impact."""
     return settings.smoothing * ca.exp(-((contact.rate / settings.fast) ** 2))
 
 
@@ -250,7 +250,7 @@ def _soft_impulse(
     conditions: Conditions,
     seen: tuple[Expr, Frame, Expr],
 ) -> SoftImpulse:
-    """What a soft contact gives; ``seen``: its velocity in the middle of the substep; where and when it begins to act.
+    """Return the impulse of a soft contact; ``seen``: its velocity at mid-substep; where and when it begins.
 
     What lasts from the last step goes on acting in the prediction, but for the contact's own force.
     """

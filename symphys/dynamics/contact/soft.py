@@ -124,7 +124,7 @@ def soft_impulse(law: Law, at: SoftApproach) -> SoftImpulse:
 
 
 def _time_in_contact(omega: Expr, ratio: Expr, whole: Any, velocity: Expr, place: tuple[Expr, Expr]) -> Expr:
-    """How long surfaces that move at ``velocity`` push, up to the whole time: until f of a cubic along it is 0."""
+    """Return how long surfaces at ``velocity`` push, at most the whole time: until f of a cubic along it is 0."""
     (e, a), time, share = place, whole.time, 2 * ratio / omega
     push = a - omega**2 * e
     moved, end = time * whole.mean_velocity(velocity, push), whole.end_velocity(velocity, push)

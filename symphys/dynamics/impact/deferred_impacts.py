@@ -37,7 +37,7 @@ class DeferredImpacts:
 
 
 def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequence[StepSplit]) -> DeferredImpacts:
-    """What must give no impulse within ``duration`` [s], the last substep of a step.
+    """Return the contacts that must give no impulse within ``duration`` [s], the last substep of a step.
 
     That is what closes at speed but does not meet. And, where surfaces rebound or bodies can be hit off their centres,
     all but the first impact of a body: two at once would be resolved from the velocities before both, which can add
@@ -86,7 +86,7 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
 
 
 def _room(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
-    """How far two balls that rebound may go into each other before they are parted [m]; None for other pairs."""
+    """Return how deep two rebounding balls may overlap before they are parted [m]; None for other pairs."""
     if pair.law.soft or is_zero(pair.law.restitution) or eccentric & set(bodies_of(pair)):
         return None
     shapes = [world.surface(side) for side in (pair.first, pair.second) if side.body is not None]
@@ -103,7 +103,7 @@ def _hit(settings: StepSettings, law: Law, contact: Contact, near: Expr) -> tupl
 
 @traced
 def _sooner(first: Expr, meets: Expr, time: Expr) -> Expr:
-    """When a body is first hit, with one more contact looked at."""
+    """Update the instant at which a body is first hit by one more contact."""
     return ca.if_else(meets, ca.fmin(first, time), first)
 
 
@@ -117,7 +117,7 @@ def _blown(
     meets: Expr,
     contact: Contact,
 ) -> Expr:
-    """How the velocity of a ball changes as it is first hit [m/s], with one more contact; hits at one instant add."""
+    """Update the velocity change of a ball at its first hit [m/s] by one more contact; simultaneous hits add."""
     blow, first = before
     share = 1 / masses[side] / sum(1 / mass for mass in masses)
     kick = (1 + law.restitution) * share * ca.fmax(-contact.rate, 0) * (1 - 2 * side)

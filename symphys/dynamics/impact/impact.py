@@ -94,7 +94,7 @@ def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, d
 
 @traced
 def _until(earliest: Expr, first: Expr, dt: Expr) -> Expr:
-    """When the last of the impacts that share the split may be; none may be left between its instant and the split."""
+    """Return the latest instant of impacts that share the split; none may lie between it and the split."""
     return ca.fmax(earliest, first) + TOGETHER * dt
 
 

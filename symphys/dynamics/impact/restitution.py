@@ -101,7 +101,7 @@ def _energies(
 
 @traced
 def _rotor_energies(armature: Expr, rates: list[Expr], sums: tuple[Expr, Expr, Expr]) -> tuple[Expr, Expr, Expr]:
-    """The same of the rotors of a joint."""
+    """Add the energies of the rotors of a joint."""
     before, plastic, newton = rates
     (a, b, c), way, half = sums, newton - plastic, armature / 2
     change = ca.dot(plastic, plastic) - ca.dot(before, before)

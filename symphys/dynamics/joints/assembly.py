@@ -103,7 +103,7 @@ def _touched(world: World) -> set[int]:
 
 
 def momenta_of(context: StepContext, trees: KinematicTrees, solved: AllVelocities) -> Momenta:
-    """Of all bodies."""
+    """Return the momenta of all bodies from the velocities that the sweeps keep."""
     found = list(solved)
     for tree, coordinates in zip(kinematic_trees(context.world.joints), trees.coordinates, strict=True):
         momenta = body_momenta(coordinates, solved[tree.root])
@@ -182,7 +182,7 @@ def _stacked(values: tuple[Expr, ...]) -> Expr:
 
 
 def _command(context: StepContext, joint: Joint, k: int, x: State) -> Command:
-    """Of coordinate ``k`` of a joint; 0 if it has none."""
+    """Return the command of coordinate ``k`` of a joint, and that of the step before; 0 without one."""
     given = context.input(f"{joint.name}.command")
     before = ca.SX(0) if joint.drive is None else x[f"{joint.name}.{joint.drive}"][k]
     return Command(ca.SX(0) if given is None else given[k], before)
@@ -212,7 +212,7 @@ def _coupled(
 
 
 def _places(world: World, trees: KinematicTrees) -> dict[int, tuple[int, Expr]]:
-    """Of each joint of a tree: its first coordinate, and the tree's responses."""
+    """Return for each joint of a tree its first coordinate and the tree's responses."""
     return {
         link.joint: (link.start, coordinates.responses)
         for tree, coordinates in zip(kinematic_trees(world.joints), trees.coordinates, strict=True)
@@ -238,19 +238,19 @@ def locks_at(context: StepContext, trees: KinematicTrees) -> list[tuple[PlacedCo
 def warm_started(
     context: StepContext, constraints: Sequence[JointConstraint], x: State, kick: Expr
 ) -> list[JointImpulse]:
-    """What the sweeps start from: the last step's forces over this substep's kick."""
+    """Return the start of the sweeps: the last step's forces over this substep's kick."""
     if not context.settings.scheme.warm_start:
         return [JointImpulse(ca.SX(numbers_of(each.placed.constraint), 1)) for each in constraints]
     return [_again(each.placed.constraint, x[each.name], each.k, kick) for each in constraints]
 
 
 def numbers_of(constraint: LockConstraint | CoordinateConstraint) -> int:
-    """How many impulses a constraint gives."""
+    """Return the number of impulses of a constraint."""
     return constraint.error.leaf.rows if isinstance(constraint, LockConstraint) else 1
 
 
 def own(stored: Expr, k: int | None) -> Expr:
-    """What is a constraint's of a stored column."""
+    """Return a constraint's part of a stored column."""
     return stored if k is None else stored[k]
 
 

@@ -79,7 +79,7 @@ class CoordinateConstraint:
         return -sign * self.inverse_mobility * ca.fmin(beyond, 0)
 
     def rate(self, momenta: tuple[Any, ...]) -> Expr:
-        """Of the coordinate."""
+        """Return the rate of the coordinate [rad/s] or [m/s]."""
         if self.of_tree is None:
             return speeds(self.terms, self.seen, momenta)
         return momenta[0].along(self.of_tree.jacobian)
@@ -93,7 +93,7 @@ class CoordinateConstraint:
         return JointImpulse(stored)
 
     def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
-        """See ``VelocityConstraint``."""
+        """Implement ``VelocityConstraint.project``."""
         new, change = self.answer(self.rate(momenta), old.numbers)
         return self.apply(momenta, JointImpulse(change)), JointImpulse(new)
 
@@ -141,7 +141,7 @@ class CoordinateConstraint:
         return impulse
 
     def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
-        """See ``VelocityConstraint``."""
+        """Implement ``VelocityConstraint.apply``."""
         if self.of_tree is None:
             return apply_impulse(self.terms, self.given_along, momenta, impulse.numbers, self.same)
         after = GeneralizedVelocities(momenta[0].numbers + ca.mtimes(self.of_tree.response, impulse.numbers))

@@ -46,7 +46,7 @@ class SubstepTimes:
 
     @property
     def lag(self) -> Expr:
-        """How much of ``kick`` lies before the substep."""
+        """Return the part of ``kick`` [s] that lies before the substep."""
         return self.kick - self.duration / 2
 
 
@@ -124,7 +124,7 @@ def lock_constraint(
 
 @traced
 def lock_at_impact(frames: JointFrames, motions: Motions, momenta: tuple[Any, ...], same: bool) -> LockConstraint:
-    """What the joint locks, at the instant of an impact: it changes no velocity unless something else does."""
+    """Return the constraint of locked directions at an impact: it changes no velocity unless something else does."""
     now = ca.SX(0)
     placed = frames.placed(now)
     terms, seen = frames.terms(motions, now, now), locked(frames.joint, placed)
@@ -249,7 +249,7 @@ def _driven(at: CoordinateTerms, drive: Expr, command: Command, substep: Substep
 
 
 def _impulse(drive: Expr, command: Command, substep: SubstepTimes) -> Expr:
-    """Of what commands give by themselves: each acts from the start of its step to the end."""
+    """Return the drive of commands by themselves: each acts from the start of its step to the end."""
     return substep.lag * command.before + substep.duration / 2 * drive
 
 
@@ -278,7 +278,7 @@ def _force_ends(motor: AffineMotor) -> tuple[Expr | None, Expr | None]:
 
 
 def servo_velocity(servo: Servo, command: Expr, value: Expr, smoothing: Expr) -> Expr:
-    """What a servo aims at, but for its bounds; rounding off its range changes velocities by the smoothing."""
+    """Return the target of a servo without its bounds; rounding its range changes velocities by the smoothing."""
     if servo.range is not None:
         command = clip(command, -servo.range, servo.range, smoothing / servo.gain)
     return servo.gain * (command - value)
@@ -308,7 +308,7 @@ def upper_limit(
 
 
 def _room(left: Expr, strikes: Expr) -> Expr:
-    """How far a limit may go within the substep; by rounding more where it strikes, see ``TIE``."""
+    """Return how far a limit may go within the substep; by rounding more at a strike, see ``TIE``."""
     return ca.if_else(left < -TIE, 0, left) + TIE * strikes
 
 

@@ -20,7 +20,7 @@ class JointImpulse:
 
     @property
     def count(self) -> int:
-        """How many numbers it has."""
+        """Return the number of components."""
         return int(self.numbers.shape[0])
 
     def like(self, numbers: Expr) -> JointImpulse:

@@ -75,7 +75,7 @@ class LockConstraint:
         return JointImpulse(stored if self.given_along.slides is not None else in_world(self.axes, stored))
 
     def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
-        """See ``VelocityConstraint``."""
+        """Implement ``VelocityConstraint.project``."""
         miss = speeds(self.terms, self.seen, momenta) - self.target + self.softness * old.numbers
         change = JointImpulse(-ca.mtimes(self.mass, miss))
         return self.apply(momenta, change), old.plus(change)
@@ -92,7 +92,7 @@ class LockConstraint:
         return -ca.mtimes(stiff, miss), stiff
 
     def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
-        """See ``VelocityConstraint``."""
+        """Implement ``VelocityConstraint.apply``."""
         return apply_impulse(self.terms, self.given_along, momenta, impulse.numbers, self.same)
 
 

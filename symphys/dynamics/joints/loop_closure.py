@@ -113,7 +113,7 @@ def _more(
 
 
 def _relative(constraint: LockConstraint | CoordinateConstraint, moved: Displacements) -> Expr:
-    """Of the first body against the second along the constraint's directions, to third order in the rotation."""
+    """Return the displacement of the first body against the second along the constraint, to third order."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for term, shift in zip(constraint.terms, moved, strict=True):
         linear += term.sign * (shift.linear + ca.cross(shift.angular, term.arm))

@@ -53,7 +53,7 @@ def lasting_forces(
     x: State,
     kick: Expr,
 ) -> tuple[Struck, State]:
-    """Which components an impact struck, and the lasting forces of ``joints`` from their impulses ``given``.
+    """Return the components that an impact struck, and the lasting forces of ``joints`` from impulses ``given``.
 
     ``solved``: the velocities after the sweeps.
     """
@@ -67,7 +67,7 @@ def _struck(
     joints: Sequence[JointConstraint],
     given: Sequence[JointImpulse],
 ) -> Struck:
-    """Of each component: 1 if a contact or a limit of it is an impact, whose share of joint forces does not last."""
+    """Return for each component 1 if a contact or limit of it is an impact, whose joint forces do not last."""
     found = {}
     for group in components(context.world):
         touching = tuple(each.constraint for each in contacts if group & set(each.bodies))
@@ -120,7 +120,7 @@ def _sprung(constraint: LockConstraint, momenta: tuple[Any, ...], impulse: Joint
 
 
 def of_body(struck: Struck, body: int) -> Expr:
-    """Whether what hangs on a body is struck."""
+    """Return 1 if the component of a body is struck, else 0."""
     return next(impact for group, impact in struck.items() if body in group)
 
 
@@ -144,7 +144,7 @@ def _lasting(
 
 
 def commanded(context: StepContext, joints: Sequence[JointConstraint], forces: State) -> State:
-    """What commands give by themselves, which acts until the next step begins, whatever the sweeps start from."""
+    """Return the force of commands by themselves; it acts until the next step, whatever the sweeps start from."""
     found, owner = State(), {joint.name: joint for joint in context.world.joints}
     drives = dict[str, list[Expr]]()
     for each in joints:

@@ -81,7 +81,7 @@ def _reading(world: World, layout: Layout, joint: Joint, x: Expr) -> Reading:
 
 
 def _rate(frames: JointFrames, placed: PlacedFrames, coordinate: Coordinate, motions: list[Motion]) -> Expr:
-    """How fast the first body moves against the second along a coordinate."""
+    """Return the rate of the first body against the second along a coordinate."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for sign, arm, (velocity, spin) in zip((1, -1), frames.lever_arms(ca.SX(0)), motions, strict=False):
         linear += sign * (velocity + ca.cross(spin, arm))
@@ -150,7 +150,7 @@ def _reactions(at: SensedState) -> dict[str, Wrench]:
 
 
 def _known(context: StepContext, x: State, index: int) -> tuple[Wrench, Wrench]:
-    """What acted from outside on a body in the step before, and its persistent forces."""
+    """Return the external and the persistent forces on a body in the step before."""
     name, zero = context.world.bodies[index].name, ca.SX.zeros(3)
     force, torque = (context.input(f"{name}.{field}") for field in INPUT_FIELDS)
     given = zero if force is None else force, zero if torque is None else torque

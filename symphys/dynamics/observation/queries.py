@@ -40,7 +40,7 @@ def gap_function(world: World, parameters: Sequence[Any] | None = None) -> ca.Fu
 def slip_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
-    """How fast surfaces move across their normals [m/s]: (x, u, p) -> (pairs,)."""
+    """Return the slip speeds of surfaces [m/s]: (x, u, p) -> (pairs,)."""
     x, u, p, _ = arguments = arguments_of(world, inputs, parameters)
     tracer = inline(world, arguments, reduces=False)
     with tracing(tracer):
@@ -61,7 +61,7 @@ def _slip(contact: Contact, motions: Motions) -> Expr:
 
 @traced
 def _gaps(first: Surface, second: Surface, a: PredictedPath, b: PredictedPath) -> list[Expr]:
-    """Nothing else of the contacts: the function is small, whatever the instant of touch takes."""
+    """Return the gaps alone: the function is small, however large the code for the instant of touch."""
     return [contact.gap for contact in collide(first, second, a, b)]
 
 

@@ -34,7 +34,7 @@ class SensedState:
 
     @cached_property
     def layout(self) -> Layout:
-        """Where the parts of the state lie."""
+        """Return the columns of the parts of the state."""
         return Layout(self.world)
 
     def part(self, name: str) -> Expr:

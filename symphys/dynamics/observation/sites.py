@@ -22,7 +22,7 @@ def _place(at: SensedState, site: Site) -> Expr:
 
 
 def _arm(at: SensedState, site: Site) -> Expr:
-    """From the centre of mass to the site, world frame (3,) [m]."""
+    """Return the vector from the centre of mass to the site, world frame (3,) [m]."""
     return rotation.rotate(_of_body(at, site, "orientation"), _place(at, site))
 
 

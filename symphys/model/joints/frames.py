@@ -41,7 +41,7 @@ class Pose:
 
 
 def pose(name: str, state: Mapping[str, Array]) -> Pose:
-    """Of a body in a state by names such as ``ball.position``, or of the world."""
+    """Return the pose of a body in a state by names such as ``ball.position``, or that of the world."""
     if name == WORLD:
         return Pose(np.zeros(3), np.eye(3))
     turned = np.array(rotation.matrix(state[f"{name}.orientation"]), float)

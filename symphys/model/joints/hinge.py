@@ -15,7 +15,7 @@ from symphys.types import Array, Expr
 
 
 def angle(placed: PlacedFrames) -> Expr:
-    """In [-pi, pi] [rad]: of the first side's y and z against the second's, about x; whole turns are not seen."""
+    """Return the angle of the first side's y and z against the second's about x, in [-pi, pi] [rad]."""
     a, b = placed.a, placed.b
     cos = ca.dot(a[:, 1], b[:, 1]) + ca.dot(a[:, 2], b[:, 2])
     sin = ca.dot(a[:, 1], b[:, 2]) - ca.dot(a[:, 2], b[:, 1])

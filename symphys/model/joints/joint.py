@@ -112,7 +112,7 @@ class Joint:
 
     @property
     def acting(self) -> tuple[str, ...]:
-        """Which of motor, lower, upper, spring and friction act along its coordinates."""
+        """Return which of motor, lower, upper, spring and friction act along its coordinates."""
         if not self.kind.coordinates:
             return ()
         dry = None if is_zero(self.friction) else self.friction
@@ -121,7 +121,7 @@ class Joint:
 
     @property
     def drive(self) -> str | None:
-        """Where the state keeps what the command of a step alone gives, which acts until the next step begins.
+        """Return the field of the state for what a step's command gives by itself until the next step begins.
 
         None for a motor that aims at a velocity, whose commands act through what it aims at.
         """

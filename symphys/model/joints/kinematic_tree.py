@@ -52,12 +52,12 @@ class KinematicTree:
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """In the order of the links."""
+        """Return the bodies in the order of the links."""
         return tuple(link.body for link in self.links)
 
     @property
     def size(self) -> int:
-        """How many coordinates."""
+        """Return the number of coordinates."""
         return self.links[-1].start + self.links[-1].count
 
 
@@ -79,7 +79,7 @@ def tree_joints(joints: Sequence[Joint]) -> frozenset[int]:
 
 
 def carriers(count: int, joints: Sequence[Joint]) -> tuple[int, ...]:
-    """For each of ``count`` bodies where the sweeps keep its velocities: at the root of its tree, or at itself."""
+    """Return for each of ``count`` bodies the carrier of its velocities: the root of its tree, or itself."""
     found = list(range(count))
     for tree in kinematic_trees(joints):
         for body in tree.bodies:

@@ -31,7 +31,7 @@ class NamedJoint(Protocol):
 
     @property
     def kind(self) -> Kind:
-        """What it locks."""
+        """Return the kind of joint, which says what it locks."""
 
     @property
     def first(self) -> str:
@@ -39,11 +39,11 @@ class NamedJoint(Protocol):
 
     @property
     def second(self) -> str | None:
-        """What these are measured against; None: the world."""
+        """Return the body that coordinates are measured against; None: the world."""
 
     @property
     def frames(self) -> tuple[JointFrame, JointFrame]:
-        """Of the first and of the second."""
+        """Return the frames of the first and of the second side."""
 
     @property
     def frequency(self) -> float:
@@ -134,7 +134,7 @@ def placed_frames(joint: NamedJoint, state: Mapping[str, Array]) -> tuple[Placed
 
 
 def frames_of(joint: NamedJoint, state: Mapping[str, Expr]) -> tuple[PlacedFrames, Expr]:
-    """As ``placed_frames``, of casadi's DM or MX."""
+    """Place frames as ``placed_frames`` does, in casadi's DM or MX."""
     axes, points = [], []
     for name, frame in zip((joint.first, joint.second or WORLD), joint.frames, strict=True):
         own, point = rotation.matrix(ca.DM(frame.orientation)), ca.DM(frame.point)

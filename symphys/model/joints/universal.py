@@ -15,13 +15,13 @@ from symphys.types import Array, Expr
 
 
 def swing(placed: PlacedFrames) -> Expr:
-    """In [-pi, pi] [rad]: of the first side's x about the second side's y; whole turns are not seen."""
+    """Return the angle of the first side's x about the second side's y, in [-pi, pi] [rad], without whole turns."""
     a, b = placed.a, placed.b
     return angle_of(-ca.dot(a[:, 0], b[:, 2]), ca.dot(a[:, 0], b[:, 0]))
 
 
 def twist(placed: PlacedFrames) -> Expr:
-    """In [-pi, pi] [rad]: of the first side about its own x, against the second side's y, without whole turns."""
+    """Return the angle of the first side about its own x, in [-pi, pi] [rad], without whole turns."""
     a, b = placed.a, placed.b
     return angle_of(-ca.dot(a[:, 2], b[:, 1]), ca.dot(a[:, 1], b[:, 1]))
 

@@ -86,7 +86,7 @@ class Start:
         return np.array(self.functions.gaps(self.x, self.p)).ravel()
 
     def quantities(self) -> dict[str, Callable[[], Expr]]:
-        """By the names of sensors, functions that return what they read; see ``Formula.evaluate``."""
+        """Map names of sensors to functions that return their readings; see ``Formula.evaluate``."""
         return {name: partial(self.sensed, name) for name in self.functions.sensors}
 
     def sensed(self, name: str) -> Expr:

@@ -48,7 +48,7 @@ class ParametricJoint:
 
     @property
     def apart(self) -> PairRule | None:
-        """That its bodies do not touch each other, as a [[pair]] table would say it; None where they may."""
+        """Return the [[pair]] rule by which its bodies do not touch each other; None if they may."""
         if self.collide or self.second is None:
             return None
         return PairRule(f"{self.second}-{self.first}", frozenset((self.first, self.second)), False, {})

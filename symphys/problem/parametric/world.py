@@ -200,7 +200,7 @@ class ParametricWorld:
         return Law.of(self.statements(a, b, value))
 
     def statements(self, a: str, b: str, value: Value | None = None) -> Statements:
-        """What the tables state for the two, with the values of what is a parameter; None: as the file has it."""
+        """Return the law that tables state for the two, with values of parameters; None: as the file has them."""
         return {
             key: [(owner, value(f"{owner}.{key}") if value and varies else number) for owner, number, varies in sources]
             for key, sources in self.sources(a, b).items()

@@ -64,7 +64,7 @@ def check_collides_with(names: Sequence[str], groups: Sequence[str], document: D
 
 
 def check_ranks(parametric: ParametricWorld, faults: Faults) -> None:
-    """Where two [[pair]] tables of a surface and a group both hold for two surfaces, they must say the same."""
+    """Check that two [[pair]] tables of a surface and a group that hold for the same surfaces agree."""
     groups = {part.name: part.group for part in parametric.parts}
     found: dict[tuple[str | None, str | None], Rivals] = {}
     for index, pair in enumerate(parametric.pairs):
@@ -92,7 +92,7 @@ Rivals = dict[Statement, list[tuple[int, str]]]
 
 
 def statement(pair: PairRule) -> Statement:
-    """What a table says."""
+    """Return the coefficients that a table states."""
     return (pair.collide, *sorted(pair.states.items()))
 
 
@@ -149,7 +149,7 @@ def unused(parametric: ParametricWorld, pair: PairRule) -> str:
 
 
 def table_place(parametric: ParametricWorld, owner: str, faults: Faults) -> Place:
-    """Where the table is that states a coefficient: of a surface, a pair or [contact], by its name."""
+    """Return the place of the table that states a coefficient: of a surface, a pair or [contact]."""
     for kind in ("body", "plane", "block", "terrain"):
         for index, table in enumerate(faults.data.get(kind, ())):
             if table["name"] == owner:

@@ -16,7 +16,7 @@ from symphys.types import Array
 def read_joint_frames(
     place: Place, table: JointTable, spec: JointSpec, word: str, initial: Mapping[str, Array], faults: Faults
 ) -> tuple[JointFrame, JointFrame]:
-    """Of the second body in the table, whose coordinates count, then of the first; they coincide at the start.
+    """Return the frames of the table's second body, whose coordinates count, then of the first.
 
     Args:
         place: of the table.

@@ -243,7 +243,7 @@ class JointReader:
         return None
 
     def check_acting(self, kind: Kind) -> None:
-        """What acts along coordinates needs some."""
+        """Note what acts along coordinates of a joint without any."""
         if kind.coordinates:
             return
         for key in ("motor", "limits", "limits_deg", "start", "start_deg", "spring", "friction"):
@@ -277,7 +277,7 @@ class JointReader:
         return AffineMotor(**{**dict(table.affine), **ranges})
 
     def limits(self, kind: Kind) -> Limits:
-        """In rad or m."""
+        """Read the limits in rad or m."""
         table = self.table
         if table.limits is not None and table.limits_deg is not None:
             self.add("limits_deg", "limits are given too; leave one out")
@@ -289,7 +289,7 @@ class JointReader:
         return Limits(low, high)
 
     def start(self, kind: Kind, limits: Limits) -> tuple[float, ...]:
-        """In rad or m, within the limits; empty if none is given."""
+        """Return the start in rad or m, within the limits; empty if none is given."""
         table = self.table
         key, given = ("start", table.start) if table.start_deg is None else ("start_deg", table.start_deg)
         if given is None or not kind.coordinates:

@@ -13,9 +13,13 @@ from tools.laboratory import Lab
 from tools.repeats import few
 
 import symphys
-from symphys import (
+from symphys.dynamics.observation import SensedState, sensor_readings
+from symphys.errors import ProblemError
+from symphys.maths.rotation import matrix
+from symphys.model import (
     Body,
     FixedJoint,
+    HelicalJoint,
     Hinge,
     Law,
     Plane,
@@ -28,9 +32,6 @@ from symphys import (
     World,
     make_world,
 )
-from symphys.dynamics.observation import SensedState, sensor_readings
-from symphys.errors import ProblemError
-from symphys.maths.rotation import matrix
 from symphys.model.joints import KINDS, Joint, JointCoupling, JointFrame
 from symphys.model.state_layout import Layout, initial_state, input_sizes
 from symphys.transcription import transcribe
@@ -158,6 +159,18 @@ def test_a_rotor_takes_its_share_of_a_torque() -> None:
     world = make_world([Body("wheel", 1.0, INERTIA)], joints=[wheel])
     x = settled(world, 0.1, [3.0], ["axle.command"])
     assert wrench(world, "axle", x) == pytest.approx([0, 0, G, 0, 0, 1.0], abs=1e-10)
+
+
+def test_a_nut_on_a_screw_carries_what_its_thread_gives() -> None:
+    """It falls by r an angle: (I + m r^2) w' = -m g r, and the thread gives m (g + r w') and I w'."""
+    pitch = 0.5
+    lead = pitch / (2 * np.pi)
+    screw = HelicalJoint("screw", ("world", "nut"), axis=(0, 0, 1), pitch=pitch, point=(0, 0, 0))
+    world = make_world([Body("nut", M, INERTIA)], joints=[screw])
+    spin = -M * G * lead / (INERTIA + M * lead**2)
+    expected = [0, 0, M * (G + lead * spin), 0, 0, INERTIA * spin]
+    for x in (initial_state(world), settled(world, 0.2)):
+        assert wrench(world, "screw", x) == pytest.approx(expected, abs=1e-10)
 
 
 def test_inputs_of_the_step_before_count() -> None:
