@@ -24,15 +24,15 @@ from bench import Row, spent
 
 import symphys
 from symphys import files
-from symphys.batches import run_batch
+from symphys.batches import Observer, run_batch
 from symphys.problem import load_problem
 from symphys.report import WantedPages, make_pages, wanted_below, write_batch_report
 from symphys.results.case_name import case_name
 from symphys.results.file_names import CONFIG, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
 from symphys.results.table import Journal, write_table
 from symphys.runs import Job, make_jobs
+from symphys.runs.execute import judge
 from symphys.runs.record import make_result, used
-from symphys.runs.solving import judge
 from symphys.solvers import solver
 from symphys.transcription import Transcription, transcribe
 
@@ -125,16 +125,10 @@ def timed() -> Iterator[Measured]:
     found.wall, found.cpu = perf_counter() - began, spent() - worked
 
 
-class MemoryObserver:
+class MemoryObserver(Observer):
     """An observer of a batch that notes the memory of this process when runs end."""
 
     resident = 0.0
-
-    def started(self, job: Job, resumed: bool) -> None:
-        """Do nothing."""
-
-    def advanced(self, job: Job, row: Any) -> None:
-        """Do nothing."""
 
     def ended(self, job: Job, result: Any, skipped: bool) -> None:
         """Note the memory [MB]."""

@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from symphys.errors import SymphysError
 from symphys.problem import Problem, require_solvable
 from symphys.problem.loading import load
-from symphys.runs.choice import SITUATIONS, numbers, situation
+from symphys.runs.choice import SITUATIONS, situation
 from symphys.runs.record import equivalents
 from symphys.shooting import Evaluator, ShootingProblem, Values
 from symphys.solvers import SOLVERS, Counts, Outcome, Status, TraceRow
@@ -127,7 +127,8 @@ def left_out(problem: Problem) -> str:
         return str(error)
     if problem.scenarios is not None:
         return "it has scenarios, of which other solvers draw samples"
-    return f"{numbers(problem)} numbers that act all the time" if situation(problem) is SITUATIONS[-1] else ""
+    numbers = sum(variable.guess.size for variable in problem.variables)
+    return f"{numbers} numbers that act all the time" if situation(problem) is SITUATIONS[-1] else ""
 
 
 def methods_of(shooting: ShootingProblem) -> tuple[str, ...]:

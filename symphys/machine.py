@@ -26,8 +26,7 @@ from symphys.codegen import (
     interpret,
 )
 from symphys.codegen.cuda import compile_on, find_gpu
-from symphys.codegen.toolchain.compiler import find_compiler, processors
-from symphys.codegen.toolchain.processor import processor
+from symphys.codegen.toolchain.compiler import find_compiler, processor, processors
 
 PACKAGES = ("casadi", "click", "cma", "matplotlib", "numpy", "pydantic", "rich", "scipy")
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "spral")

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from symphys.files import write_text
-from symphys.importing.findings import Finding
-from symphys.importing.options import ImportOptions
+from symphys.importing.records import Finding, ImportOptions
 from symphys.importing.robot import Imported, read_robot
 from symphys.importing.writing import HEADINGS, described, robot_text, sentence
 from symphys.problem import Problem, problem_of_tables

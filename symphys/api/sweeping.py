@@ -15,7 +15,7 @@ from typing import Any, TypedDict, Unpack
 
 from symphys.api.solution import Solution
 from symphys.api.solving import Guess, guess_of, kept
-from symphys.batches import ENGINES, BatchLimits, BatchResult, run_batch, run_on
+from symphys.batches import ENGINES, BatchLimits, BatchResult, Observer, run_batch, run_on
 from symphys.codegen.backends import require_backend
 from symphys.errors import SymphysError
 from symphys.problem import Problem
@@ -24,9 +24,9 @@ from symphys.problem.problem import plain
 from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.table import read_sweep
 from symphys.results.run import read_run
-from symphys.runs import Job, Result, make_jobs
-from symphys.runs.standing import RERUN
-from symphys.runs.transcription_cache import Transcribe
+from symphys.runs import Job, make_jobs
+from symphys.runs.execute import Transcribe
+from symphys.runs.inspection import RERUN
 from symphys.solvers import TraceRow
 from symphys.suggest import hint
 from symphys.transcription import transcribe
@@ -199,18 +199,12 @@ def drop_with(solutions: Sequence[Solution], out: Path) -> None:
 
 
 @dataclass(frozen=True)
-class ProgressObserver:
+class ProgressObserver(Observer):
     """Pass the iterations of a batch to a function."""
 
     progress: BatchProgress | None
-
-    def started(self, job: Job, resumed: bool) -> None:
-        """Report nothing."""
 
     def advanced(self, job: Job, row: TraceRow) -> None:
         """Report an iteration."""
         if self.progress:
             self.progress(job.name, row)
-
-    def ended(self, job: Job, result: Result, skipped: bool) -> None:
-        """Report nothing."""

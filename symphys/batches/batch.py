@@ -1,43 +1,40 @@
 """Many runs: one after another here, or side by side in worker processes; no run's failure stops the others.
 
-Any number of commands may do the same batch at once, on any machines: each run is claimed in its folder by one of them,
-see ``symphys.runs.claim``, and the others take the result from there.
+Any number of commands may work on one batch at once, on any machines: each run is claimed in its folder by one of them,
+see ``symphys.runs.claim``, and the others read the result from there.
 """
 
 from __future__ import annotations
 
 import contextlib
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 from symphys import files
-from symphys.batches.ledger import Ledger, Observer
+from symphys.batches.ledger import Ledger, Observer, retried
 from symphys.batches.limits import UNLIMITED, BatchLimits, Halt
-from symphys.batches.multi_start import groups, solve_group
 from symphys.batches.pool import NoWorkers, Pool
 from symphys.batches.queue import Queue
 from symphys.batches.worker import TICK
 from symphys.interrupts import Interrupts
-from symphys.results.file_names import RESULT
 from symphys.results.result import Result
-from symphys.runs.claim import FolderBusy, claimed
-from symphys.runs.execute import execute, with_claim
+from symphys.runs.claim import FolderBusy, claimed, owner
+from symphys.runs.execute import Transcribe, TranscriptionCache, execute, with_claim
+from symphys.runs.inspection import RERUN, inspect_run
 from symphys.runs.job import Job
 from symphys.runs.record import failure
-from symphys.runs.standing import RERUN, stamped, standing
-from symphys.runs.transcription_cache import Transcribe, TranscriptionCache
-from symphys.solvers import Monitor, TraceRow
+from symphys.solvers import Monitor, Outcome, TraceRow, solve_multi_start, solver
 
 
 @dataclass(frozen=True)
 class BatchResult:
-    """What came of the jobs.
+    """The results of a batch.
 
     Attributes:
-        results: (jobs) in the order of the jobs, without what only their folders need hold; None for a run that did not
-            come to its end.
+        results: in the order of the jobs, without fields that only their folders need; None for an unfinished run.
         interrupted: whether Ctrl-C was pressed.
         spent: whether the time of the batch was used up before all was done.
     """
@@ -45,6 +42,12 @@ class BatchResult:
     results: tuple[Result | None, ...]
     interrupted: bool
     spent: bool = False
+
+    @classmethod
+    def of(cls, ledger: Ledger, halt: Halt) -> BatchResult:
+        """Return the results of a ledger, whose runs ``halt`` may have stopped."""
+        left = any(result is None or result.interrupted for result in ledger.results)
+        return cls(tuple(ledger.results), halt.interrupted(), halt.spent and left)
 
     @property
     def accepted(self) -> bool:
@@ -61,11 +64,11 @@ def run_batch(
     limits: BatchLimits = UNLIMITED,
     rerun: str = "",
 ) -> BatchResult:
-    """Run what is not done yet, here or in ``processes`` workers, until all is done or Ctrl-C is pressed.
+    """Do the runs that are not done yet, here or in ``processes`` workers, until all are done or Ctrl-C is pressed.
 
     ``multi_start``: here, solve the seeds of a problem and solver side by side where the solver can. ``rerun``: also do
-    again what is over, a key of ``symphys.runs.standing.RERUN``. ``limits``: a run that has to end at a time has a
-    process of its own, which can be killed whatever it is at; seeds side by side stop at the budget after an iteration.
+    again runs that are over, a key of ``symphys.runs.inspection.RERUN``. ``limits``: a run with a limit has a
+    process of its own, which can be killed at any point; seeds side by side stop at the budget after an iteration.
     """
     ledger = Ledger(jobs, observer)
     with Interrupts().listening() as stop:
@@ -74,47 +77,33 @@ def run_batch(
         queue = Queue(waiting)
         apart = limits.timeout < float("inf") or (limits.bounded and not multi_start)
         if apart or (processes > 1 and len(waiting) > 1):
-            side_by_side(waiting, queue, processes, transcribe, ledger, halt, limits)
+            try:
+                Pool(waiting, queue, processes, transcribe, ledger, halt, limits).run()
+            except NoWorkers as error:
+                ledger.note(f"{error}. The runs are done one after another, in this process")
+                SerialRunner(waiting, queue, transcribe, ledger, halt, limits).run(False)
         else:
-            Here(waiting, queue, transcribe, ledger, halt, limits).run(multi_start)
+            SerialRunner(waiting, queue, transcribe, ledger, halt, limits).run(multi_start)
         ledger.close()
-    left = any(result is None or result.interrupted for result in ledger.results)
-    return BatchResult(tuple(ledger.results), stop.requested, halt.spent and left)
+    return BatchResult.of(ledger, halt)
 
 
 def plan(jobs: Sequence[Job], ledger: Ledger, rerun: str) -> list[tuple[int, Job]]:
-    """What is to be done, the biggest first; what is over is taken from its folder."""
+    """Return the runs to do, the biggest first; results of runs that are over go to the ledger."""
     found = []
     for index, job in enumerate(jobs):
-        stands = standing(job)
-        if stands.missing():
+        inspection = inspect_run(job)
+        if inspection.needs_work():
             found.append((index, job))
-        elif stands.missing(RERUN.get(rerun, frozenset())):
-            found.append((index, replace(job, outdated=stands.stamp)))
-        elif stands.result:
-            ledger.skip(index, stands.result)
+        elif inspection.needs_work(RERUN.get(rerun, frozenset())):
+            found.append((index, replace(job, outdated=inspection.stamp)))
+        elif inspection.result:
+            ledger.skip(index, inspection.result)
     return sorted(found, key=lambda each: -each[1].size)
 
 
-def side_by_side(
-    jobs: dict[int, Job],
-    queue: Queue,
-    processes: int,
-    transcribe: Transcribe,
-    ledger: Ledger,
-    halt: Halt,
-    limits: BatchLimits,
-) -> None:
-    """Do all in workers; where they do not start, here."""
-    try:
-        Pool(jobs, queue, processes, transcribe, ledger, halt, limits).run()
-    except NoWorkers as error:
-        ledger.note(f"{error}. The runs are done one after another, in this process")
-        Here(jobs, queue, transcribe, ledger, halt, limits).run(False)
-
-
-class Here:
-    """Does the runs of a queue in this process, one after another."""
+class SerialRunner:
+    """The runs of a queue, one after another in this process."""
 
     def __init__(
         self,
@@ -125,12 +114,12 @@ class Here:
         halt: Halt,
         limits: BatchLimits,
     ) -> None:
-        """Nothing is done yet."""
+        """Keep the runs and their limits."""
         self.jobs, self.queue, self.ledger, self.halt, self.limits = jobs, queue, ledger, halt, limits
         self.transcriptions = TranscriptionCache(transcribe)
 
     def run(self, multi_start: bool) -> None:
-        """Do all jobs, or as many as can be before a halt."""
+        """Do all jobs, or as many as a halt leaves time for."""
         if multi_start:
             self.run_groups()
         last = None
@@ -147,7 +136,7 @@ class Here:
             last = self.queue.done(index)
 
     def do(self, index: int) -> None:
-        """Do one run, and try it again as often as is asked for."""
+        """Do one run, with as many tries as the limits allow."""
         for left in reversed(range(self.limits.retries + 1)):
             job = self.jobs[index]
             result = execute(
@@ -159,12 +148,11 @@ class Here:
             )
             if result.status != "failed" or not left or self.halt():
                 break
-            self.ledger.note(f"{job.name}: tried again, as {result.advice}")
-            self.jobs[index] = replace(job, outdated=stamped(job.folder.path / RESULT))
+            self.jobs[index] = retried(job, result.advice, self.ledger)
         self.ledger.ended(index, result)
 
     def watch(self, index: int) -> Monitor:
-        """What sees the iterations of a run, and stops it at a halt."""
+        """Return the monitor of a run, which stops it at a halt."""
 
         def monitor(row: TraceRow) -> None:
             if self.halt():
@@ -174,18 +162,18 @@ class Here:
         return monitor
 
     def run_groups(self) -> None:
-        """Solve the seeds that can be side by side, and judge each; the others stay in the queue."""
-        halfway = {index for index, job in self.jobs.items() if standing(job).checkpoint is not None}
+        """Solve the seeds that can be solved side by side; the other runs stay in the queue."""
+        halfway = {index for index, job in self.jobs.items() if inspect_run(job).checkpoint is not None}
         for group in groups(self.jobs, halfway):
             if len(group) > 1 and not self.halt():
                 self.run_group(group)
 
     def run_group(self, group: list[int]) -> None:
-        """Solve seeds side by side, as far as no other command has claimed them."""
+        """Solve seeds side by side, unless another command has claimed them, and judge each."""
         with contextlib.ExitStack() as stack:
             claims = {}
             for index in group:
-                with contextlib.suppress(files.FileError):  # busy, or it cannot be written: done alone, it says so
+                with contextlib.suppress(files.FileError):  # the run reports it when it is done alone
                     claims[index] = stack.enter_context(claimed(self.jobs[index].folder.path))
                     self.ledger.started(index, False)
             solved = solve_group({index: self.jobs[index] for index in claims}, self.transcriptions, self.watch)
@@ -197,3 +185,76 @@ class Here:
                     result = failure(job, str(error), again=True)
                 self.queue.remove(index)
                 self.ledger.ended(index, result)
+
+
+def groups(jobs: Mapping[int, Job], halfway: Collection[int]) -> list[list[int]]:
+    """Return the indices of the jobs in their order, grouped where jobs differ in their seed only and start afresh."""
+    found: list[list[int]] = []
+    for index, job in jobs.items():
+        last = found[-1][-1] if found else index
+        if found and index not in halfway and last not in halfway and differ_in_seed(jobs[last], job):
+            found[-1].append(index)
+        else:
+            found.append([index])
+    return found
+
+
+def differ_in_seed(one: Job, other: Job) -> bool:
+    """Whether two jobs have the same problem, options and solver, and that solver runs in threads."""
+    same = one.problem is other.problem and one.config.solver == other.config.solver and one.options == other.options
+    return same and solver(one.config.solver).threaded
+
+
+def solve_group(
+    jobs: Mapping[int, Job], transcriptions: TranscriptionCache, watch: Callable[[int], Monitor]
+) -> dict[int, Outcome]:
+    """Return the outcomes of a group, each as if solved alone; none if anything fails, so that each run reports it."""
+    first = next(iter(jobs.values()))
+    lock = threading.Lock()
+
+    def monitored(index: int) -> Monitor:
+        report = watch(index)
+
+        def monitor(row: TraceRow) -> None:
+            with lock:
+                report(row)
+
+        return monitor
+
+    seeds = [job.config.seed for job in jobs.values()]
+    try:
+        shooting = transcriptions(first).shooting
+        starts = [shooting.start(seed) for seed in seeds]
+        monitors = [monitored(index) for index in jobs]
+        chosen = solver(first.config.solver)
+        found = solve_multi_start(chosen, shooting, starts, first.options, seeds, monitors)
+    except Exception:  # the run at fault reports it when it is solved alone
+        return {}
+    return dict(zip(jobs, found, strict=True))
+
+
+@dataclass(frozen=True)
+class Preview:
+    """A run before it is begun.
+
+    Attributes:
+        job: the run.
+        todo: whether it would be done.
+        state: a value of ``symphys.runs.inspection.RunState``, or "claimed".
+        why: the reason, as a clause.
+    """
+
+    job: Job
+    todo: bool
+    state: str
+    why: str
+
+
+def previews(jobs: Sequence[Job], rerun: str = "") -> Iterator[Preview]:
+    """Yield what would become of the runs, in their order; nothing is written. ``rerun``: as in ``run_batch``."""
+    for job in jobs:
+        found, holder = inspect_run(job), owner(job.folder.path)
+        if holder is not None:
+            yield Preview(job, False, "claimed", f"{holder} is at it")
+        else:
+            yield Preview(job, found.needs_work(RERUN.get(rerun, frozenset())), found.state.value, found.why)

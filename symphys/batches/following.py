@@ -1,6 +1,6 @@
 """A batch that is done elsewhere: an engine starts drivers, and this process follows what they do and computes nothing.
 
-What comes of a run is read from its folder. News come from the board, see ``symphys.batches.engines.board``.
+Results are read from run folders; messages of drivers come from their ``Board``.
 """
 
 from __future__ import annotations
@@ -14,29 +14,27 @@ from pathlib import Path
 from symphys import files
 from symphys.batches.batch import BatchResult, plan
 from symphys.batches.engines import Engine, EngineError, open_engine
-from symphys.batches.engines.board import NOTE, OVER, RESUMED, Board
-from symphys.batches.engines.driver import DriverTask
+from symphys.batches.engines.driver import NOTE, OVER, RESUMED, Board, DriverTask
 from symphys.batches.ledger import Ledger, Observer
 from symphys.batches.limits import UNLIMITED, BatchLimits, Halt
 from symphys.interrupts import Interrupts
 from symphys.results.file_names import RESULT
 from symphys.results.result import Result, read_result
 from symphys.runs.claim import holder, is_over
-from symphys.runs.execute import give_up
+from symphys.runs.execute import Transcribe, give_up
 from symphys.runs.folder import RunFolder
+from symphys.runs.inspection import RunState, inspect_run
 from symphys.runs.job import Job
 from symphys.runs.record import failure
-from symphys.runs.standing import Stands, standing
-from symphys.runs.transcription_cache import Transcribe
 
 TICK = 0.25
-"""[s] between two looks, at least."""
+"""[s] at least between two looks at the board."""
 SHARE = 20
-"""Looking takes at most one of so many seconds."""
+"""Looking at the board takes at most one second in so many."""
 MOST_ROUNDS = 3
-"""How often drivers are started again while no run comes to its end."""
+"""Times that drivers are restarted while no run ends."""
 GRACE = 5.0
-"""[s] that drivers have to end by themselves when nothing is left, and their runs when the time of the batch is up."""
+"""[s] for drivers to end by themselves when nothing is left, and for their runs when the batch's time is up."""
 
 
 def run_on(
@@ -50,7 +48,7 @@ def run_on(
     limits: BatchLimits = UNLIMITED,
     rerun: str = "",
 ) -> BatchResult:
-    """``run_batch`` by so many drivers that an engine starts.
+    """Do a batch as ``run_batch`` does, by ``drivers`` that an engine starts.
 
     ``engine``, ``scheduler``: see ``open_engine``. ``out``: the folder of the batch; all machines see it by one path.
 
@@ -59,54 +57,37 @@ def run_on(
         FileError: ``out`` cannot be written.
     """
     ledger = Ledger(jobs, observer)
-    with Interrupts().listening() as stop:
+    with Interrupts().listening() as stop, contextlib.ExitStack() as stack:
         halt = Halt(stop, limits.budget)
         waiting = plan(jobs, ledger, rerun)
         if waiting:
-            follow(engine, scheduler, waiting, drivers, ledger, transcribe, out.absolute(), limits, halt)
-    left = any(result is None or result.interrupted for result in ledger.results)
-    return BatchResult(tuple(ledger.results), stop.requested, halt.spent and left)
-
-
-def follow(
-    name: str,
-    scheduler: str,
-    waiting: list[tuple[int, Job]],
-    drivers: int,
-    ledger: Ledger,
-    transcribe: Transcribe,
-    out: Path,
-    limits: BatchLimits,
-    halt: Halt,
-) -> None:
-    """Open the engine, let it do what waits, and put all away that was needed for that."""
-    sent = tuple(replace(job, folder=RunFolder(job.folder.path.absolute())) for _, job in waiting)
-    with contextlib.ExitStack() as stack:
-        engine = open_engine(name, scheduler, min(drivers, len(sent)), out)
-        stack.callback(engine.close)
-        board = Board.hang(out)
-        stack.callback(board.take_down)
-        task = DriverTask(board, sent, transcribe, replace(limits, budget=float("inf")))
-        follower = Follower(task, engine, drivers, [index for index, _ in waiting], ledger, halt)
-        follower.run()
-        follower.part()
+            sent = tuple(replace(job, folder=RunFolder(job.folder.path.absolute())) for _, job in waiting)
+            opened = open_engine(engine, scheduler, min(drivers, len(sent)), out.absolute())
+            stack.callback(opened.close)
+            board = Board.create(out.absolute())
+            stack.callback(board.remove)
+            task = DriverTask(board, sent, transcribe, replace(limits, budget=float("inf")))
+            follower = Follower(task, opened, drivers, [index for index, _ in waiting], ledger, halt)
+            follower.run()
+            follower.close()
+    return BatchResult.of(ledger, halt)
 
 
 @dataclass
 class Follower:
-    """Follows the drivers of a batch.
+    """The command that follows the drivers of a batch.
 
     Attributes:
-        task: what each driver does, with the runs that were sent.
+        task: of each driver, with the runs that were sent.
         engine: starts drivers.
         drivers: how many are wanted.
-        indices: (runs that were sent) of each in the ledger.
-        left: those that were sent and are not over.
-        at_work: those of them that were begun.
-        tried_by: the drivers that have begun each.
-        rounds: how often drivers were started again since a run was over.
-        turn: drivers that were started.
-        told: what has ended drivers; each is said once.
+        indices: of the runs that were sent, in the ledger.
+        left: the runs that were sent and are not over.
+        at_work: the begun runs among them.
+        tried_by: the tokens of drivers that have begun each run.
+        rounds: restarts of drivers since the last run ended.
+        turn: number of drivers started so far.
+        reported: reasons for which drivers ended, each noted once.
     """
 
     task: DriverTask
@@ -120,36 +101,42 @@ class Follower:
     tried_by: dict[int, set[str]] = field(default_factory=dict)
     rounds: int = -1
     turn: int = 0
-    told: set[str] = field(default_factory=set)
+    reported: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        """Nothing has begun."""
+        """Start with all runs left."""
         self.left = set(range(len(self.indices)))
 
     def run(self) -> None:
-        """Follow until all is over, nobody works any more, or a halt has stopped those who did."""
+        """Follow until all runs are over, no driver works any more, or a halt has stopped them."""
         asked = False
         while self.left:
             began = time.monotonic()
             if self.halt() and not asked:
                 asked = True
                 self.task.board.stop(self.halt.reason)
-            alive = self.engine.alive()
+            alive, faults = self.engine.poll()
             self.take_news()
-            self.bury()
-            if not (self.wind_down(alive) if asked else self.keep_up(alive)):
+            self.reap()
+            if asked:
+                # after Ctrl-C a run may take its time, since a second one ends it; the time of the batch is a limit
+                goes_on = bool(alive and self.at_work) and self.halt.overdue < GRACE
+            else:
+                self.report(faults)
+                goes_on = self.scale(alive)
+            if not goes_on:
                 break
             self.wait(max(TICK, (SHARE - 1) * (time.monotonic() - began)), asked)
         self.sweep(asked)
 
     def wait(self, seconds: float, asked: bool) -> None:
-        """Wait for the next look; not after a halt that is new."""
+        """Wait for the next look, but not longer than until a new halt."""
         until = time.monotonic() + seconds
         while (rest := until - time.monotonic()) > 0 and (asked or not self.halt()):
             time.sleep(min(TICK, rest))
 
     def take_news(self) -> None:
-        """Read what drivers have left on the board."""
+        """Read the messages of the drivers."""
         for news in self.task.board.news():
             if news.what == NOTE:
                 self.ledger.note(news.text)
@@ -163,38 +150,41 @@ class Follower:
                 self.ledger.started(self.indices[news.index], news.what == RESUMED)
 
     def end(self, index: int, result: Result) -> None:
-        """A run is over."""
+        """Record the result of a run."""
         self.left.discard(index)
         self.at_work.discard(index)
         self.rounds = min(self.rounds, 0)
         self.ledger.ended(self.indices[index], result)
 
-    def bury(self) -> None:
-        """Give up runs of which one driver more has died than they may be tried again."""
+    def reap(self) -> None:
+        """Give up runs on which more drivers have died than the retries allow."""
         most = max(self.task.limits.retries, 1)
         for index in [index for index in self.at_work if len(self.tried_by[index]) > most]:
-            if died := self.deserted(index):
+            if died := self.dead_owner(index):
                 self.give_up(index, f"{died} died, as did others at this run before: see log.txt there")
 
-    def deserted(self, index: int) -> str:
-        """Whose claim it is that is left on a run at which nobody works any more; empty if there is none."""
+    def dead_owner(self, index: int) -> str:
+        """Return the owner of a claim whose process has died; empty if there is none."""
         found = holder(self.task.jobs[index].folder.path)
         return str(found[1]) if found and is_over(*found) else ""
 
     def give_up(self, index: int, message: str) -> None:
         """Write that a run failed, so that no driver takes it up, unless one has already."""
         self.task.board.tell(OVER, index)
-        if self.deserted(index):
+        if self.dead_owner(index):
             self.end(index, give_up(self.task.jobs[index], message, again=True))
         else:
-            self.task.board.take_back(index)
+            self.task.board.clear_done(index)
 
-    def keep_up(self, alive: int) -> bool:
-        """Start drivers in the place of those that ended while runs are left; False if there is none any more."""
-        for fault in self.engine.faults():
-            if fault not in self.told:
-                self.told.add(fault)
+    def report(self, faults: list[str]) -> None:
+        """Note why drivers ended, each reason once."""
+        for fault in faults:
+            if fault not in self.reported:
+                self.reported.add(fault)
                 self.ledger.note(f"a driver ended: {fault}")
+
+    def scale(self, alive: int) -> bool:
+        """Start drivers in place of those that ended while runs are left; False if none is left and none starts."""
         missing = min(self.drivers, len(self.left)) - alive
         if missing <= 0:
             return True
@@ -213,19 +203,12 @@ class Follower:
             self.turn += 1
         return True
 
-    def wind_down(self, alive: int) -> bool:
-        """After a halt: whether to wait for runs to stop; the rest of the drivers is not waited for.
-
-        After Ctrl-C a run may take its time, since a second one ends it. The time of the batch is a limit.
-        """
-        return bool(alive and self.at_work) and self.halt.overdue < GRACE
-
     def sweep(self, asked: bool) -> None:
-        """Take what is in the folders of runs of which no news came; say what is missing."""
+        """Read the folders of runs without a message; note how many are missing."""
         for index in sorted(self.left):
-            found = standing(self.task.jobs[index])
+            found = inspect_run(self.task.jobs[index])
             fresh = found.stamp != self.task.jobs[index].outdated
-            if found.result and fresh and (index in self.at_work or not found.missing()):
+            if found.result and fresh and (index in self.at_work or not found.needs_work()):
                 self.end(index, found.result)
         if self.left and not asked:
             self.ledger.note(
@@ -233,19 +216,19 @@ class Follower:
                 "does the rest"
             )
 
-    def part(self) -> None:
-        """Let drivers that find nothing more end by themselves."""
+    def close(self) -> None:
+        """Wait a little for drivers that find nothing more to do."""
         self.task.board.stop(self.halt.reason)
         until = time.monotonic() + GRACE
-        while self.engine.alive() and time.monotonic() < until:
+        while self.engine.poll()[0] and time.monotonic() < until:
             time.sleep(TICK / 5)
 
 
 def outcome(job: Job) -> Result:
-    """What a run that is over has come to, as its folder says."""
-    found = standing(job)
+    """Return the result of a run that is over, from its folder."""
+    found = inspect_run(job)
     try:
-        if found.result is None and found.stands in (Stands.LOST, Stands.HALFWAY):
+        if found.result is None and found.state in (RunState.LOST, RunState.HALFWAY):
             return read_result(job.folder.path / RESULT)
     except files.FileError as error:
         return failure(job, str(error), again=True)

@@ -1,58 +1,56 @@
-"""What has come of the runs of a batch, and who is told of it."""
+"""The results of a batch so far, and the observer of what happens in it."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from symphys import files
+from symphys.results.file_names import RESULT
 from symphys.results.result import Result
 from symphys.results.table import write_table
 from symphys.runs.claim import owner
+from symphys.runs.inspection import file_stamp
 from symphys.runs.job import Job
 from symphys.solvers import TraceRow
 
+NOT_KEPT: Mapping[str, Any] = {
+    **{key: {} for key in ("z", "guess", "costs", "outputs", "counts", "price", "versions", "provenance")},
+    "stages": (),
+}
+"""Fields that a result loses in the memory of a batch; its folder has them."""
 
-class Observer(Protocol):
-    """Receives what happens to the runs of a batch."""
+
+class Observer:
+    """Receiver of what happens to the runs of a batch; subclasses override what they show."""
 
     def started(self, job: Job, resumed: bool) -> None:
-        """The run begins, or goes on."""
+        """Receive that a run starts or resumes."""
 
     def advanced(self, job: Job, row: TraceRow) -> None:
-        """The run has come to this iteration."""
-
-    def ended(self, job: Job, result: Result, skipped: bool) -> None:
-        """The run is over; ``skipped``: it was so before, or another command did it."""
-
-
-@runtime_checkable
-class JudgingObserver(Protocol):
-    """An observer that also receives what comes after the solver."""
+        """Receive an iteration of a run."""
 
     def judging(self, job: Job, what: str) -> None:
-        """The run's solver is done, and this part of judging what it found begins."""
+        """Receive that a part of judging begins, once the solver of a run is done."""
 
-
-@runtime_checkable
-class NotedObserver(Protocol):
-    """An observer that also receives what happens to the batch."""
+    def ended(self, job: Job, result: Result, skipped: bool) -> None:
+        """Receive the result of a run; ``skipped``: it was over before, or another command did it."""
 
     def note(self, text: str) -> None:
-        """Something that people should know."""
+        """Receive a message about the batch."""
 
 
 @dataclass
 class Ledger:
-    """Keeps the results by the index of their job, and passes on what happens.
+    """The results of a batch by the index of their job; passes on what happens to the observer.
 
     Attributes:
         jobs: all that were asked for.
-        results: one for each job, without what only its folder need hold; None until it is over.
+        results: one for each job, without fields that only its folder needs; None until it is over.
         begun: indices of the jobs that were begun here.
-        waited: whether it was said that only runs of other commands are left.
+        waited: whether it was reported that only runs of other commands are left.
     """
 
     jobs: Sequence[Job]
@@ -62,7 +60,7 @@ class Ledger:
     waited: bool = False
 
     def __post_init__(self) -> None:
-        """No job is done."""
+        """Start without results."""
         self.results = [None] * len(self.jobs)
 
     def skip(self, index: int, result: Result) -> None:
@@ -81,8 +79,7 @@ class Ledger:
 
     def judging(self, index: int, what: str) -> None:
         """Report that a part of judging a run begins, to an observer that takes it."""
-        if isinstance(self.observer, JudgingObserver):
-            self.observer.judging(self.jobs[index], what)
+        self.observer.judging(self.jobs[index], what)
 
     def ended(self, index: int, result: Result) -> None:
         """Keep a result and report it; a run that was not begun here was done by another command."""
@@ -108,18 +105,16 @@ class Ledger:
 
     def note(self, text: str) -> None:
         """Report what happens to the batch."""
-        if isinstance(self.observer, NotedObserver):
-            self.observer.note(text)
+        self.observer.note(text)
 
 
-NOT_KEPT: Mapping[str, Any] = {
-    **{key: {} for key in ("z", "guess", "costs", "outputs", "counts", "price", "versions", "provenance")},
-    "stages": (),
-}
-"""What a result is left without in the memory of a batch; its folder has it."""
+def retried(job: Job, why: str, ledger: Ledger) -> Job:
+    """Return the job for another try, in which the result in its folder does not count."""
+    ledger.note(f"{job.name}: tried again, as {why}")
+    return replace(job, outdated=file_stamp(job.folder.path / RESULT))
 
 
 def slim(result: Result) -> Result:
-    """A result without what nobody asks of a batch, so that ten thousand take little memory."""
+    """Return a result without the fields that a batch does not use, so that ten thousand take little memory."""
     trust = {} if result.accepted else result.trust
     return replace(result, **NOT_KEPT, trust=trust)

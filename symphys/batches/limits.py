@@ -1,4 +1,4 @@
-"""What bounds a batch: tries and time of a run, time of the whole; and why work is to stop."""
+"""The limits of a batch: tries and time of a run, time of the whole; and the halt that they cause."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from symphys.interrupts import Stop
 
 @dataclass(frozen=True)
 class BatchLimits:
-    """Bounds of a batch.
+    """Limits of a batch.
 
     Attributes:
         retries: how often a run that fails is tried again; one whose process dies is so at least once.
@@ -30,14 +30,14 @@ class BatchLimits:
 
 
 UNLIMITED = BatchLimits()
-"""Whatever it takes; no second try."""
+"""No limit of time; no second try."""
 
 
 class Halt:
-    """Whether, and why, runs are to stop where they can go on later."""
+    """The condition on which runs are to stop where they can resume."""
 
     def __init__(self, interrupted: Stop, budget: float = math.inf) -> None:
-        """``interrupted``: whether Ctrl-C was pressed; ``budget``: [s] from now."""
+        """Keep ``interrupted``, whether Ctrl-C was pressed, and ``budget`` [s] from this moment."""
         self.interrupted, self.budget = interrupted, budget
         self.began = monotonic()
 
@@ -48,7 +48,7 @@ class Halt:
 
     @property
     def overdue(self) -> float:
-        """[s] since the time of the batch was used up; 0 before."""
+        """Time [s] since the budget was used up; 0 until then."""
         return max(monotonic() - self.began - self.budget, 0.0)
 
     def __call__(self) -> bool:
@@ -57,12 +57,12 @@ class Halt:
 
     @property
     def reason(self) -> str:
-        """For the runs that it stops; empty after Ctrl-C, which needs no words."""
+        """The reason, for the results of stopped runs; empty after Ctrl-C."""
         if self.interrupted() or not self.spent:
             return ""
         return f"stopped as the {self.budget:g} s of the batch are used up; the same command goes on from here"
 
 
 def timed_out(timeout: float) -> str:
-    """Said of a run that was stopped."""
+    """Return the reason for a run that was stopped by its timeout."""
     return f"stopped after {timeout:g} s, its timeout; the same command goes on from here"

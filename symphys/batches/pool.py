@@ -1,62 +1,64 @@
-"""Runs side by side in worker processes. A process that dies concerns its own run only, and another takes its place.
+"""Runs side by side in worker processes. A process that dies costs its own run only, and another takes its place.
 
-Each worker has a pipe of its own: a queue that workers share stays locked for ever when one of them is killed in it.
+Each worker has a pipe of its own: a shared queue would stay locked forever when a worker is killed while it holds it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import multiprocessing
+import os
 import signal
+import subprocess
 import time
 from collections import Counter
 from collections.abc import Hashable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from multiprocessing import connection
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
+from pathlib import Path
 
 from symphys import threads
-from symphys.batches.ledger import Ledger
+from symphys.batches.ledger import Ledger, retried
 from symphys.batches.limits import BatchLimits, Halt, timed_out
-from symphys.batches.process_tree import end_tree
 from symphys.batches.queue import Queue
 from symphys.batches.worker import TICK, Begun, Ended, News, Order, Ready, Stopping, serve
 from symphys.interrupts import ignoring_interrupts
-from symphys.results.file_names import RESULT
 from symphys.results.result import Result
-from symphys.runs.execute import give_up, stop_at_limit
+from symphys.runs.execute import Transcribe, give_up, stop_at_limit
 from symphys.runs.job import Job
-from symphys.runs.standing import stamped
-from symphys.runs.transcription_cache import Transcribe
 from symphys.solvers import TraceRow
 
 GRACE = 1.0
-"""[s] that a run has to stop by itself after its time is up; then its process is killed, and its compilers with it."""
+"""[s] for a run to stop by itself after its timeout; then its process is killed, and its compilers with it."""
 BUILDING, SOLVING = "building and compiling", "solving"
-"""What a run is at before its first iteration and after it; the judging announces its parts."""
+"""The phases of a run before and after its first iteration; judging announces its own parts."""
+PS_TIMEOUT = 1.0
+"""[s] after which ``ps``, asked where there is no /proc, is not waited for."""
 MOST_STARTS = 3
-"""Workers that end before they are ready, one after the other, until no more are tried."""
+"""Workers in a row that end before they are ready, after which no more are tried."""
 
 
 class NoWorkers(Exception):
-    """Worker processes cannot be started; the text says what became of the last."""
+    """Raised where worker processes cannot be started; the text says how the last one ended."""
 
 
 @dataclass
-class Seat:
+class WorkerSlot:
     """A worker process, as the parent sees it.
 
     Attributes:
-        process, pipe: the worker, and the way to it.
-        ready: whether it takes runs.
-        index: of the job that it is at.
-        last: the subject that it has transcribed.
-        until: [s] when the time of its run is up.
-        doing: what its run is at.
+        process, pipe: the worker and the connection to it.
+        ready: whether it accepts runs.
+        index: of its job; None if it is idle.
+        last: the subject of its last transcription.
+        until: [s] the deadline of its run.
+        doing: the phase of its run.
         asked: whether its run was asked to stop.
-        why: which limit its run has reached, in words; empty for none.
-        ended: whether its process was killed for that.
+        why: the limit that its run has reached, in words; empty for none.
+        ended: whether its process was killed for it.
     """
 
     process: SpawnProcess
@@ -73,7 +75,7 @@ class Seat:
 
 @dataclass
 class Pool:
-    """Worker processes that do what a queue holds."""
+    """Worker processes that do the runs of a queue."""
 
     jobs: dict[int, Job]
     queue: Queue
@@ -82,12 +84,12 @@ class Pool:
     ledger: Ledger
     halt: Halt
     limits: BatchLimits
-    seats: list[Seat] = field(default_factory=list)
+    slots: list[WorkerSlot] = field(default_factory=list)
     tries: Counter[int] = field(default_factory=Counter)
     failed_starts: int = 0
 
     def run(self) -> None:
-        """Do all jobs, or as many as can be before a halt. NoWorkers where there can be none."""
+        """Do all jobs, or as many as a halt leaves time for; NoWorkers if no worker starts."""
         threads.limit()
         try:
             while self.working or (len(self.queue) and not self.halt()):
@@ -100,14 +102,14 @@ class Pool:
             self.close()
 
     @property
-    def working(self) -> list[Seat]:
-        """The workers that are at a run."""
-        return [seat for seat in self.seats if seat.index is not None]
+    def working(self) -> list[WorkerSlot]:
+        """The slots that have a run."""
+        return [slot for slot in self.slots if slot.index is not None]
 
     def fill(self) -> None:
-        """Start workers until there are enough for what is left."""
+        """Start workers until there are enough for the runs that are left."""
         wanted = min(self.count, len(self.queue) + len(self.working))
-        while len(self.seats) < wanted:
+        while len(self.slots) < wanted:
             context = multiprocessing.get_context("spawn")
             ours, theirs = context.Pipe()
             given = theirs, self.transcribe, self.limits.bounded
@@ -115,75 +117,75 @@ class Pool:
             with ignoring_interrupts():
                 process.start()
             theirs.close()
-            self.seats.append(Seat(process, ours))
+            self.slots.append(WorkerSlot(process, ours))
 
     def hand_out(self) -> None:
         """Give each idle worker a run."""
-        for seat in self.seats:
-            if not seat.ready or seat.index is not None:
+        for slot in self.slots:
+            if not slot.ready or slot.index is not None:
                 continue
-            index = self.queue.take(seat.last)
+            index = self.queue.take(slot.last)
             if index is None:
                 if not self.working:
                     self.ledger.wait_for(self.queue.claimed)
                 return
-            seat.index, seat.asked, seat.why, seat.doing = index, False, "", BUILDING
-            seat.until = time.monotonic() + self.limits.timeout
-            send(seat, (self.jobs[index],))
+            slot.index, slot.asked, slot.why, slot.doing = index, False, "", BUILDING
+            slot.until = time.monotonic() + self.limits.timeout
+            send(slot, (self.jobs[index],))
 
     def bound(self) -> None:
-        """Ask runs to stop whose time is up, or all of them at a halt; kill a process that a limit does not stop."""
+        """Ask runs to stop at a halt or timeout; kill a process that does not stop."""
         now, halt = time.monotonic(), self.halt()
-        for seat in self.working:
-            if not seat.asked and (halt or now > seat.until):
-                seat.asked, seat.why = True, self.halt.reason if halt else timed_out(self.limits.timeout)
-                seat.until = now + GRACE if seat.why else math.inf
-                send(seat, Stopping(seat.why))
-            elif seat.asked and now > seat.until and seat.process.pid and not seat.ended:
-                seat.ended = True
-                end_tree(seat.process.pid)
+        for slot in self.working:
+            if not slot.asked and (halt or now > slot.until):
+                slot.asked, slot.why = True, self.halt.reason if halt else timed_out(self.limits.timeout)
+                slot.until = now + GRACE if slot.why else math.inf
+                send(slot, Stopping(slot.why))
+            elif slot.asked and now > slot.until and slot.process.pid and not slot.ended:
+                slot.ended = True
+                end_tree(slot.process.pid)
 
     def listen(self) -> None:
-        """Wait for news, and take them."""
-        waited = connection.wait([each for seat in self.seats for each in (seat.pipe, seat.process.sentinel)], TICK)
-        if not self.seats:
+        """Wait for messages and read them."""
+        waited = connection.wait([each for slot in self.slots for each in (slot.pipe, slot.process.sentinel)], TICK)
+        if not self.slots:
             time.sleep(TICK)
-        for seat in list(self.seats):
-            if seat.pipe in waited or seat.process.sentinel in waited:
-                self.take_news(seat)
+        for slot in list(self.slots):
+            if slot.pipe in waited or slot.process.sentinel in waited:
+                self.take_news(slot)
 
-    def take_news(self, seat: Seat) -> None:
-        """Read what a worker has sent; of one that is dead, to the last word."""
-        dead = not seat.process.is_alive()
+    def take_news(self, slot: WorkerSlot) -> None:
+        """Read the messages of a worker; of a dead one, all that it has sent."""
+        dead = not slot.process.is_alive()
         try:
-            while seat.pipe.poll():
-                self.take(seat, seat.pipe.recv())
+            while slot.pipe.poll():
+                self.take(slot, slot.pipe.recv())
         except (EOFError, OSError):
             dead = True
         if dead:
-            self.bury(seat)
+            self.reap(slot)
 
-    def take(self, seat: Seat, news: News) -> None:
-        """Take one message."""
-        index = seat.index
+    def take(self, slot: WorkerSlot, news: News) -> None:
+        """Take one message of a worker."""
+        index = slot.index
         if isinstance(news, Ready):
-            seat.ready, self.failed_starts = True, 0
+            slot.ready, self.failed_starts = True, 0
         elif index is None:
             return
         elif isinstance(news, Begun):
             self.ledger.started(index, news.resumed)
         elif isinstance(news, TraceRow):
-            seat.doing = SOLVING
+            slot.doing = SOLVING
             self.ledger.advanced(index, news)
         elif isinstance(news, Ended):
-            seat.last, seat.index = self.queue.done(index), None
+            slot.last, slot.index = self.queue.done(index), None
             self.end(index, news.result)
         else:
-            seat.doing = news
+            slot.doing = news
             self.ledger.judging(index, news)
 
     def end(self, index: int, result: Result | None) -> None:
-        """A run has ended, or is another command's."""
+        """Record the result of a run; None: another command works on it."""
         if result is None:
             self.queue.put_off(index)
             return
@@ -194,56 +196,54 @@ class Pool:
             self.ledger.ended(index, result)
 
     def again(self, index: int, why: str) -> None:
-        """Let a run be tried once more."""
-        job = self.jobs[index]
-        self.jobs[index] = replace(job, outdated=stamped(job.folder.path / RESULT))
-        self.ledger.note(f"{job.name}: tried again, as {why}")
+        """Put a run back for another try."""
+        self.jobs[index] = retried(self.jobs[index], why, self.ledger)
         self.queue.put(index)
 
-    def bury(self, seat: Seat) -> None:
-        """A worker is dead; its run, if it had one, is tried again or given up."""
-        self.seats.remove(seat)
-        seat.process.join()
-        seat.pipe.close()
-        cause = cause_of(seat.process.exitcode)
-        if not seat.ready:
+    def reap(self, slot: WorkerSlot) -> None:
+        """Remove a dead worker; its run, if it had one, is tried again or given up."""
+        self.slots.remove(slot)
+        slot.process.join()
+        slot.pipe.close()
+        cause = cause_of(slot.process.exitcode)
+        if not slot.ready:
             self.failed_starts += 1
             if self.failed_starts >= MOST_STARTS:
                 raise NoWorkers(f"worker processes do not start: the last {cause}")
-        index = seat.index
+        index = slot.index
         if index is None:
             return
         self.queue.done(index)
         self.tries[index] += 1
         job = self.jobs[index]
-        if seat.ended:
-            self.ledger.ended(index, stop_at_limit(job, f"{seat.why} (it was at: {seat.doing})"))
+        if slot.ended:
+            self.ledger.ended(index, stop_at_limit(job, f"{slot.why} (it was at: {slot.doing})"))
         elif self.tries[index] <= max(self.limits.retries, 1) and not self.halt():
             self.again(index, f"its process {cause}")
-        elif not seat.asked:
+        elif not slot.asked:
             self.ledger.ended(index, give_up(job, f"the process of this run {cause}", again=True))
 
     def close(self) -> None:
-        """Let idle workers end, and end those that are not."""
-        for seat in self.seats:
-            seat.pipe.close()
-            if seat.index is not None or not seat.ready:
-                seat.process.terminate()
-        for seat in self.seats:
-            seat.process.join()
-        self.seats.clear()
+        """End all workers; idle ones end by themselves."""
+        for slot in self.slots:
+            slot.pipe.close()
+            if slot.index is not None or not slot.ready:
+                slot.process.terminate()
+        for slot in self.slots:
+            slot.process.join()
+        self.slots.clear()
 
 
-def send(seat: Seat, order: Order) -> None:
-    """Tell a worker; one that is dead is found out when it is listened to."""
+def send(slot: WorkerSlot, order: Order) -> None:
+    """Send an order to a worker; a dead worker is noticed when it is listened to."""
     try:
-        seat.pipe.send(order)
+        slot.pipe.send(order)
     except OSError:
         return
 
 
 def cause_of(code: int | None) -> str:
-    """How a process ended, in words."""
+    """Return how a process ended, in words."""
     if code is None or code >= 0:
         return f"died with exit code {code}: a crash in compiled code, or out of memory"
     try:
@@ -252,3 +252,44 @@ def cause_of(code: int | None) -> str:
         name = f"signal {-code}"
     hint = ": killed from outside, or out of memory" if name == "SIGKILL" else ": a crash in compiled code"
     return f"died of {name}{hint if name in ('SIGKILL', 'SIGSEGV', 'SIGABRT', 'SIGBUS', 'SIGILL', 'SIGFPE') else ''}"
+
+
+def end_tree(process: int) -> None:
+    """Kill a process and its descendants, all of which are halted first, so that none starts another meanwhile."""
+    found: list[int] = []
+    new = [process]
+    while new:
+        send_signal(new, "SIGSTOP")
+        found += new
+        parents = parents_by_process()
+        new = [each for each, parent in parents.items() if parent in found and each not in found]
+    send_signal(found, "SIGKILL")
+
+
+def send_signal(processes: list[int], name: str) -> None:
+    """Send a signal by its name; Windows can only end a process, not halt it."""
+    number = getattr(signal, name, None)
+    for process in processes:
+        with contextlib.suppress(OSError):
+            if number is not None:
+                os.kill(process, number)
+            elif name == "SIGKILL":
+                os.kill(process, signal.SIGTERM)
+
+
+def parents_by_process() -> dict[int, int]:
+    """Return the parent of every visible process of this machine; empty where the system does not list them."""
+    found: dict[int, int] = {}
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            text = entry.read_text(encoding="utf-8", errors="replace")
+            found[int(entry.parent.name)] = int(text.rpartition(")")[2].split()[1])
+    if found:
+        return found
+    try:
+        command = ["ps", "-A", "-o", "pid=,ppid="]
+        listed = subprocess.run(command, capture_output=True, text=True, timeout=PS_TIMEOUT, check=False).stdout
+    except (OSError, subprocess.SubprocessError):
+        return {}
+    pairs = [line.split() for line in listed.splitlines()]
+    return {int(pair[0]): int(pair[1]) for pair in pairs if len(pair) == 2 and all(map(str.isdigit, pair))}

@@ -1,4 +1,4 @@
-"""The runs of a batch that are left, and which of them is next."""
+"""The queue of the runs of a batch that are left."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ LOOK = 1.0
 
 
 class Queue:
-    """Runs that wait, by what they are of, and runs that other commands have claimed.
+    """Waiting runs by their subject, and runs that other commands have claimed.
 
-    Whoever has built a problem file gets more of its runs, points of a sweep too; who has not, those of a file that
-    nobody is at. So a problem is built and compiled by one while the others do something else, as long as there is
-    something else.
+    A worker that has built a problem file gets more of its runs, points of a sweep too; other workers get those of a
+    file that nobody works on. So one worker compiles a problem while the others do something else, if there is any.
     """
 
     def __init__(self, jobs: Mapping[int, Job]) -> None:
-        """All wait, in the order that is given."""
+        """Start with all jobs waiting, in the order given."""
         self.jobs = jobs
         self.waiting: dict[Hashable, deque[int]] = {}
         self.claimed: dict[int, float] = {}
@@ -31,19 +30,19 @@ class Queue:
             self.put(index)
 
     def __len__(self) -> int:
-        """How many are left that nobody here works on."""
+        """Return how many runs are left that nobody here works on."""
         return sum(map(len, self.waiting.values())) + len(self.claimed)
 
     def put(self, index: int) -> None:
-        """Let a run wait behind the others of its kind."""
+        """Put a run behind the others of its subject."""
         self.waiting.setdefault(self.subjects[index], deque()).append(index)
 
     def put_off(self, index: int) -> None:
-        """Another command has claimed it: look again in a while whether it is over."""
+        """Keep a run that another command has claimed, to look again whether it is over."""
         self.claimed[index] = monotonic() + LOOK
 
     def take(self, last: Hashable = None) -> int | None:
-        """The next run for whoever did one of the subject ``last``; None if there is none for now."""
+        """Return the next run for a worker whose last subject was ``last``; None if there is none for the moment."""
         now = monotonic()
         for index in [index for index, due in self.claimed.items() if due <= now]:
             del self.claimed[index]
@@ -58,21 +57,21 @@ class Queue:
         return index
 
     def choose(self, last: Hashable) -> Hashable | None:
-        """The subject of which the next run is."""
+        """Return the subject of the next run."""
         if last in self.waiting:
             return last
         free = (subject for subject in self.waiting if not self.at_work[subject])
         return next(free, next(iter(self.waiting), None))
 
     def remove(self, index: int) -> None:
-        """It is done."""
+        """Take out a waiting run that is done."""
         subject = self.subjects[index]
         self.waiting[subject].remove(index)
         if not self.waiting[subject]:
             del self.waiting[subject]
 
     def done(self, index: int) -> Hashable:
-        """Nobody works on it any more; its subject."""
+        """Note that nobody works on a run any more, and return its subject."""
         subject = self.subjects[index]
         self.at_work[subject] -= 1
         return subject

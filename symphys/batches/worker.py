@@ -1,4 +1,4 @@
-"""What a worker process does: runs, one after the other, as its parent sends them."""
+"""The worker process: it does runs, one after the other, as its parent sends them."""
 
 from __future__ import annotations
 
@@ -11,50 +11,49 @@ from multiprocessing.connection import Connection
 
 from symphys.results.result import Result
 from symphys.runs.claim import FolderBusy
-from symphys.runs.execute import execute
+from symphys.runs.execute import Transcribe, TranscriptionCache, execute
 from symphys.runs.job import Job
-from symphys.runs.transcription_cache import Transcribe, TranscriptionCache
 from symphys.solvers import TraceRow
 
 TICK = 0.1
-"""[s] between two iterations that are reported."""
+"""[s] between two reported iterations."""
 
 
 @dataclass(frozen=True)
 class Ready:
-    """The process has started and waits for a run."""
+    """Message of a worker that has started and accepts runs."""
 
 
 @dataclass(frozen=True)
 class Begun:
-    """The run begins, or goes on."""
+    """Message that a run starts or resumes."""
 
     resumed: bool
 
 
 @dataclass(frozen=True)
 class Ended:
-    """The run is over; None: another command is at it."""
+    """Message that a run is over; None: another command works on it."""
 
     result: Result | None
 
 
 @dataclass(frozen=True)
 class Stopping:
-    """The run is to stop where it can go on; the text says why."""
+    """Order to stop the run where it can resume; the text is the reason."""
 
     reason: str
 
 
 News = Ready | Begun | Ended | TraceRow | str
-"""From a worker; a text is a part of judging that begins."""
+"""Messages of a worker; a text announces a part of judging."""
 Order = tuple[Job] | Stopping
-"""To a worker: a run, or that it is to stop."""
+"""Orders to a worker: a run, or to stop."""
 
 
 @dataclass
 class Worker:
-    """A worker process and the run that it is at; ``bounded``: whether a limit may kill it."""
+    """A worker process and its run; ``bounded``: whether a limit may kill it."""
 
     parent: Connection[News, Order]
     transcriptions: TranscriptionCache
@@ -62,7 +61,7 @@ class Worker:
     reported: float = field(default=0.0)
 
     def serve(self) -> None:
-        """Do what the parent sends, until it closes the connection."""
+        """Do what the parent orders, until it closes the connection."""
         self.parent.send(Ready())
         while True:
             try:
@@ -87,8 +86,8 @@ class Worker:
             return None
 
     def watch(self, row: TraceRow) -> None:
-        """Report to the parent now and then; stop the solver when asked to."""
-        while (order := self.hear()) is not None:
+        """Report to the parent at intervals; stop the solver when ordered to."""
+        while (order := self.receive()) is not None:
             if isinstance(order, Stopping):
                 raise KeyboardInterrupt(order.reason)
         now = time.monotonic()
@@ -96,15 +95,15 @@ class Worker:
             self.reported = now
             self.tell(row)
 
-    def hear(self) -> Order | None:
-        """What the parent has sent; None if there is nothing. Without a parent the process ends, its run unwritten."""
+    def receive(self) -> Order | None:
+        """Return the next order of the parent, or None. Without a parent the process ends, its run unwritten."""
         try:
             return self.parent.recv() if self.parent.poll() else None
         except (EOFError, OSError):
             os._exit(1)
 
     def tell(self, news: News) -> None:
-        """Send news; likewise."""
+        """Send a message; without a parent the process ends."""
         try:
             self.parent.send(news)
         except OSError:
@@ -112,13 +111,13 @@ class Worker:
 
 
 def serve(parent: Connection[News, Order], transcribe: Transcribe, bounded: bool = False) -> None:
-    """The life of a worker process; it ends with its parent. ``bounded``: see ``Worker``."""
+    """Run a worker process until its parent ends. ``bounded``: see ``Worker``."""
     threading.Thread(target=end_with_parent, daemon=True).start()
     Worker(parent, TranscriptionCache(transcribe), bounded).serve()
 
 
 def end_with_parent() -> None:
-    """Wait for the parent's end; a parent that was killed cannot stop its workers."""
+    """Wait for the end of the parent and exit, since a killed parent cannot stop its workers."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -1,4 +1,4 @@
-"""The group of commands, and what an error looks like: one message, an exit code, no traceback."""
+"""The group of commands, with errors as one message and an exit code, without a traceback."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from typing import Any
 
 import click
 
+from symphys.cli.arguments import INTERRUPTED
+from symphys.cli.best import best
 from symphys.cli.cache import cache
 from symphys.cli.check import check
+from symphys.cli.diff import diff
 from symphys.cli.doctor import doctor
 from symphys.cli.export import export
-from symphys.cli.finding.best import best
-from symphys.cli.finding.diff import diff
-from symphys.cli.finding.ls import ls
-from symphys.cli.finding.replay import replay
-from symphys.cli.recordings.identify import identify
+from symphys.cli.identify import identify
+from symphys.cli.importing import import_robot
+from symphys.cli.ls import ls
+from symphys.cli.mpc import mpc
+from symphys.cli.replay import replay
 from symphys.cli.report import report
-from symphys.cli.robots.importing import import_robot
-from symphys.cli.robots.mpc import mpc
 from symphys.cli.schema import schema
 from symphys.cli.shipped import listing, new
 from symphys.cli.show import show
@@ -31,29 +32,8 @@ from symphys.errors import SymphysError
 from symphys.suggest import hint
 from symphys.version import __version__
 
-SOLVED, WRONG, INTERRUPTED, UNREAD = 0, 2, 130, 141
-"""Interrupted is 128 and the number of SIGINT; output that nobody reads is 128 and the number of SIGPIPE."""
-
-
-class Commands(click.Group):
-    """A group that suggests what an unknown command may have meant."""
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command; UsageError with the nearest if there is none."""
-        name = args[0]
-        if name not in self.commands and not name.startswith("-"):
-            raise click.UsageError(f"no such command {name!r}; {hint(name, self.commands)}", ctx)
-        return super().resolve_command(ctx, args)
-
-
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="symphys", message="%(prog)s %(version)s")
-def app() -> None:
-    """Trajectory optimisation through contact: a problem file in, a solution and a report out."""
-
-
+SOLVED, WRONG, UNREAD = 0, 2, 141
+"""Exit codes; UNREAD is 128 + SIGPIPE, for output that nobody reads."""
 COMMANDS = (
     new,
     solve,
@@ -73,12 +53,33 @@ COMMANDS = (
     doctor,
     cache,
 )
+
+
+class Commands(click.Group):
+    """A group that suggests the nearest command for an unknown one."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command; UsageError with the nearest name if it does not exist."""
+        name = args[0]
+        if name not in self.commands and not name.startswith("-"):
+            raise click.UsageError(f"no such command {name!r}; {hint(name, self.commands)}", ctx)
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="symphys", message="%(prog)s %(version)s")
+def app() -> None:
+    """Trajectory optimisation through contact: a problem file in, a solution and a report out."""
+
+
 for command in COMMANDS:
     app.add_command(command)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line; the exit code.
+    """Run a command line and return the exit code.
 
     0: every run solved, or found its best where there is nothing to meet; 1: some run not solved, not to be trusted, or
     failed, or a gradient that is wrong; 2: wrong usage or problem file;
@@ -99,7 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def run(arguments: Sequence[str] | None) -> int:
-    """Run a command, and say what is wrong; the exit code. BrokenPipeError if nobody reads what it says."""
+    """Run a command and report errors; return the exit code. BrokenPipeError if nobody reads the output."""
     try:
         return int(app.main(args=arguments, prog_name="symphys", standalone_mode=False) or SOLVED)
     except click.ClickException as error:
@@ -119,10 +120,10 @@ def run(arguments: Sequence[str] | None) -> int:
 
 
 class LossyFile(io.RawIOBase):
-    """A file of messages: what a full disk does not take is lost, so that no message ends the work that it is about."""
+    """A file of messages that loses what a full disk does not take, so that no message ends the work it reports."""
 
     def __init__(self, raw: io.FileIO) -> None:
-        """``raw``: where it goes; it stays open."""
+        """Write to ``raw``, which stays open."""
         self.raw = raw
 
     def write(self, text: Any) -> int:
@@ -135,11 +136,11 @@ class LossyFile(io.RawIOBase):
             return len(text)
 
     def writable(self) -> bool:
-        """It is."""
+        """Whether it can be written: always."""
         return True
 
     def fileno(self) -> int:
-        """Of the file."""
+        """Return the descriptor of the file."""
         return self.raw.fileno()
 
     def isatty(self) -> bool:
@@ -148,14 +149,14 @@ class LossyFile(io.RawIOBase):
 
 
 def file_of(stream: Any) -> io.FileIO | None:
-    """The file that an output writes to; None if it is none, as in tests."""
+    """Return the file that an output writes to; None if there is none, as in tests."""
     buffer = getattr(stream, "buffer", None)
     raw = getattr(buffer, "raw", buffer)
     return raw if isinstance(raw, io.FileIO) else None
 
 
 def prepare(opened: contextlib.ExitStack) -> None:
-    """Let outputs take every name, and nothing go wrong where one was closed before the start (``>&-``)."""
+    """Let outputs take every name, and replace those that were closed before the start (``>&-``)."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
@@ -171,7 +172,7 @@ def prepare(opened: contextlib.ExitStack) -> None:
 
 
 def close_quietly() -> None:
-    """The reader of an output has gone: print nothing more to it, not even at exit."""
+    """Print nothing more to outputs whose reader has gone, not even at exit."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

@@ -19,32 +19,44 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 REPORTS = Path("reports")
-MOST_TOLD = 100
-"""How often at most the reading of a sweep is told of."""
+INTERRUPTED = 130
+"""The exit code after Ctrl-C: 128 + SIGINT."""
+MOST_MESSAGES = 100
+"""Most progress messages while a sweep is read."""
+settings_option = click.option(
+    "--set",
+    "assignments",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Change a value of the problem file: simulation.dt=0.005, solver.cma.evaluations=2000. Repeatable.",
+)
+out_option = click.option(
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=REPORTS,
+    show_default=True,
+    help="Folder for what is written.",
+)
 
 
 class UsageFault(SymphysError):
-    """An argument that cannot be used."""
+    """Raised for an argument that cannot be used."""
 
 
 def complete_problem(_context: click.Context, _argument: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Shipped problems, robots and tasks, and TOML files, whose names begin so; where there is none, any path."""
+    """Complete shipped problems, robots and tasks, and TOML files; where there are none, any path."""
     from symphys import problems
 
     folder = Path(begun) if begun.endswith("/") else Path(begun).parent
     entries = sorted(folder.iterdir()) if folder.is_dir() else []
-    there = [f"{entry}/" if entry.is_dir() else str(entry) for entry in entries if is_problem_or_folder(entry)]
+    offered = [each for each in entries if each.suffix == ".toml" or (each.is_dir() and each.name[0] != ".")]
+    there = [f"{entry}/" if entry.is_dir() else str(entry) for entry in offered]
     found = [name for name in (*problems.catalogue(), *problems.parts(), *there) if name.startswith(begun)]
     return [CompletionItem(name) for name in found] or [CompletionItem(begun, type="file")]
 
 
-def is_problem_or_folder(path: Path) -> bool:
-    """Whether it may be, or hold, a problem file."""
-    return path.suffix == ".toml" or (path.is_dir() and not path.name.startswith("."))
-
-
 def complete_solvers(_context: click.Context, _option: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Names of solvers after those that a comma ends."""
+    """Complete the last of the names of solvers, which commas separate."""
     from symphys.solvers import SOLVERS
 
     before, comma, last = begun.rpartition(",")
@@ -52,25 +64,14 @@ def complete_solvers(_context: click.Context, _option: click.Parameter, begun: s
 
 
 def complete_backend(_context: click.Context, _option: click.Parameter, begun: str) -> list[CompletionItem]:
-    """Names of backends."""
+    """Complete the name of a backend."""
     from symphys.codegen.backends import NAMES
 
     return [CompletionItem(name) for name in NAMES if name.startswith(begun)]
 
 
-def settings_option(command: F) -> F:
-    """``--set KEY=VALUE``, as often as you like."""
-    return click.option(
-        "--set",
-        "assignments",
-        multiple=True,
-        metavar="KEY=VALUE",
-        help="Change a value of the problem file: simulation.dt=0.005, solver.cma.evaluations=2000. Repeatable.",
-    )(command)
-
-
 def sweep_options(command: F) -> F:
-    """``--sweep KEY=VALUES``, as often as you like, and ``--samples KIND:COUNT``."""
+    """Add ``--sweep KEY=VALUES``, which is repeatable, and ``--samples KIND:COUNT``."""
     sweep = click.option(
         "--sweep",
         "sweeps",
@@ -88,21 +89,19 @@ def sweep_options(command: F) -> F:
     return sweep(samples(command))
 
 
-def backend_option(command: F) -> F:
-    """``--backend NAME``."""
-    return click.option(
-        "--backend",
-        default="auto",
-        show_default=True,
-        metavar="auto|casadi|c|simd|simd32|cuda|cuda32",
-        shell_complete=complete_backend,
-        help="What evaluates: SIMD kernels (simd32: in single precision), casadi's C (all need a C compiler), a GPU "
-        "(cuda32: in single precision; needs the extra symphys[cuda]), or casadi's virtual machine.",
-    )(command)
+backend_option = click.option(
+    "--backend",
+    default="auto",
+    show_default=True,
+    metavar="auto|casadi|c|simd|simd32|cuda|cuda32",
+    shell_complete=complete_backend,
+    help="What evaluates: SIMD kernels (simd32: in single precision), casadi's C (all need a C compiler), a GPU "
+    "(cuda32: in single precision; needs the extra symphys[cuda]), or casadi's virtual machine.",
+)
 
 
 def read_backend(name: str) -> str:
-    """The name, if it is one."""
+    """Return the name of a backend; UsageFault if there is none of that name."""
     from symphys.codegen.backends import NAMES
 
     if name not in NAMES:
@@ -110,19 +109,8 @@ def read_backend(name: str) -> str:
     return name
 
 
-def out_option(command: F) -> F:
-    """``--out DIR``."""
-    return click.option(
-        "--out",
-        type=click.Path(path_type=Path, file_okay=False),
-        default=REPORTS,
-        show_default=True,
-        help="Folder for what is written.",
-    )(command)
-
-
 def read_settings(assignments: Iterable[str]) -> dict[str, object]:
-    """``KEY=VALUE`` pairs by key; a value is read as TOML, and as plain text where it is none."""
+    """Read ``KEY=VALUE`` pairs; a value is TOML, or plain text if it is not valid TOML."""
     from symphys.problem.reading.value_texts import read_value
 
     settings: dict[str, object] = {}
@@ -135,7 +123,7 @@ def read_settings(assignments: Iterable[str]) -> dict[str, object]:
 
 
 def read_problems(sources: Sequence[str], settings: dict[str, object]) -> list[Problem]:
-    """The problems in files or under shipped names, each once; two of one name would share their run folders."""
+    """Read each problem once, from files or under shipped names; two of one name would share run folders."""
     from symphys.problem import load_problem
 
     paths = list(dict.fromkeys(problem_path(source) for source in sources))
@@ -151,7 +139,7 @@ def read_problems(sources: Sequence[str], settings: dict[str, object]) -> list[P
 def read_sweeps(
     problems: Iterable[Problem], sweeps: Sequence[str], samples: str | None
 ) -> list[tuple[Problem, Sweep | None]]:
-    """The problems, each with what is swept of it, as its file says, --sweep and --samples; None for nothing."""
+    """Return each problem with its sweep, from its file, --sweep and --samples; None without a sweep."""
     from symphys.problem.sweeps.points import combined
     from symphys.problem.sweeps.texts import read_axes, read_samples
 
@@ -168,13 +156,13 @@ def read_sweeps(
 def points_of(
     found: Sequence[tuple[Problem, Sweep | None]], working: Callable[..., AbstractContextManager[Callable[[str], None]]]
 ) -> Iterator[Problem]:
-    """Every problem, and each point of those that are swept, validated one by one; ``working`` shows how far it is."""
+    """Yield each problem, or each point of its sweep, validated one by one; ``working`` shows the progress."""
     from symphys.problem.sweeps.points import swept
 
     count = sum(len(sweep) for _, sweep in found if sweep is not None)
     seen = 0
-    shown = {f"point {k + 1:,} of {count:,}": 1.0 for k in range(0, count, max(count // MOST_TOLD, 1))}
-    with working("checking the sweep", shown) if count > MOST_TOLD else nullcontext(str) as tell:
+    shown = {f"point {k + 1:,} of {count:,}": 1.0 for k in range(0, count, max(count // MOST_MESSAGES, 1))}
+    with working("checking the sweep", shown) if count > MOST_MESSAGES else nullcontext(str) as tell:
         for problem, sweep in found:
             for point in [problem] if sweep is None else swept(problem, sweep):
                 yield point
@@ -184,7 +172,7 @@ def points_of(
 
 
 def problem_path(source: str) -> Path:
-    """A file, or a shipped problem by its name, which a folder of that name does not hide."""
+    """Return the path of a file, or of a shipped problem, which a folder of its name does not hide."""
     from symphys import problems
 
     shipped = problems.catalogue()
@@ -194,7 +182,7 @@ def problem_path(source: str) -> Path:
 
 
 def read_solvers(text: str | None) -> tuple[str, ...] | None:
-    """Names, separated by commas, each once; None, for those that each problem is for, if nothing is asked for."""
+    """Read names separated by commas, each once; None, for the solvers of each problem, if none are given."""
     from symphys.solvers import SOLVERS
 
     if text is None:

@@ -13,13 +13,11 @@ from symphys.findings.writing import several
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from symphys.cli.examined import Examined
     from symphys.problem import Constraint, Cost, Problem, Target
     from symphys.transcription import Transcription
-    from symphys.verification.examination import Tell
 
 BUILDING, BUILDING_TAKES = "building the problem", 8.0
-"""What comes before an examination, and about how long it takes beside the parts of that."""
+"""The part before an examination, and about how long it takes relative to the examination's parts."""
 
 
 @click.command()
@@ -37,13 +35,13 @@ def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int
 
     Exit code 1: the gradient disagrees with differences, or something is not finite.
     """
-    from symphys.cli.examined import print_examined
+    from symphys.cli.examined import Examined, print_examined
     from symphys.cli.watching import working
     from symphys.problem import require_solvable
     from symphys.runs import check_tables
     from symphys.trajectory import NotFinite
     from symphys.transcription import transcribe
-    from symphys.verification.examination import PARTS
+    from symphys.verification.examination import PARTS, examine
 
     (problem,) = read_problems([source], read_settings(assignments))
     check_tables(problem)
@@ -57,7 +55,7 @@ def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int
             tell(BUILDING)
             transcription = transcribe(problem, backend="casadi")
             z = transcription.shooting.start(0) if folder is None else found(folder, transcription)
-            examined = look(transcription, z, tell)
+            examined = Examined.of(transcription.judge(z), examine(transcription, z, tell))
     except NotFinite as error:
         click.echo(f"\n{error}")
         return 1
@@ -65,35 +63,20 @@ def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int
     return 1 if examined.wrong else 0
 
 
-def look(transcription: Transcription, z: NDArray[Any], tell: Tell) -> Examined:
-    """Examine ``z``; ``tell`` as in ``examine``."""
-    from symphys.cli.examined import Examined
-    from symphys.verification import examine
-
-    return Examined.of(transcription.judge(z), examine(transcription, z, tell))
-
-
 def found(folder: Path, transcription: Transcription) -> NDArray[Any]:
-    """(n,) what a run found; UsageFault where it is no run of this problem."""
-    import numpy as np
-
+    """Return the decision vector (n,) that a run found; UsageFault if it is no run of this problem."""
     from symphys.runs import read_result
+    from symphys.runs.replay import ReplayError, stored_variables
 
-    known, parts = read_result(folder / "result.json").z, []
-    for block in transcription.shooting.blocks:
-        size = block.stop - block.start
-        values = known[block.name].value.T.ravel() if block.name in known else np.zeros(0)
-        if values.size != size:
-            raise UsageFault(
-                f"--at {folder}: this run found {values.size} numbers for variable {block.name!r}, the problem has "
-                f"{size}; give a folder that `symphys solve` wrote for this file, and the same --set"
-            )
-        parts.append(values)
-    return np.concatenate(parts)
+    try:
+        return stored_variables(read_result(folder / "result.json"), transcription)
+    except ReplayError as error:
+        text = f"{error}; give a folder that `symphys solve` wrote for this file, and the same --set"
+        raise UsageFault(f"--at {folder}: {text}") from None
 
 
 def describe(problem: Problem) -> list[str]:
-    """What the file contains, in lines."""
+    """Return the contents of the file, in lines."""
     from symphys.problem import set_quantities
     from symphys.problem.recordings.summary import recording_lines
 
@@ -118,7 +101,9 @@ def describe(problem: Problem) -> list[str]:
     for kind, things in (("cost", problem.costs), ("target", problem.targets), ("constraint", problem.constraints)):
         for thing in things:
             formula = " ".join(thing.formula.text.split())
-            lines.append(f"  {kind:<12} {thing.name}: {formula} ({moment(thing)}{in_unit(thing)})")
+            unit = getattr(thing, "unit", "")
+            when = moment(thing) + (f", in {unit}" if unit else "")
+            lines.append(f"  {kind:<12} {thing.name}: {formula} ({when})")
     if problem.termination is not None:
         lines.append(f"  over         where {' '.join(problem.termination.margin.text.split())} < 0")
     if problem.scenarios is not None:
@@ -129,7 +114,7 @@ def describe(problem: Problem) -> list[str]:
 
 
 def solvers_of(problem: Problem) -> list[str]:
-    """Which solvers it gets, and why, in lines."""
+    """Return the solvers of a problem and the reasons for them, in lines."""
     from symphys.runs.choice import chosen
 
     if problem.solvers:
@@ -139,18 +124,12 @@ def solvers_of(problem: Problem) -> list[str]:
 
 
 def listed(names: Any) -> str:
-    """Names with commas."""
+    """Join names with commas."""
     return ", ".join(names) or "none"
 
 
-def in_unit(thing: Cost | Target | Constraint) -> str:
-    """The unit of what is asked for, as far as it is known."""
-    unit = getattr(thing, "unit", "")
-    return f", in {unit}" if unit else ""
-
-
 def moment(thing: Cost | Target | Constraint) -> str:
-    """When something is looked at."""
+    """Return when a cost, target or constraint is evaluated."""
     during = getattr(thing, "during", None)
     if during is not None:
         return f"during {during.name}"
@@ -158,7 +137,7 @@ def moment(thing: Cost | Target | Constraint) -> str:
 
 
 def given(problem: Problem) -> list[str]:
-    """What acts by formulas, what is given over time, and how the motion is divided, in lines."""
+    """Return force laws, references and phases, in lines."""
     lines = []
     for law in problem.forces:
         acted = " against ".join(name for name, _, _ in law.acts_on)

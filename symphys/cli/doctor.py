@@ -1,4 +1,4 @@
-"""``symphys doctor``: what is there, and does it work?"""
+"""``symphys doctor``: check compilers, GPUs and packages of this machine."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ WORDS = {text: COLOURS[level] for words in (MARKS, VERDICTS) for level, text in 
 
 
 def print_examined(examined: Examined) -> None:
-    """Print it."""
+    """Print tables, findings and advice."""
     trust, judged = examined.trust, examined.judged
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
     if first := of_influence(trust):
@@ -39,7 +39,7 @@ def print_examined(examined: Examined) -> None:
 
 
 def print_table(console: Console, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table; verdicts, whose column has no title, are kept in one line."""
+    """Print a table; verdicts, whose column has no title, are not wrapped."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for title in header:
         table.add_column(title, no_wrap=not title, overflow="fold")
@@ -49,5 +49,5 @@ def print_table(console: Console, header: Sequence[str], rows: Sequence[Sequence
 
 
 def printable(text: str, console: Console) -> str:
-    """The text without what the terminal cannot show."""
+    """Replace characters that the terminal cannot show."""
     return text.encode(console.encoding, "replace").decode(console.encoding)

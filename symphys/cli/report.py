@@ -1,11 +1,10 @@
-"""``symphys report``, and how commands make pages: their options, their progress, and what is said of failures."""
+"""``symphys report``, and how commands make pages: options, progress and messages on failures."""
 
 from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from symphys import threads
+from symphys.cli.wording import percent, time_words
 from symphys.findings.writing import several
 
 if TYPE_CHECKING:
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 MOST_JOBS = 256
 MOST_PRINTED = 50
-"""Pages of runs are printed one by one up to so many."""
+"""Number of pages up to which each is printed."""
 UNDRAWN = 3
 """The exit code where a page could not be made."""
 MOST_NAMED = 20
-"""The same of pages that failed."""
+"""Number of failed pages that are named."""
 
 pages_option = click.option(
     "--pages",
@@ -83,12 +83,13 @@ def report(folder: Path, pages: str, remake: bool, new: bool, jobs: int | None) 
 
 
 def make_shown(wanted: WantedPages, kind: str, jobs: int, silent: bool = False, limit: float = math.inf) -> MadePages:
-    """Make pages, say how far it is unless ``silent``, and name those that could not be made."""
+    """Make pages, show the progress unless ``silent``, and report those that could not be made."""
+    from symphys.cli.watching.heartbeat import live_line
     from symphys.report import make_pages
 
     progress = PageProgress(len(wanted.runs))
     try:
-        with nullcontext() if silent else shown(progress):
+        with nullcontext() if silent else live_line("reports", progress.words):
             made = make_pages(wanted, kind, jobs, progress.tell, limit)
     except KeyboardInterrupt:
         again = shlex.join(["symphys", "report", str(wanted.root)])
@@ -101,39 +102,19 @@ def make_shown(wanted: WantedPages, kind: str, jobs: int, silent: bool = False, 
     return made
 
 
-@contextmanager
-def shown(progress: PageProgress) -> Iterator[None]:
-    """Show how many pages are made; on a terminal by a live line, elsewhere by one every few seconds."""
-    from rich.console import Console
-    from rich.text import Text
-
-    from symphys.cli.watching.heartbeat import EVERY, TICK, heartbeat
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        with heartbeat(lambda: click.echo(f"reports: {progress.words()}", err=True), EVERY):
-            yield
-        return
-    with console.status("") as status, heartbeat(lambda: status.update(Text(progress.words())), TICK):
-        yield
-
-
 class PageProgress:
-    """How many pages of runs are made, and how long the rest takes."""
+    """The progress of making pages of runs, with the time that is left."""
 
     def __init__(self, runs: int) -> None:
-        """None is made."""
+        """Start with no page made."""
         self.runs, self.over, self.began = runs, 0, monotonic()
 
     def tell(self, over: int) -> None:
-        """So many are made by now."""
+        """Set how many pages are made."""
         self.over = over
 
     def words(self) -> str:
-        """In a line."""
-        from symphys.cli.watching.words import percent
-        from symphys.cli.wording import time_words
-
+        """Return the progress as a line."""
         if self.over == self.runs:
             return "page of all runs"
         text = f"{self.over} of {self.runs} pages of runs, {percent(self.over / self.runs)}"

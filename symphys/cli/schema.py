@@ -1,4 +1,4 @@
-"""``symphys schema``: what a problem file may hold, for editors and for readers."""
+"""``symphys schema``: the schema of problem files, for editors and for readers."""
 
 from __future__ import annotations
 

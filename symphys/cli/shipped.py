@@ -1,4 +1,4 @@
-"""``symphys list`` and ``symphys new``: what is shipped, and copies of it to begin with."""
+"""``symphys list`` and ``symphys new``: the shipped problems, and copies of them."""
 
 from __future__ import annotations
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import re
 import shlex
 import sys
 from collections.abc import Callable, Mapping
@@ -15,6 +17,8 @@ import click
 
 from symphys import files, threads
 from symphys.cli.arguments import (
+    INTERRUPTED,
+    UsageFault,
     backend_option,
     complete_problem,
     complete_solvers,
@@ -28,22 +32,35 @@ from symphys.cli.arguments import (
     settings_option,
     sweep_options,
 )
-from symphys.cli.batch_options import BatchOptions, batch_options
 from symphys.cli.report import UNDRAWN, make_shown, pages_option
 from symphys.cli.wording import duration, many_pairs
 
 if TYPE_CHECKING:
     from symphys.batches import BatchResult
-    from symphys.cli.watching.choice import Shown
+    from symphys.cli.watching.observers import Shown
     from symphys.problem import Problem
     from symphys.report.making.batch import MadePages
     from symphys.runs import Job
 
-MOST_SEEDS = 10_000
-MOST_JOBS = 256
-INTERRUPTED = 130
-LEAST_PAGE = 60.0
-"""[s] that a page may take at least where runs have a timeout."""
+UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+"""[s] of each unit."""
+MOST_RETRIES, MOST_SEEDS, MOST_JOBS = 1000, 10_000, 256
+MIN_PAGE_TIMEOUT = 60.0
+"""[s] Least timeout of a page where runs have a timeout."""
+
+
+def read_time(_context: click.Context | None, option: click.Parameter, text: str | None) -> float:
+    """Return the seconds of a time such as 90, 10min or 2h; inf for None; UsageFault for anything else."""
+    if text is None:
+        return math.inf
+    found = re.fullmatch(r"\s*([0-9.]+)\s*([a-z]*)\s*", text)
+    try:
+        seconds = float(found[1]) * UNITS[found[2]] if found else 0.0
+    except (ValueError, KeyError):
+        seconds = 0.0
+    if not seconds > 0:
+        raise UsageFault(f"{option.opts[0]} {text!r}: write a time above 0, such as 90, 90s, 10min, 2h or 1d")
+    return seconds
 
 
 @click.command()
@@ -97,7 +114,43 @@ LEAST_PAGE = 60.0
 @pages_option
 @backend_option
 @out_option
-@batch_options
+@click.option(
+    "--retries",
+    type=click.IntRange(0, MOST_RETRIES),
+    default=0,
+    show_default=True,
+    help="How often a run that fails is tried again; one whose process dies is so once in any case.",
+)
+@click.option(
+    "--timeout",
+    metavar="TIME",
+    callback=read_time,
+    help="End a run after so long, whatever it is at: 90, 10min, 2h. It can go on later.",
+)
+@click.option(
+    "--budget", metavar="TIME", callback=read_time, help="Stop the whole batch after so long. The same command goes on."
+)
+@click.option(
+    "--rerun",
+    type=click.Choice(("failed", "changed", "all")),
+    default=None,
+    help="Do again what is over: runs that failed, those of another version of symphys, or all.",
+)
+@click.option("--dry-run", is_flag=True, help="Say what would be done, and why, and do nothing.")
+@click.option("--json", is_flag=True, help="Write what happens to stdout, a JSON object a line.")
+@click.option("--quiet", is_flag=True, help="Show nothing but failures.")
+@click.option(
+    "--on",
+    type=click.Choice(("dask", "slurm")),
+    default=None,
+    help="Let as many drivers as --jobs says do the runs: on dask workers, or as jobs of Slurm.",
+)
+@click.option(
+    "--scheduler",
+    metavar="TEXT",
+    help="dask: the address of a cluster, tcp://host:8786, instead of workers here. slurm: what to ask for, "
+    "partition=short,timeout_min=60,mem_gb=4, or local.",
+)
 def solve(
     sources: tuple[str, ...],
     names: str | None,
@@ -113,7 +166,15 @@ def solve(
     pages: str,
     backend: str,
     out: Path,
-    how: BatchOptions,
+    retries: int,
+    timeout: float,
+    budget: float,
+    rerun: str | None,
+    dry_run: bool,
+    json: bool,
+    quiet: bool,
+    on: str | None,
+    scheduler: str | None,
 ) -> int:
     """Solve problems, and write a report.
 
@@ -122,6 +183,10 @@ def solve(
     """
     began = perf_counter()
     threads.limit()
+    if scheduler and not on:
+        raise UsageFault(f"--scheduler {scheduler!r} needs --on dask or --on slurm")
+    if on and multi_start:
+        raise UsageFault(f"--multi-start solves seeds side by side in one process: leave it or --on {on} out")
     from symphys.batches import BatchLimits, run_batch, run_on
     from symphys.cli.watching import watch, working
     from symphys.runs import make_jobs, read_guess_run
@@ -136,28 +201,28 @@ def solve(
         for each in points_of(read_sweeps(problems, sweeps, samples), working)
         for job in make_jobs([each], solvers, range(seeds), dict(each.settings), *common)
     ]
-    if how.dry_run:
-        return print_previews(asked, how.rerun)
-    print_notes(problems, solvers, asked, how.quiet or how.json)
+    if dry_run:
+        return print_previews(asked, rerun or "")
+    print_notes(problems, solvers, asked, quiet or json)
     require_folder(out)
-    made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or how.on else None)
-    limits = BatchLimits(how.retries, how.timeout, how.budget)
-    with watch(len(asked), how.quiet, how.json) as observer:
-        if how.on:
-            batch = run_on(how.on, how.scheduler, asked, jobs, observer, made, out, limits, how.rerun)
+    made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or on else None)
+    limits = BatchLimits(retries, timeout, budget)
+    with watch(len(asked), quiet, json) as observer:
+        if on:
+            batch = run_on(on, scheduler or "", asked, jobs, observer, made, out, limits, rerun or "")
         else:
-            batch = run_batch(asked, jobs, observer, made, multi_start, limits, how.rerun)
-    silent, over = how.json or how.quiet, batch.interrupted or not any(batch.results)
-    limit = max(how.timeout, LEAST_PAGE)
+            batch = run_batch(asked, jobs, observer, made, multi_start, limits, rerun or "")
+    silent, over = json or quiet, batch.interrupted or not any(batch.results)
+    limit = max(timeout, MIN_PAGE_TIMEOUT)
     write = None if no_report or over else partial(write_reports, asked, out, pages, jobs, silent, limit)
     if silent:
         return conclude_silently(batch, observer, write)
-    parts = observer.notes.seconds if jobs == 1 and not (multi_start or how.on) else {}
+    parts = observer.notes.seconds if jobs == 1 and not (multi_start or on) else {}
     return conclude(asked, batch, out, began, parts, write)
 
 
 def print_notes(problems: list[Problem], solvers: tuple[str, ...] | None, jobs: list[Job], silent: bool) -> None:
-    """Say which solvers were chosen, and what of a guess was not taken as it is; many pairs also where ``silent``."""
+    """Print the solvers that were chosen and the notes on guesses unless ``silent``; many pairs always."""
     from symphys.runs.choice import chosen_lines
 
     for problem in problems:
@@ -177,13 +242,13 @@ def require_folder(out: Path) -> None:
 
 
 def print_previews(jobs: list[Job], rerun: str) -> int:
-    """Say what would be done, and why, a run a line; the exit code."""
+    """Print what would be done, and why, a run a line; return the exit code."""
     from symphys.batches import previews
 
     todo = 0
     for each in previews(jobs, rerun):
         todo += each.todo
-        click.echo(f"{each.job.name}: {'to do' if each.todo else each.stands}: {each.why}")
+        click.echo(f"{each.job.name}: {'to do' if each.todo else each.state}: {each.why}")
     click.echo(f"{todo} of {len(jobs)} runs are to do")
     return 0
 
@@ -196,7 +261,7 @@ def conclude(
     parts: Mapping[str, float],
     write: Callable[[], MadePages] | None,
 ) -> int:
-    """Show what came of it; ``write``: makes the pages; the exit code."""
+    """Print the summary, make the pages with ``write``, and return the exit code."""
     from symphys.cli.summary import print_summary
 
     print_summary(jobs, batch)
@@ -214,7 +279,7 @@ def conclude(
 
 
 def conclude_silently(batch: BatchResult, observer: Shown, write: Callable[[], MadePages] | None) -> int:
-    """Make the pages, and say no more than events; the exit code."""
+    """Make the pages without output except events; return the exit code."""
     from symphys.cli.watching.events import Events
 
     code = exit_code(batch, write() if write else None)
@@ -224,7 +289,7 @@ def conclude_silently(batch: BatchResult, observer: Shown, write: Callable[[], M
 
 
 def exit_code(batch: BatchResult, made: MadePages | None) -> int:
-    """Of a batch and its pages."""
+    """Return the exit code of a batch and its pages."""
     if batch.interrupted:
         return INTERRUPTED
     if not batch.accepted:
@@ -233,7 +298,7 @@ def exit_code(batch: BatchResult, made: MadePages | None) -> int:
 
 
 def last_words(batch: BatchResult, out: Path) -> str:
-    """What an interruption, or the end of its time, has left of a batch, and how to go on."""
+    """Return how a batch was interrupted, or its time used up, and how to resume it."""
     why = "interrupted" if batch.interrupted else "the time of the batch is used up" if batch.spent else "nothing ran"
     over = sum(result is not None and not result.interrupted for result in batch.results)
     halfway = sum(result is not None and result.interrupted for result in batch.results)
@@ -244,17 +309,17 @@ def last_words(batch: BatchResult, out: Path) -> str:
 
 
 def time_line(total: float, parts: Mapping[str, float]) -> str:
-    """The whole time of the command, and what took it as far as that is known."""
+    """Return the total time of the command and its known parts, as a line."""
     named = {"building": "build", "compiling": "compile", "solving": "solve"}
-    told = {word: parts[key] for word, key in named.items() if parts.get(key)}
-    if not told:
+    shares = {word: parts[key] for word, key in named.items() if parts.get(key)}
+    if not shares:
         return f"time: {duration(total)} s in all"
-    told["judging and reports"] = max(total - sum(told.values()), 0.0)
-    return f"time: {duration(total)} s in all; {', '.join(f'{word} {duration(part)}' for word, part in told.items())}"
+    shares["judging and reports"] = max(total - sum(shares.values()), 0.0)
+    return f"time: {duration(total)} s in all; {', '.join(f'{word} {duration(part)}' for word, part in shares.items())}"
 
 
 def write_reports(jobs: list[Job], out: Path, pages: str, processes: int, silent: bool, limit: float) -> MadePages:
-    """Make the pages of the runs that are new, and that of the batch; ``silent``: say only which cannot be made.
+    """Make the pages of new runs and of the batch; ``silent``: report only pages that cannot be made.
 
     ``limit``: [s] that the page of a run may take; inf where runs have no timeout.
     """

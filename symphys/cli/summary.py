@@ -23,22 +23,22 @@ if TYPE_CHECKING:
     from symphys.runs import Job, Result
 
 Groups = Mapping[tuple[str, str], list["Result"]]
-"""Results by problem, with its settings, and solver."""
-NARROWEST = 120
-"""Columns of the table where the output is no terminal."""
+"""Results by (problem with its settings, solver)."""
+MIN_WIDTH = 120
+"""Least width of the table where the output is no terminal."""
 NUMBERS = ("solved", "objective", "worst", "iterations", "work", "seconds", "ended")
-GIVES_WAY = ("work", "iterations", "seconds", "objective", "ended")
-"""Columns that are left out where a terminal is too narrow, in this order; no number is cut."""
+OPTIONAL = ("work", "iterations", "seconds", "objective", "ended")
+"""Columns that are left out on narrow terminals, in this order; no number is cut."""
 MOST_ROWS = 30
-"""Rows of the table; of more, the best and the worst are shown."""
+"""Rows of the table; if there are more, the best and the worst are shown."""
 MOST_ADVICE = 10
 """Lines of advice below a table of the best and the worst."""
 MOST_MISSED = 3
-"""How many missed checks of a run are named."""
+"""Missed checks of a run that are named."""
 
 
 def print_summary(jobs: list[Job], batch: BatchResult) -> None:
-    """Print the table, and the advice of what is not solved."""
+    """Print the table, and advice for runs that are not solved."""
     groups: dict[tuple[str, str], list[Result]] = {}
     for job, result in zip(jobs, batch.results, strict=True):
         group = groups.setdefault((job.case, job.config.solver), [])
@@ -46,7 +46,7 @@ def print_summary(jobs: list[Job], batch: BatchResult) -> None:
             group.append(result)
     console = Console()
     if not console.is_terminal:
-        console = Console(width=max(console.width, NARROWEST))
+        console = Console(width=max(console.width, MIN_WIDTH))
     shown = best_and_worst(groups)
     console.print(fitting_table(shown, console.width, len(groups) - len(shown)))
     if len(shown) < len(groups):
@@ -56,7 +56,7 @@ def print_summary(jobs: list[Job], batch: BatchResult) -> None:
 
 
 def best_and_worst(groups: Groups) -> Groups:
-    """All groups, as they are; of more than fit into a table the best and the worst, from best to worst."""
+    """Return all groups, or, if they do not fit into a table, the best and the worst ones, sorted."""
     if len(groups) <= MOST_ROWS:
         return groups
     ranked = sorted(groups, key=lambda name: rank(groups[name]))
@@ -65,7 +65,7 @@ def best_and_worst(groups: Groups) -> Groups:
 
 
 def rank(group: list[Result]) -> tuple[float, float, float]:
-    """The lower the better: how many did not do what was asked, how much is missed, and the objective."""
+    """Return a sort key, lower for better groups: share of failures, largest error, objective."""
     missed = sum(not result.accepted for result in group) / len(group) if group else math.inf
     worst = median(result.worst_ratio for result in group if not result.accepted)
     objective = median(known(result, "objective") for result in group)
@@ -74,16 +74,16 @@ def rank(group: list[Result]) -> tuple[float, float, float]:
 
 
 def counts(batch: BatchResult, groups: int) -> str:
-    """How many runs ended how."""
+    """Return how many runs ended in which way."""
     ends = Counter("not begun" if result is None else verdict(result) for result in batch.results)
     listed = ", ".join(f"{count:,} {words}" for words, count in ends.most_common())
     return f"{len(batch.results):,} runs: {listed}. The best and the worst of {groups:,} rows are shown."
 
 
 def fitting_table(groups: Groups, width: int, left_out: int = 0) -> Table:
-    """The table with as many columns as fit; where even the least do not, names are wrapped."""
-    for count in range(len(GIVES_WAY) + 1):
-        columns = [name for name in NUMBERS if name not in GIVES_WAY[:count]]
+    """Return the table with as many columns as fit the width; names are wrapped if too few do."""
+    for count in range(len(OPTIONAL) + 1):
+        columns = [name for name in NUMBERS if name not in OPTIONAL[:count]]
         shown = table(groups, columns, left_out)
         if Console(width=1000).measure(shown).maximum <= width:
             break
@@ -91,7 +91,7 @@ def fitting_table(groups: Groups, width: int, left_out: int = 0) -> Table:
 
 
 def table(groups: Groups, columns: Sequence[str] = NUMBERS, left_out: int = 0) -> Table:
-    """The table of all groups, by problem and solver, with these columns; in its middle, how many are left out."""
+    """Return the table of groups with these columns; a row in its middle says how many are left out."""
     several = any(len(group) > 1 for group in groups.values())
     caption = "worst: largest error / tolerance, met at 1; work in rollouts" + ("; medians over the seeds" * several)
     shown = Table(box=SIMPLE_HEAD, caption=caption, caption_justify="left")
@@ -108,7 +108,7 @@ def table(groups: Groups, columns: Sequence[str] = NUMBERS, left_out: int = 0) -
 
 
 def cells(group: list[Result]) -> dict[str, Text]:
-    """The numbers of one row, by column."""
+    """Return the cells of one row, by column."""
     solved = sum(result.solved for result in group)
     ends = Counter(ended(result) for result in group)
     texts = [
@@ -126,23 +126,23 @@ def cells(group: list[Result]) -> dict[str, Text]:
 
 
 def known(result: Result, name: str) -> float | None:
-    """A number of a result; None where the run did not reach it."""
+    """Return a number of a result; None if the run did not reach it."""
     return None if name in result.absent else getattr(result, name)
 
 
 def ended(result: Result) -> str:
-    """How a run ended: as its solver did, or the verdict, where that says more."""
+    """Return how a run ended: the status of its solver, or the verdict where that says more."""
     return verdict(result) if result.verdict in (DOUBTED, BEST_FOUND) else result.status.replace("_", " ")
 
 
 def median(values: Iterable[float | None]) -> float | None:
-    """The median of what is known; None if nothing is."""
+    """Return the median of the known values; None if there are none."""
     found = [value for value in values if value is not None]
     return statistics.median(found) if found else None
 
 
 def advice(groups: Groups) -> list[str]:
-    """Why runs are not to be trusted, and what to try for the unsolved, each once per problem and solver."""
+    """Return why runs are doubted, and what to try for unsolved ones, each once per problem and solver."""
     lines = [
         f"{problem} {solver}: {line}"
         for (problem, solver), group in groups.items()
@@ -155,7 +155,7 @@ def advice(groups: Groups) -> list[str]:
 
 
 def advice_together(groups: Groups) -> list[str]:
-    """The same for many groups: what is said of several of them is said once, with the first as an example."""
+    """Return the advice for many groups: each line once, with the first group as an example."""
     examples: dict[str, list[str]] = {}
     for (problem, solver), group in groups.items():
         for line in advice({("", ""): group}):
@@ -169,7 +169,7 @@ def advice_together(groups: Groups) -> list[str]:
 
 
 def held_back(group: list[Result]) -> list[str]:
-    """How many of several seeds end at the same bound, where a bound holds one of them back."""
+    """Return how many of several seeds end at the same bound, where a bound holds one of them back."""
     if len(group) < 2:
         return []
     bounds = [bound for result in group if not result.solved for bound in held_bounds(result)]
@@ -182,19 +182,19 @@ def held_back(group: list[Result]) -> list[str]:
 
 
 def held_bounds(result: Result) -> tuple[HeldBound, ...]:
-    """The bounds that hold a run back."""
+    """Return the bounds that hold a run back."""
     return holding(Examination.from_json(dict(result.trust)), result.judge(result.verdict != NOT_SOLVED))
 
 
 def said(result: Result) -> list[str]:
-    """The lines on one run."""
+    """Return the lines on one run."""
     if result.verdict == DOUBTED:
         return [f"not to be trusted: {'; '.join(result.doubts)}"]
     return [] if result.solved else [missed(result), first_line(result.advice)]
 
 
 def missed(result: Result) -> str:
-    """Which checks are missed by how much, the worst first; empty where none is."""
+    """Return the missed checks with their errors, the worst first; empty if there are none."""
     found = sorted((check for check in result.checks if not check.met), key=lambda check: -check.ratio)
     if not found:
         return ""

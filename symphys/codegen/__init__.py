@@ -10,12 +10,10 @@ if TYPE_CHECKING:
     from symphys.codegen.program.interpret import interpret
     from symphys.codegen.program.nan_location import Bad
     from symphys.codegen.program.program import AdjointDiscount, FunctionCall, MemoryLayout, Place, Program
-    from symphys.codegen.runtime.fixed_addresses import Fixed, FixedBatch
-    from symphys.codegen.runtime.kernel import Kernel, ProcessorKernel
+    from symphys.codegen.runtime.kernel import BuildReport, Fixed, FixedBatch, Kernel, ProcessorKernel
     from symphys.codegen.toolchain.build import compile_program, shared_library
     from symphys.codegen.toolchain.cache import Cache, CacheInfo, default_cache
     from symphys.codegen.toolchain.compiler import processors
-    from symphys.codegen.toolchain.report import BuildReport
 
 __all__ = [
     "AdjointDiscount",
@@ -49,11 +47,9 @@ __getattr__ = later(
         "program.interpret": ("interpret",),
         "program.nan_location": ("Bad",),
         "program.program": ("AdjointDiscount", "FunctionCall", "MemoryLayout", "Place", "Program"),
-        "runtime.fixed_addresses": ("Fixed", "FixedBatch"),
-        "runtime.kernel": ("Kernel", "ProcessorKernel"),
+        "runtime.kernel": ("BuildReport", "Fixed", "FixedBatch", "Kernel", "ProcessorKernel"),
         "toolchain.build": ("compile_program", "shared_library"),
         "toolchain.cache": ("Cache", "CacheInfo", "default_cache"),
         "toolchain.compiler": ("processors",),
-        "toolchain.report": ("BuildReport",),
     },
 )

@@ -12,10 +12,9 @@ A formula is a number or a column vector. It is made of
 There are no comparisons, keywords, strings, attributes of values or anything else.
 """
 
-from symphys.expression.errors import FormulaError
+from symphys.expression.columns import FormulaError
 from symphys.expression.formula import Formula, MotionPart
-from symphys.expression.functions import FUNCTIONS
-from symphys.expression.names import CONSTANTS, OVER_TIME
+from symphys.expression.functions import CONSTANTS, FUNCTIONS, OVER_TIME
 from symphys.expression.parse import parse
 
 __all__ = ["CONSTANTS", "FUNCTIONS", "OVER_TIME", "Formula", "FormulaError", "MotionPart", "parse"]

@@ -1,4 +1,4 @@
-"""Column vectors of casadi type (SX, MX, DM): the only values that formulas know, and the shapes that fit together."""
+"""Column vectors of casadi type (SX, MX, DM), the only values of formulas, and errors where shapes do not fit."""
 
 from __future__ import annotations
 
@@ -6,12 +6,20 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.expression.errors import UnfitError
+from symphys.errors import SymphysError
 from symphys.types import Expr
 
 
+class FormulaError(SymphysError):
+    """Raised for a formula that cannot be read or evaluated; names the piece at fault and what is allowed."""
+
+
+class UnfitError(ValueError):
+    """Raised for values that an operation cannot take; becomes a FormulaError that names the piece of the formula."""
+
+
 def column(value: Any) -> Expr:
-    """A number, a sequence of numbers or a casadi expression as a column (n,); UnfitError for a matrix."""
+    """Convert a number, a sequence of numbers or a casadi expression to a column (n,); UnfitError for a matrix."""
     expression = value if isinstance(value, ca.SX | ca.MX | ca.DM) else ca.DM(value)
     if expression.shape[1] != 1 or expression.shape[0] == 0:
         rows, columns = expression.shape
@@ -20,17 +28,17 @@ def column(value: Any) -> Expr:
 
 
 def length(value: Expr) -> int:
-    """The number of components; 1 for a number."""
+    """Return the number of components; 1 for a number."""
     return int(value.shape[0])
 
 
 def shape(value: Expr) -> str:
-    """The shape in words."""
+    """Return the shape in words."""
     return "a number" if length(value) == 1 else f"a vector of {length(value)}"
 
 
 def require_fit(*values: Expr) -> None:
-    """UnfitError unless all values that are not numbers have the same length."""
+    """Raise UnfitError unless all values that are not numbers have the same length."""
     vectors = [value for value in values if length(value) > 1]
     for other in vectors[1:]:
         if length(other) != length(vectors[0]):
@@ -38,24 +46,24 @@ def require_fit(*values: Expr) -> None:
 
 
 def require_length(value: Expr, wanted: int, role: str) -> None:
-    """UnfitError unless ``value`` has ``wanted`` components."""
+    """Raise UnfitError unless ``value`` has ``wanted`` components."""
     if length(value) != wanted:
         raise UnfitError(f"{role} must have {wanted} components, but is {shape(value)}")
 
 
 def require_same(a: Expr, b: Expr) -> None:
-    """UnfitError unless both have the same length."""
+    """Raise UnfitError unless both have the same length."""
     if length(a) != length(b):
         raise UnfitError(f"both must have the same length, but they are {shape(a)} and {shape(b)}")
 
 
 def join(*values: Expr) -> Expr:
-    """All components one after the other."""
+    """Join all components to one column."""
     return ca.vertcat(*values)
 
 
 def component(value: Expr, index: int) -> Expr:
-    """One component, counted from 0, or from -1 backwards."""
+    """Return one component, counted from 0, or from -1 backwards."""
     n = length(value)
     if not -n <= index < n:
         raise UnfitError(f"there is no component {index}: it is {shape(value)}, indices go from 0 to {n - 1}")
@@ -63,7 +71,7 @@ def component(value: Expr, index: int) -> Expr:
 
 
 def part(value: Expr, key: slice) -> Expr:
-    """The components of a Python slice; unlike Python's, one that leaves the vector or is empty is an error."""
+    """Return the components of a Python slice; unlike Python's, an empty one or one out of range is an error."""
     n = length(value)
     for end in (key.start, key.stop):
         if end is not None and not -n <= end <= n:

@@ -1,17 +1,29 @@
-"""The functions and operators of formulas, each with its arguments and meaning."""
+"""The names, functions and operators of formulas, each with its arguments and meaning."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
+from math import pi
 
 import casadi as ca
 
-from symphys.expression.columns import length, require_fit, require_length, require_same
-from symphys.expression.errors import UnfitError
+from symphys.expression.columns import UnfitError, length, require_fit, require_length, require_same
 from symphys.maths import angles, rotation
 from symphys.types import Expr
+
+CONSTANTS = {"pi": pi}
+INSTANTS = ("start", "end")
+"""Prefixes for the value at the first or last instant of a motion, as in ``end.knee.angle``."""
+OF_INSTANTS = ("time", "alive")
+"""Names without a dot that differ from instant to instant: ``end.time`` is the duration."""
+OVER_TIME = {
+    "integral": "integral(f): of a formula over the time of the motion",
+    "average": "average(f): of a formula over the time of the motion",
+}
+"""Functions of a whole motion, and how they are written."""
+
 
 NORM_WIDTH = 1e-12
 """norm(v) is sqrt(v . v + NORM_WIDTH^2), and hypot likewise: finite derivatives at 0, where the value is 1e-12."""
@@ -23,8 +35,8 @@ class Function:
 
     Attributes:
         signature: how it is written.
-        meaning: one line.
-        apply: takes columns, gives a column; raises UnfitError where shapes do not fit.
+        meaning: in one line.
+        apply: columns to column; raises UnfitError where shapes do not fit.
         least, most: number of arguments; ``most`` None is any number.
     """
 
@@ -36,7 +48,7 @@ class Function:
 
 
 def elementwise(operation: Callable[..., Expr]) -> Callable[..., Expr]:
-    """The operation component by component, numbers combining with every component."""
+    """Return the operation component by component, with numbers combining with every component."""
 
     def apply(*values: Expr) -> Expr:
         require_fit(*values)
@@ -46,17 +58,17 @@ def elementwise(operation: Callable[..., Expr]) -> Callable[..., Expr]:
 
 
 def larger(a: Expr, b: Expr) -> Expr:
-    """The larger one; unlike fmax, a NaN on either side stays a NaN."""
+    """Return the larger value; unlike fmax, NaN on either side gives NaN."""
     return ca.if_else(a > b, a, ca.if_else(b >= a, b, a + b))
 
 
 def smaller(a: Expr, b: Expr) -> Expr:
-    """The smaller one; unlike fmin, a NaN on either side stays a NaN."""
+    """Return the smaller value; unlike fmin, NaN on either side gives NaN."""
     return ca.if_else(a < b, a, ca.if_else(b <= a, b, a + b))
 
 
 def extreme(choose: Callable[[Expr, Expr], Expr]) -> Callable[..., Expr]:
-    """Of one vector: its extreme component; of several values: component by component."""
+    """Return a function that takes the extreme component of one vector, or of several values component by component."""
 
     def apply(*values: Expr) -> Expr:
         if len(values) == 1:
@@ -68,12 +80,12 @@ def extreme(choose: Callable[[Expr, Expr], Expr]) -> Callable[..., Expr]:
 
 
 def clip(x: Expr, lower: Expr, upper: Expr) -> Expr:
-    """X limited to [lower, upper]."""
+    """Limit ``x`` to [lower, upper]."""
     return smaller(larger(x, lower), upper)
 
 
 def smooth_larger(*arguments: Expr) -> Expr:
-    """Width * log(sum of exp(value / width)), of values shifted by the largest, so that no exponential overflows.
+    """Return width * log(sum of exp(value / width)), with values shifted by the largest against overflow.
 
     It exceeds the largest of n values by at most width * log(n); the last argument is the width.
     """
@@ -91,47 +103,47 @@ def smooth_larger(*arguments: Expr) -> Expr:
 
 
 def smooth_smaller(*arguments: Expr) -> Expr:
-    """The mirror image of ``smooth_larger``: below the smallest by at most width * log(n)."""
+    """Return the mirror image of ``smooth_larger``: below the smallest by at most width * log(n)."""
     *values, width = arguments
     return -smooth_larger(*(-value for value in values), width)
 
 
 def length_of(*squares: Expr) -> Expr:
-    """sqrt(sum of the squares + NORM_WIDTH^2)."""
+    """Return sqrt(sum of the squares + NORM_WIDTH^2)."""
     return ca.sqrt(sum(squares) + NORM_WIDTH**2)
 
 
 def hypot(a: Expr, b: Expr) -> Expr:
-    """The length of (a, b)."""
+    """Return the length of (a, b)."""
     return length_of(a * a, b * b)
 
 
 def norm(vector: Expr) -> Expr:
-    """The Euclidean length."""
+    """Return the Euclidean length."""
     return length_of(ca.dot(vector, vector))
 
 
 def mean(vector: Expr) -> Expr:
-    """The mean of the components."""
+    """Return the mean of the components."""
     total: Expr = ca.sum1(vector)
     return total / length(vector)
 
 
 def dot(a: Expr, b: Expr) -> Expr:
-    """The scalar product."""
+    """Return the scalar product."""
     require_same(a, b)
     return ca.dot(a, b)
 
 
 def cross(a: Expr, b: Expr) -> Expr:
-    """The vector product."""
+    """Return the vector product."""
     require_length(a, 3, "the first vector")
     require_length(b, 3, "the second vector")
     return ca.cross(a, b)
 
 
 def rotate(quaternion: Expr, vector: Expr) -> Expr:
-    """The body-frame vector in world coordinates."""
+    """Return the body-frame vector in world coordinates."""
     require_length(quaternion, 4, "the quaternion")
     require_length(vector, 3, "the vector")
     return rotation.rotate(quaternion, vector)

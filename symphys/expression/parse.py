@@ -1,9 +1,13 @@
-"""From a syntax tree to a formula: a fixed list of nodes is let through, everything else is an error."""
+"""From text to a formula: a Python syntax tree of bounded size, of which a fixed list of nodes is allowed.
+
+Every failure is a FormulaError.
+"""
 
 from __future__ import annotations
 
 import ast
 import copyreg
+import warnings
 from collections.abc import Callable
 from functools import lru_cache, partial
 from math import isfinite
@@ -12,15 +16,29 @@ from operator import neg, pos
 import casadi as ca
 
 from symphys.expression import columns
-from symphys.expression.errors import FormulaError
-from symphys.expression.formula import Formula, MotionPart
-from symphys.expression.functions import FUNCTIONS, elementwise
-from symphys.expression.names import CONSTANTS, INSTANTS, OF_INSTANTS, OVER_TIME
-from symphys.expression.source import flatten, read
-from symphys.expression.tree import Constant, Node, Reference, apply
+from symphys.expression.columns import FormulaError
+from symphys.expression.formula import Constant, Formula, MotionPart, Node, Reference, apply
+from symphys.expression.functions import CONSTANTS, FUNCTIONS, INSTANTS, OF_INSTANTS, OVER_TIME, elementwise
 from symphys.suggest import hint, quote
 from symphys.types import Expr
 
+MAX_LENGTH = 10_000
+MAX_NODES = 2_000
+MAX_DEPTH = 100
+
+REPLACEMENTS = {
+    "\u00d7": "*",
+    "\u00b7": "*",
+    "\u00f7": "/",
+    "\u2212": "-",
+    "\u2013": "-",
+    "\u00b2": "**2",
+    "\u00b3": "**3",
+    "\u03c0": "pi",
+    "\u221a": "sqrt()",
+}
+"""Typographic characters that people paste, and what to write instead."""
+FORBIDDEN = "#\\\x00"
 OPERATORS: dict[type[ast.operator], Callable[..., Expr]] = {
     ast.Add: elementwise(ca.plus),
     ast.Sub: elementwise(ca.minus),
@@ -32,16 +50,66 @@ SIGNS: dict[type[ast.unaryop], Callable[..., Expr]] = {ast.UAdd: pos, ast.USub: 
 ALLOWED = (
     "a formula has numbers, names, + - * / **, components [i], ranges [i:j], vectors [a, b] and calls of functions"
 )
-
-
 ONE_INSTANT = "costs, targets, constraints and outputs are of whole motions; this formula is of one instant"
+
+
+def flatten(text: str) -> str:
+    """Return the text on one line, stripped; FormulaError for a character that no formula has."""
+    if len(text) > MAX_LENGTH:
+        raise FormulaError(f"the formula has {len(text)} characters; {MAX_LENGTH} are allowed")
+    line = "".join(" " if c in "\t\r\n" else c for c in text).strip(" ")
+    if not line:
+        raise FormulaError("the formula is empty")
+    for c in line:
+        if not " " <= c <= "~" or c in FORBIDDEN:
+            instead = f"; write {REPLACEMENTS[c]}" if c in REPLACEMENTS else ""
+            raise FormulaError(f"the character {c!r} is not allowed in the formula {quote(line)}{instead}")
+    return line
+
+
+def read(line: str) -> ast.expr:
+    """Return the syntax tree of one line."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # the tokeniser warns of such things as 1if
+            root = ast.parse(line, mode="eval").body
+    except SyntaxError as error:
+        raise FormulaError(f"cannot read the formula {quote(line)}: {syntax_fault(error)}") from None
+    except (RecursionError, MemoryError):
+        raise FormulaError(f"the formula {quote(line)} is nested too deep; {MAX_DEPTH} levels are allowed") from None
+    except (ValueError, OverflowError, Warning) as error:
+        raise FormulaError(f"cannot read the formula {quote(line)}: {error}") from None
+    require_size(root, line)
+    return root
+
+
+def syntax_fault(error: SyntaxError) -> str:
+    """Return the parser's message with the column, without Python's advice to programmers."""
+    reason = (error.msg or "invalid syntax").split(". Perhaps")[0].split(";")[0]
+    return f"{reason} at column {error.offset}" if error.offset else reason
+
+
+def require_size(root: ast.expr, line: str) -> None:
+    """Raise FormulaError for a tree with too many nodes or levels, without recursion."""
+    level: list[ast.AST] = [root]
+    nodes = depth = 0
+    while level:
+        nodes, depth = nodes + len(level), depth + 1
+        if nodes > MAX_NODES:
+            raise FormulaError(f"the formula {quote(line)} is too long; {MAX_NODES} pieces are allowed")
+        if depth > MAX_DEPTH:
+            raise FormulaError(
+                f"the formula {quote(line)} is nested too deep; {MAX_DEPTH} levels are allowed "
+                "(write a long sum as sum([a, b, c]))"
+            )
+        level = [child for node in level for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
 
 
 @lru_cache(maxsize=1024)
 def parse(text: str, whole: bool = False) -> Formula:
     """Read a formula; FormulaError names the piece at fault, what is allowed and the nearest valid names.
 
-    ``whole``: whether it may take parts of a whole motion: ``start.NAME``, ``end.NAME``, ``integral(...)``.
+    ``whole``: whether parts of a whole motion are allowed: ``start.NAME``, ``end.NAME``, ``integral(...)``.
     """
     builder = Builder(flatten(text), whole)
     return builder.formula(text, read(builder.line))
@@ -52,7 +120,7 @@ copyreg.pickle(Formula, lambda formula: (parse, (formula.text, bool(formula.part
 
 
 class Builder:
-    """Turns syntax into nodes and collects the names on the way."""
+    """The conversion of syntax into nodes, which collects the names on the way."""
 
     def __init__(self, line: str, whole: bool = False) -> None:
         """Keep the line, from which errors quote, and whether parts of a whole motion are allowed."""
@@ -71,12 +139,12 @@ class Builder:
         }
 
     def formula(self, text: str, syntax: ast.expr) -> Formula:
-        """The formula of a piece of syntax."""
+        """Return the formula of a piece of syntax."""
         root = self.build(syntax)
         return Formula(text, frozenset(self.names), root, tuple(self.parts.values()))
 
     def build(self, syntax: ast.expr) -> Node:
-        """The node of a piece of syntax."""
+        """Return the node of a piece of syntax."""
         rule = self._rules.get(type(syntax))
         if rule is None:
             raise self._refused(syntax)
@@ -127,14 +195,14 @@ class Builder:
         return self._reference(f"{syntax.value.id}.{syntax.attr}")
 
     def _part(self, syntax: ast.expr, kind: str, name: str, formula: Formula) -> Node:
-        """Something of the whole motion, by a name of its own."""
+        """Return a reference to a part of the whole motion, under a name of its own."""
         if not self.whole:
             raise FormulaError(f"{quote(self._piece(syntax))} is of a whole motion; {self.instant}")
         self.parts[name] = MotionPart(name, kind, formula)  # type: ignore[arg-type]
         return self._reference(name)
 
     def _over_time(self, syntax: ast.Call, kind: str) -> Node:
-        """The integral or average of a formula, which is of one instant."""
+        """Return the integral or average of a formula of one instant."""
         if len(syntax.args) != 1 or syntax.keywords:
             raise FormulaError(f"{quote(self._piece(syntax))}: one formula is wanted; {OVER_TIME[kind]}")
         inner = Builder(self.line)

@@ -14,10 +14,9 @@ from operator import neg, pos
 from typing import Any
 
 from symphys.expression import columns
-from symphys.expression.formula import Formula
+from symphys.expression.formula import Apply, Constant, Formula, Node, Reference
 from symphys.expression.functions import FUNCTIONS
 from symphys.expression.parse import OPERATORS
-from symphys.expression.tree import Apply, Constant, Node, Reference
 
 Powers = Mapping[str, int]
 """The power of each base unit; a pure number has none."""
@@ -31,16 +30,18 @@ NAMED = {
     "N s": {"kg": 1, "m": 1, "s": -1},
     "N m/rad": {"kg": 1, "m": 2, "s": -2, "rad": -1},
 }
-"""Units that have a name of their own."""
+"""Derived units with a name of their own."""
 BASE = ("kg", "m", "s", "rad")
 PURE = (0.0, 0.5, 1.0, 2.0)
 """Sizes of factors that are pure numbers."""
 NUMBER: Powers = {"number": 1}
-"""Of constants, which take the unit of what they are added to."""
+"""The unit of constants, which take the unit of what they are added to."""
+KEEPING = ("abs", "wrap_to_pi", "min", "max", "smooth_max", "smooth_min", "clip", "hypot", "norm", "sum", "mean")
+"""Functions that keep the unit of their arguments."""
 
 
 def unit_of(formula: Formula, units: Mapping[str, str]) -> str:
-    """The unit of a formula's value; empty where it has none or where that is not clear.
+    """Return the unit of a formula's value; empty if it has none or if it is not clear.
 
     Args:
         formula: that is read.
@@ -52,7 +53,7 @@ def unit_of(formula: Formula, units: Mapping[str, str]) -> str:
 
 
 def part_units(formula: Formula, units: Mapping[str, str]) -> dict[str, str]:
-    """The units of what a formula takes of a whole motion, where they are known."""
+    """Return the known units of a formula's parts of a whole motion."""
     known = {}
     for part in formula.parts:
         powers = infer(part.formula.root, units)
@@ -66,7 +67,7 @@ def part_units(formula: Formula, units: Mapping[str, str]) -> dict[str, str]:
 
 
 def infer(node: Node, units: Mapping[str, str]) -> Found:
-    """The powers of a node's unit."""
+    """Return the powers of a node's unit; None if unknown."""
     if isinstance(node, Constant):
         return NUMBER
     if isinstance(node, Reference):
@@ -78,7 +79,7 @@ def infer(node: Node, units: Mapping[str, str]) -> Found:
 
 
 def read(text: str) -> Found:
-    """The powers in a unit such as ``N m/rad`` or ``m/s^2``; None for one that is not known."""
+    """Return the powers of a unit such as ``N m/rad`` or ``m/s^2``; None for an unknown unit."""
     total: dict[str, int] = {}
     for place, part in enumerate(text.split("/")):
         for factor in part.split():
@@ -92,7 +93,7 @@ def read(text: str) -> Found:
 
 
 def written(powers: Powers) -> str:
-    """The unit as text; empty for a pure number, and for angles mixed with what gives no unit in use."""
+    """Return the unit as text; empty for a pure number, and for mixtures of angles that give no unit in use."""
     for name, known in NAMED.items():
         if known == powers:
             return name
@@ -104,24 +105,24 @@ def written(powers: Powers) -> str:
 
 
 def exponent(power: int) -> str:
-    """``^2``; nothing for 1."""
+    """Return ``^2`` and the like; empty for 1."""
     return f"^{power}" if power > 1 else ""
 
 
 def combined(one: Powers, other: Powers, times: int = 1) -> Powers:
-    """The powers of one unit times another to a power."""
+    """Return the powers of one unit times another to a power."""
     total = {name: one.get(name, 0) + times * other.get(name, 0) for name in {**one, **other}}
     return {name: power for name, power in total.items() if power}
 
 
 def alike(node: Apply, parts: list[Powers]) -> Found:
-    """Of what keeps the unit of its arguments, which must be one."""
+    """Return the common unit of the arguments, for functions that keep it."""
     known = [part for part in parts if part != NUMBER]
     return known[0] if known and all(part == known[0] for part in known) else None
 
 
 def factor(argument: Node, part: Powers) -> Found:
-    """The powers of a factor; None for a constant that may hide a unit."""
+    """Return the powers of a factor; None for a constant that may hide a unit."""
     if part != NUMBER:
         return part
     pure = isinstance(argument, Constant) and all(abs(number) in PURE for number in argument.value.nonzeros())
@@ -129,13 +130,13 @@ def factor(argument: Node, part: Powers) -> Found:
 
 
 def product(node: Apply, parts: list[Powers], times: int = 1) -> Found:
-    """Of a product, or with -1 of a quotient."""
+    """Return the unit of a product, or with -1 of a quotient."""
     one, other = (factor(argument, part) for argument, part in zip(node.arguments, parts, strict=True))
     return None if one is None or other is None else combined(one, other, times)
 
 
 def power(node: Apply, parts: list[Powers]) -> Found:
-    """Of a power whose exponent is a whole number."""
+    """Return the unit of a power whose exponent is a whole number."""
     exponents = node.arguments[1]
     whole = isinstance(exponents, Constant) and exponents.value.numel() == 1 and float(exponents.value).is_integer()
     if parts[0] == NUMBER or not whole or not isinstance(exponents, Constant):
@@ -144,24 +145,22 @@ def power(node: Apply, parts: list[Powers]) -> Found:
 
 
 def root(node: Apply, parts: list[Powers]) -> Found:
-    """Of a square root."""
+    """Return the unit of a square root."""
     if any(power % 2 for power in parts[0].values()):
         return None
     return {name: power // 2 for name, power in parts[0].items()}
 
 
 def turned(node: Apply, parts: list[Powers]) -> Found:
-    """Of a vector that a quaternion turns."""
+    """Return the unit of a vector that a quaternion rotates."""
     return parts[1] if parts[0] in ({}, NUMBER) and parts[1] != NUMBER else None
 
 
 def giving(result: Powers, *allowed: Powers) -> Callable[[Apply, list[Powers]], Found]:
-    """The rule of a function with a unit of its own; ``allowed``: of its argument."""
+    """Return the rule of a function with a unit of its own; ``allowed``: units of its argument."""
     return lambda node, parts: result if parts[0] in allowed else None
 
 
-KEEPING = ("abs", "wrap_to_pi", "min", "max", "smooth_max", "smooth_min", "clip", "hypot", "norm", "sum", "mean")
-"""Functions that keep the unit of their arguments."""
 RULES: dict[Callable[..., Any], Callable[[Apply, list[Powers]], Found]] = {
     **dict.fromkeys((OPERATORS[ast.Add], OPERATORS[ast.Sub], neg, pos), alike),
     **dict.fromkeys((columns.join, columns.component, columns.part), alike),
@@ -178,4 +177,4 @@ RULES: dict[Callable[..., Any], Callable[[Apply, list[Powers]], Found]] = {
     **{FUNCTIONS[name].apply: giving({"rad": 1}, {}) for name in ("asin", "acos", "atan")},
     **{FUNCTIONS[name].apply: giving({}, {}) for name in ("sinh", "cosh", "tanh", "exp", "log")},
 }
-"""The unit of what a function gives, from its arguments' units; one that is absent gives none."""
+"""The rule for the unit of each function's value; without a rule the unit is unknown."""

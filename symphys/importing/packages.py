@@ -6,14 +6,14 @@ import sysconfig
 from importlib.util import find_spec
 from pathlib import Path
 
-from symphys.importing.problem import ImportProblem
+from symphys.importing.records import ImportProblem
 
 SCHEME = "package:"
 """Followed by two slashes, of which a path keeps one."""
 
 
 def model_file(name: str | Path) -> Path:
-    """The path of a model, which may be one in an installed package; nothing of the package is run.
+    """Return the path of a model, which may be in an installed package; nothing of the package is executed.
 
     Raises:
         ImportProblem: for a package that is not installed, and for a file that it does not have.
@@ -32,7 +32,7 @@ def model_file(name: str | Path) -> Path:
 
 
 def package_folder(package: str) -> Path | None:
-    """The folder of an installed package, or of that name beside packages; None if there is none."""
+    """Return the folder of an installed package, or of that name next to packages; None if there is none."""
     if not package.replace("_", "a").isidentifier():
         beside = Path(sysconfig.get_paths()["purelib"]) / package
         return beside if package not in ("", ".", "..") and beside.is_dir() else None

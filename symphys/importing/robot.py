@@ -7,17 +7,25 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from symphys.files import modified
-from symphys.importing.findings import Finding, Kind
-from symphys.importing.options import ImportOptions
 from symphys.importing.packages import model_file
-from symphys.importing.source import AS_IT_IS, Source, read_source
-from symphys.importing.tables import tables_of
+from symphys.importing.records import CompiledModel, Finding, ImportOptions, Kind, gathered
+from symphys.importing.source import AS_IT_IS, read_source
+from symphys.importing.tables.contacts import read_contacts
+from symphys.importing.tables.joints import read_couplings, read_joints, read_loops, read_motors
+from symphys.importing.tables.links import body_table, read_links
+from symphys.importing.tables.pose import begin, keyframe, lift, reference_pose
+from symphys.importing.tables.reading import ModelReading, numbers
+from symphys.importing.tables.sensors import read_sensors, read_sites
+from symphys.importing.tables.shapes import read_shapes, read_statics
 
 KINDS: tuple[Kind, ...] = ("taken", "approximated", "left out", "recovered")
-"""In the order of tables."""
+"""Kinds of findings, in the order in which they are shown."""
 MOST_KEPT = 32
 """Robots that a process keeps, since reading one takes a second."""
+GRAVITY = (0.0, 0.0, -9.81)
 
 
 @dataclass(frozen=True)
@@ -26,7 +34,7 @@ class Imported:
 
     Attributes:
         file: that was read.
-        title: of the robot: what the model calls itself, else the name of the file.
+        title: the model's own name, else the name of the file.
         tables: of a problem file, as ``[[include]]`` takes them: bodies, joints, ...
         findings: what became of the parts of the model, in the order of ``KINDS``.
     """
@@ -38,7 +46,7 @@ class Imported:
 
 
 _kept: dict[tuple[str, ImportOptions], tuple[dict[Path, int | None], Imported]] = {}
-"""By path and options: when the files of each were written, and what was made of them."""
+"""Robots by path and options, with the times of their files."""
 
 
 def read_robot(path: str | Path, options: ImportOptions = AS_IT_IS) -> Imported:
@@ -62,15 +70,124 @@ def read_robot(path: str | Path, options: ImportOptions = AS_IT_IS) -> Imported:
     return replace(known, file=path, tables=deepcopy(known.tables))
 
 
-def made(source: Source, options: ImportOptions) -> Imported:
-    """The robot of a compiled model."""
+def made(source: CompiledModel, options: ImportOptions) -> Imported:
+    """Return the robot of a compiled model."""
     tables, findings = tables_of(source, options)
-    told = dict.fromkeys((*source.findings, *findings))
-    ordered = tuple(sorted(told, key=lambda finding: KINDS.index(finding.kind)))
+    unique = dict.fromkeys((*source.findings, *findings))
+    ordered = tuple(sorted(unique, key=lambda finding: KINDS.index(finding.kind)))
     return Imported(source.file, title(source.model, source.file), tables, ordered)
 
 
 def title(model: Any, file: Path) -> str:
-    """What a compiled model calls itself; the name of the file where it has none of its own."""
+    """Return the name of a compiled model; the name of the file if it has none of its own."""
     own = bytes(model.names).split(b"\0", 1)[0].decode("utf-8", "replace")
     return file.stem if own in ("", "MuJoCo Model") else own
+
+
+def tables_of(source: CompiledModel, options: ImportOptions) -> tuple[dict[str, Any], tuple[Finding, ...]]:
+    """Return the tables of a problem file, and findings on the parts of the model.
+
+    Raises:
+        ImportProblem: the keyframe does not exist.
+    """
+    import mujoco
+
+    key = keyframe(mujoco, source.model, options.keyframe, str(source.file))
+    reading = ModelReading(mujoco, source.model, reference_pose(mujoco, source.model, key), options, key, source.motors)
+    lift(reading)
+    read_links(reading, source.inertials)
+    frames, joints = read_joints(reading)
+    read_motors(reading, joints)
+    reading.driven |= {table["name"] for table in joints if "motor" in table}
+    shapes = read_shapes(reading)
+    bodies = list[dict[str, Any]]()
+    for top in dict.fromkeys(link.top for link in reading.links.values()):
+        bodies += [*frames.get(top, []), body_table(reading.links[top], [shape for _, shape in shapes.get(top, [])])]
+    statics = read_statics(reading)
+    reading.jointed |= {tuple(sorted(table["between"])) for table in joints}
+    contacts = read_contacts(reading, shapes, bodies, statics)
+    touching = contacts.pop("touching", set())
+    for table in joints:
+        if tuple(sorted(table["between"])) in touching:
+            table["collide"] = True
+    begin(reading, joints)
+    sites = read_sites(reading)
+    couplings = read_couplings(reading)
+    loops = read_loops(reading, touching)
+    sensors = read_sensors(reading)
+    nothing_of(reading)
+    found = {
+        **world_tables(reading),
+        "body": bodies,
+        **statics,
+        **contacts,
+        "joint": [*joints, *loops],
+        "coupling": couplings,
+        "site": sites,
+        "sensor": sensors,
+    }
+    taken(reading, found)
+    return {name: table for name, table in found.items() if table or name == "ground"}, gathered(reading.findings)
+
+
+def world_tables(reading: ModelReading) -> dict[str, Any]:
+    """Return [world] if gravity is not the usual one."""
+    gravity = numbers(np.array(reading.model.opt.gravity))
+    if reading.off("GRAVITY"):
+        gravity = [0.0, 0.0, 0.0]
+    return {} if tuple(gravity) == GRAVITY else {"world": {"gravity": gravity}}
+
+
+def nothing_of(reading: ModelReading) -> None:
+    """Note the parts that have no counterpart at all."""
+    model = reading.model
+    counts = {
+        "tendons": model.ntendon,
+        "skins": model.nskin,
+        "flexible bodies": model.nflex,
+        "plugins": model.nplugin,
+        "cameras": model.ncam,
+        "lights": model.nlight,
+        "materials": model.nmat,
+    }
+    lost = [f"{count} {what}" for what, count in counts.items() if count]
+    if lost:
+        reading.note("left out", ", ".join(lost), "they have no counterpart")
+    if model.opt.density or model.opt.viscosity:
+        amount = f"{model.opt.density:g} kg/m^3, {model.opt.viscosity:g} Pa s"
+        reading.note("left out", "the fluid", "nothing acts on bodies that move through it", amount)
+    if np.any(model.opt.wind):
+        reading.note("left out", "wind", "there is no fluid")
+    springs = [
+        k
+        for k in range(model.ntendon)
+        if any(np.any(of[k]) for of in (model.tendon_stiffness, model.tendon_damping, model.tendon_limited))
+    ]
+    if springs:
+        names = ", ".join(reading.name("tendon", k) or str(k) for k in springs)
+        reading.note("left out", f"springs, dampers and limits of tendons {names}", "they pull on nothing here")
+    if np.any(model.body_gravcomp):
+        amount = f"{np.max(model.body_gravcomp):g}"
+        reading.note("left out", "compensation of gravity", "all bodies have weight", amount)
+
+
+def taken(reading: ModelReading, tables: dict[str, Any]) -> None:
+    """Note what was taken over, in one line; names that had to change; the time step of the model."""
+    counted = {key: len(tables.get(key) or ()) for key in ("body", "joint", "coupling", "site", "sensor")}
+    motors = sum("motor" in table for table in tables["joint"])
+    frames = sum(table["mass"] == 0 for table in tables["body"])
+    parts = [f"{counted['body'] - frames} bodies", f"{counted['joint']} joints", f"{motors} motors"]
+    parts += [f"{frames} frames between joints of one body"] if frames else []
+    parts += [f"{counted[key]} {key}s" for key in ("coupling", "site", "sensor") if counted[key]]
+    finding = Finding("taken", ", ".join(parts), "as they are in the model")
+    reading.findings.insert(0, finding)
+    if reading.names.renamed:
+        names = ", ".join(f"{was} is {name}" for was, name in reading.names.renamed)
+        reading.note("taken", f"{len(reading.names.renamed)} parts under other names", names)
+    turned = [j for j in reading.joint_names if reading.model.jnt_type[j] > 1 and reading.reference(j)]
+    if turned:
+        text = "their coordinates are 0 at the reference pose: " + ", ".join(
+            f"{reading.joint_names[j]} is {reading.reference(j):g} less" for j in turned
+        )
+        reading.note("taken", f"{len(turned)} joints with a reference of their own", text)
+    reading.note("left out", f"time step {reading.model.opt.timestep:g} s", "the problem chooses its own")

@@ -1,4 +1,4 @@
-"""Tables of a robot as a file to read: comments say units, what came from where, and what is missing."""
+"""Tables of a robot as a readable file: comments give units, origins and losses."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from symphys.importing.findings import Finding
+from symphys.importing.records import Finding, counted
 from symphys.importing.robot import KINDS, Imported
-from symphys.importing.wording import counted
 
 WIDTH = 116
 BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -23,11 +22,11 @@ HEADINGS = {
 }
 UNITS = "Units are m, kg, s, rad, N and N m. Positions are in the world, with all joint coordinates 0."
 MOST_NOTES = 4
-"""Findings that are repeated beside one table."""
+"""Findings that are repeated beside one table, at most."""
 
 
 def robot_text(robot: Imported) -> str:
-    """The text of a robot file, which ``[[include]]`` takes: TOML with the findings as comments."""
+    """Return the text of a robot file for ``[[include]]``: TOML with the findings as comments."""
     tables = robot.tables
     head = [f"title = {basic(robot.title)}", f"description = {basic(described(robot))}", ""]
     head += comment(f"Made of {robot.file.name} by `symphys import`. {UNITS}")
@@ -41,7 +40,7 @@ def robot_text(robot: Imported) -> str:
     for key, value in tables.items():
         if isinstance(value, Mapping):
             lines += [f"[{name_of(key)}]", *entries(value), ""]
-        elif is_list_of_tables(value):
+        elif isinstance(value, list) and value and all(isinstance(each, Mapping) for each in value):
             for table in value:
                 lines += [*notes(table, robot.findings), f"[[{name_of(key)}]]", *entries(table), ""]
         else:
@@ -50,7 +49,7 @@ def robot_text(robot: Imported) -> str:
 
 
 def described(robot: Imported) -> str:
-    """What there is, in a sentence."""
+    """Return the contents of a robot in a sentence."""
     bodies = [table for table in robot.tables.get("body", ()) if table.get("mass") != 0]
     joints = robot.tables.get("joint", ())
     motors = sum("motor" in joint for joint in joints)
@@ -60,36 +59,35 @@ def described(robot: Imported) -> str:
 
 
 def sentence(finding: Finding) -> str:
-    """A finding in one line."""
+    """Return a finding in one line."""
     amount = f" ({finding.amount})" if finding.amount else ""
     return printable(f"{finding.what}: {finding.how}{amount}")
 
 
 def comment(text: str, first: str = "# ", later: str = "# ") -> list[str]:
-    """A text as lines of comment."""
+    """Return a text as lines of comment."""
     return textwrap.wrap(
         text, WIDTH, initial_indent=first, subsequent_indent=later, break_long_words=False, break_on_hyphens=False
     )
 
 
 def notes(table: Mapping[str, Any], findings: Sequence[Finding]) -> list[str]:
-    """What findings say of a table, by its name."""
+    """Return comments with the findings that name a table."""
     name = table.get("name")
     if not isinstance(name, str) or len(name) < 2:
         return []
     mention = re.compile(rf"(?<![\w.]){re.escape(name)}(?![\w.])")
     found = [finding for finding in findings if mention.search(finding.what)]
-    lines = [line for finding in found[:MOST_NOTES] for line in comment(sentence(finding))]
-    return lines
+    return [line for finding in found[:MOST_NOTES] for line in comment(sentence(finding))]
 
 
 def entries(table: Mapping[str, Any]) -> list[str]:
-    """The keys of a table, a line each, or several for what is long."""
+    """Return the keys of a table, a line each, or several for long values."""
     return [f"{name_of(key)} = {text_of(value, len(key) + 3)}" for key, value in table.items()]
 
 
 def text_of(value: Any, before: int = 0, indent: str = "") -> str:
-    """A value as TOML; what is wider than a line has a line for each entry of its longest list."""
+    """Return a value as TOML; one that is wider than a line has a line for each entry of its longest list."""
     value = value.tolist() if hasattr(value, "tolist") else value
     plain = one_line(value)
     if before + len(indent) + len(plain) <= WIDTH:
@@ -105,11 +103,12 @@ def text_of(value: Any, before: int = 0, indent: str = "") -> str:
 
 
 def rows(values: Sequence[Any], indent: str) -> Iterable[str]:
-    """Entries of a list as lines: several short ones in each."""
+    """Yield the entries of a list as lines, with several short ones in each."""
     line = ""
     for value in values:
         text = text_of(value, 1, indent)
-        if line and len(indent) + len(line) + len(text) + 3 <= WIDTH and "\n" not in text and not mapping(value):
+        short = not isinstance(value, Mapping) and "\n" not in text
+        if line and short and len(indent) + len(line) + len(text) + 3 <= WIDTH:
             line = f"{line}, {text}"
             continue
         if line:
@@ -119,13 +118,8 @@ def rows(values: Sequence[Any], indent: str) -> Iterable[str]:
         yield line
 
 
-def mapping(value: Any) -> bool:
-    """Whether it is a table."""
-    return isinstance(value, Mapping)
-
-
 def one_line(value: Any) -> str:
-    """A value as TOML in one line; numbers with all their digits."""
+    """Return a value as TOML in one line; numbers with all their digits."""
     match value:
         case bool():
             return "true" if value else "false"
@@ -145,7 +139,7 @@ def one_line(value: Any) -> str:
 
 
 def number(value: float) -> str:
-    """At most 15 digits; ``inf`` as TOML writes it."""
+    """Return a number with at most 15 digits; ``inf`` as TOML writes it."""
     if not math.isfinite(value):
         return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
     short = float(f"{value:.15g}")
@@ -153,20 +147,15 @@ def number(value: float) -> str:
 
 
 def basic(text: str) -> str:
-    """A TOML string on one line."""
+    """Return a TOML string on one line."""
     return json.dumps(printable(text), ensure_ascii=False).replace("\x7f", "")
 
 
 def printable(text: str) -> str:
-    """The text without what a line of a file cannot hold."""
+    """Replace characters that a line of a file cannot hold."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def name_of(key: str) -> str:
-    """A key as TOML."""
+    """Return a key as TOML."""
     return key if BARE.fullmatch(key) else basic(key)
-
-
-def is_list_of_tables(value: Any) -> bool:
-    """Whether it is written with double brackets."""
-    return isinstance(value, list) and bool(value) and all(isinstance(each, Mapping) for each in value)

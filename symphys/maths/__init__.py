@@ -1,1 +1,1 @@
-"""Functions of casadi types that every part of the dynamics uses: rotations, smoothed primitives."""
+"""Rotations and smoothed primitives for casadi types."""

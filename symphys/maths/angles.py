@@ -1,4 +1,4 @@
-"""Angles that differ by whole turns."""
+"""Angles modulo whole turns."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from symphys.types import Expr
 
 
 def nearest(angle: Expr, to: Expr) -> Expr:
-    """Of all angles that differ from ``angle`` by whole turns the one that is nearest to ``to`` [rad].
+    """Return the angle [rad] nearest to ``to`` that differs from ``angle`` by whole turns.
 
     Its derivative is that of ``angle``: ``to`` only chooses.
     """
@@ -16,5 +16,5 @@ def nearest(angle: Expr, to: Expr) -> Expr:
 
 
 def wrap_to_pi(angle: Expr) -> Expr:
-    """The angle between -pi and pi that differs from ``angle`` by whole turns [rad]."""
+    """Wrap an angle [rad] to the interval from -pi to pi."""
     return nearest(angle, 0.0)

@@ -1,4 +1,4 @@
-"""Functions whose expression is built once; a call puts it in place, many times faster than operation by operation."""
+"""Functions whose expression is built once; a call inlines it, many times faster than operation by operation."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from symphys.types import Expr
 
 
 def inlined(*sizes: int) -> Callable[[Callable[..., Expr]], Callable[..., Expr]]:
-    """Decorator of a function of column vectors of these sizes, which gives one matrix.
+    """Build a function of column vectors of these sizes, which gives one matrix, only once (decorator).
 
-    Its result is that of the function as it is written: casadi repeats every operation, and drops those with 0 and 1.
+    Results are those of the plain function: casadi repeats every operation, and drops those with 0 and 1.
     """
 
     def decorate(function: Callable[..., Expr]) -> Callable[..., Expr]:

@@ -13,26 +13,26 @@ from symphys.types import Expr
 SERIES_TERMS = 9
 """Terms of the series of cos and sinc: full double precision up to 2 rad, 1e-12 at half a turn."""
 MAX_ANGLE = 1e9
-"""[rad] largest angle whose whole turns can be taken off; rounding leaves nothing of a larger one."""
+"""[rad] Largest angle from which whole turns are removed; a larger one has no accuracy left."""
 UNIT_BAND = 1e-9
 """Largest deviation of a squared length from 1 that counts as rounding."""
 
 
 def cross_matrix(a: Expr) -> Expr:
-    """(3, 3): the matrix A with A b = a x b."""
+    """Return the matrix A (3, 3) with A b = a x b."""
     return ca.skew(a)
 
 
 @inlined(4, 4)
 def multiply(p: Expr, q: Expr) -> Expr:
-    """(4,): the quaternion product p q, which turns by q first."""
+    """Return the quaternion product p q (4,), which rotates by q first."""
     scalar = p[0] * q[0] - ca.dot(p[1:4], q[1:4])
     return ca.vertcat(scalar, p[0] * q[1:4] + q[0] * p[1:4] + ca.cross(p[1:4], q[1:4]))
 
 
 @inlined(4)
 def matrix(q: Expr) -> Expr:
-    """(3, 3): the rotation matrix R_wb of a unit quaternion."""
+    """Return the rotation matrix R_wb (3, 3) of a unit quaternion."""
     w, x, y, z = (q[i] for i in range(4))
     return ca.vertcat(
         ca.horzcat(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -42,7 +42,7 @@ def matrix(q: Expr) -> Expr:
 
 
 def exponential(r: Expr) -> Expr:
-    """(4,): the quaternion that turns by |r| [rad] about r, world frame.
+    """Return the quaternion (4,) that rotates by |r| [rad] about ``r``, world frame.
 
     cos(|r|/2) and sin(|r|/2)/|r| as polynomials in |r|^2, so every derivative is finite at r = 0. Whole turns are taken
     off first: with them the polynomials would not give a rotation. Beyond ``MAX_ANGLE`` no turn is made.
@@ -59,29 +59,29 @@ def exponential(r: Expr) -> Expr:
 
 
 def logarithm(q: Expr) -> Expr:
-    """(3,): the rotation vector [rad] of a unit quaternion, of length pi at most; the inverse of ``exponential``."""
+    """Return the rotation vector (3,) [rad] of a unit quaternion, at most pi long; the inverse of ``exponential``."""
     q = ca.if_else(q[0] < 0, -q, q)
     sine = length(q[1:4])
     return 2 * ca.atan2(sine, q[0]) / sine * q[1:4]
 
 
 def between(p: Expr, q: Expr) -> Expr:
-    """(3,): the rotation vector [rad] that turns orientation ``p`` into ``q``, world frame."""
+    """Return the rotation vector (3,) [rad] from orientation ``p`` to ``q``, world frame."""
     return logarithm(multiply(q, ca.vertcat(p[0], -p[1:4])))
 
 
 def turn(q: Expr, r: Expr) -> Expr:
-    """(4,): orientation ``q`` after a rotation by the vector ``r`` [rad], world frame; of length 1 up to rounding."""
+    """Return orientation ``q`` (4,) rotated by the vector ``r`` [rad], world frame; of length 1 up to rounding."""
     return unit(multiply(exponential(r), q))
 
 
 def unit(q: Expr) -> Expr:
-    """(4,): a quaternion of almost length 1 nearer to it: a step of Newton's method."""
+    """Normalise a quaternion (4,) of almost length 1 by one step of Newton's method."""
     return q * (3 - ca.dot(q, q)) / 2
 
 
 def normalised(q: Expr) -> Expr:
-    """(4,): a quaternion of any length but 0, divided by its length; as it stands within ``UNIT_BAND`` of length 1."""
+    """Normalise a quaternion (4,) of any length but 0; within ``UNIT_BAND`` of length 1 it stays as it is."""
     largest = ca.fmax(ca.fmax(ca.fabs(q[0]), ca.fabs(q[1])), ca.fmax(ca.fabs(q[2]), ca.fabs(q[3])))
     scaled = q / largest
     near = ca.fabs(ca.dot(q, q) - 1) <= UNIT_BAND
@@ -89,5 +89,5 @@ def normalised(q: Expr) -> Expr:
 
 
 def rotate(q: Expr, a: Expr) -> Expr:
-    """(3,): the body-frame vector ``a`` in world coordinates."""
+    """Return the body-frame vector ``a`` in world coordinates (3,)."""
     return ca.mtimes(matrix(q), a)

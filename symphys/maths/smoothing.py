@@ -19,7 +19,7 @@ TINY_RAMP = 1e-18
 
 
 def positive(x: Expr, width: Expr) -> Expr:
-    """max(x, 0); for width w > 0 (x + sqrt(x^2 + w^2)) / 2, which lies above it by at most w / 2, at x = 0.
+    """Return max(x, 0), or for width w > 0 (x + sqrt(x^2 + w^2)) / 2, which exceeds it by at most w / 2, at x = 0.
 
     The fixed point of y = positive(y - c, w) is y c = w^2 / 4: the central path of y >= 0, c >= 0, y c = 0.
     """
@@ -27,23 +27,23 @@ def positive(x: Expr, width: Expr) -> Expr:
 
 
 def positive_slope(x: Expr, width: Expr) -> Expr:
-    """The slope of ``positive``; 0 at x = 0 where it is exact."""
+    """Return the slope of ``positive``; 0 at x = 0 for width 0."""
     smooth = (1 + x / ca.sqrt(x * x + width * width + TINY_WIDTH_SQUARE)) / 2
     return ca.if_else(width > 0, smooth, x > 0)
 
 
 def ramp(x: Expr, width: Expr) -> Expr:
-    """From 0 to 1 as x goes from -``width`` to ``width``, in a straight line; a step where the width is 0."""
+    """Rise linearly from 0 to 1 as x goes from -``width`` to ``width``; a step for width 0."""
     return ca.fmin(ca.fmax((1 + x / (width + TINY_RAMP)) / 2, 0), 1)
 
 
 def at_least(x: Expr, low: Expr, width: Expr) -> Expr:
-    """max(x, low), and low + positive(x - low, w) for width w > 0."""
+    """Return max(x, low), or low + positive(x - low, w) for width w > 0."""
     return ca.if_else(width > 0, low + _soft(x - low, width), ca.fmax(x, low))
 
 
 def at_most(x: Expr, high: Expr, width: Expr) -> Expr:
-    """min(x, high), likewise."""
+    """Return min(x, high), or high - positive(high - x, w) for width w > 0."""
     return ca.if_else(width > 0, high - _soft(high - x, width), ca.fmin(x, high))
 
 
@@ -52,28 +52,28 @@ def _soft(x: Expr, width: Expr) -> Expr:
 
 
 def clip(x: Expr, low: Expr, high: Expr, width: Expr) -> Expr:
-    """X held in [low, high]; leaves it by at most ``width`` / 2 at either end when smooth."""
+    """Limit ``x`` to [low, high], exceeded by at most ``width`` / 2 at either end when smooth."""
     return low + positive(x - low, width) - positive(x - high, width)
 
 
 def either(a: Expr, b: Expr) -> Expr:
-    """Logical or of two flags, 0 or 1; where one is known to be 0 it is the other as it stands."""
+    """Return the logical or of two flags, 0 or 1; a constant 0 leaves the other flag unchanged."""
     return a + b - a * b
 
 
 def length(a: Expr) -> Expr:
-    """|a| of a vector, with slope 0 at a = 0 (width 1e-12)."""
+    """Return |a| of a vector, with slope 0 at a = 0 (width 1e-12)."""
     return ca.sqrt(ca.dot(a, a) + TINY_SQUARE)
 
 
 def angle_of(sine: Expr, cosine: Expr) -> Expr:
-    """atan2(sine, cosine) [rad], with finite slopes where both are 0: the cosine is 1e-12 there."""
+    """Return atan2(sine, cosine) [rad], with finite slopes where both are 0: the cosine is 1e-12 there."""
     nowhere = sine * sine + cosine * cosine < TINY_SQUARE
     return ca.atan2(sine, ca.if_else(nowhere, TINY_SQUARE**0.5, cosine))
 
 
 def onto_disc(y: Expr, radius: Expr, width: Expr, smoothing: Expr) -> Expr:
-    """The point of the disc |y| <= radius nearest to ``y``; with smoothing > 0 pulled inside over ``width``.
+    """Project ``y`` onto the disc |y| <= radius; with smoothing > 0 it is pulled inside over ``width``.
 
     Exact: y radius / |y| outside, y inside. Smooth: y radius / (radius + positive(|y| - radius, width)).
     """

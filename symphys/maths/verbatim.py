@@ -1,4 +1,4 @@
-"""Expressions as they are written: what casadi simplifies between functions may round otherwise than each by itself."""
+"""Expressions without simplification: one that spans several functions may round differently from each by itself."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import casadi as ca
 
 _LOCK = Lock()
 _OPEN: list[object] = []
-"""One for each context that is open, in any thread: the option is one for all."""
+"""An entry for each open context of any thread, since the option is global."""
 
 
 @contextmanager
 def verbatim() -> Iterator[None]:
-    """Within, no operation is simplified as it is made: (x - y) + y is not x, as it is not from call to call."""
+    """Switch off casadi's simplification of operations in the block: (x - y) + y stays so, as between functions."""
     with _LOCK:
         _OPEN.append(None)
         ca.GlobalOptions.setSimplificationOnTheFly(False)

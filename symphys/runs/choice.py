@@ -1,6 +1,6 @@
-"""Which solvers a problem gets where none is named, and why: the first of ``SITUATIONS`` that it is in.
+"""Automatic solver choice for problems that name no solver: the first of ``SITUATIONS`` that holds decides.
 
-The choice follows from what the file asks for alone; nothing is built or evaluated for it. docs/results/profiles.md has
+The choice follows from the problem file alone; nothing is built or evaluated for it. docs/results/profiles.md has
 the measurements behind it.
 """
 
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from symphys.problem import Constraint, Cost, Problem, Target
 
-FEW = 300
-"""Numbers up to which a search without gradients, or a Jacobian, is worth its evaluations."""
+MAX_SMALL = 300
+"""Length of z up to which a derivative-free search, or a Jacobian, is worth its evaluations."""
 ALWAYS = "always"
 
 
@@ -30,12 +30,12 @@ class ChosenSolver:
 
 @dataclass(frozen=True)
 class Situation:
-    """What problems have in common that get the same solvers.
+    """A class of problems that get the same solvers.
 
     Attributes:
-        name: in a few words.
-        holds: whether a problem is in it, given that it is in none before it.
-        solvers: the one that fits best first.
+        name: a short description.
+        holds: whether a problem is in it, given that no earlier situation holds.
+        solvers: the best fit first.
     """
 
     name: str
@@ -44,28 +44,23 @@ class Situation:
 
 
 def chosen(problem: Problem) -> tuple[ChosenSolver, ...]:
-    """The solvers of a problem that names none."""
+    """Return the solvers of a problem that names none, the best fit first."""
     return situation(problem).solvers
 
 
 def situation(problem: Problem) -> Situation:
-    """The first that a problem is in."""
+    """Return the first situation that holds for a problem."""
     return next(each for each in SITUATIONS if each.holds(problem))
 
 
 def chosen_lines(problem: Problem, named: Sequence[str] | None = None) -> list[str]:
-    """A line for each solver that is chosen for a problem; none where ``named`` or the file names some."""
+    """Return a line for each solver that is chosen for a problem; none where ``named`` or the file names some."""
     return [] if named or problem.solvers else [f"{problem.name}: {each}" for each in chosen(problem)]
 
 
-def numbers(problem: Problem) -> int:
-    """The length of z."""
-    return sum(variable.guess.size for variable in problem.variables)
-
-
-def few_scenarios(problem: Problem) -> bool:
-    """Whether samples of scenarios differ, and values alone can tell where to go."""
-    return problem.scenarios is not None and numbers(problem) <= FEW
+def is_small(problem: Problem) -> bool:
+    """Whether z has at most ``MAX_SMALL`` components."""
+    return sum(variable.guess.size for variable in problem.variables) <= MAX_SMALL
 
 
 def staged(problem: Problem) -> bool:
@@ -98,7 +93,7 @@ def limited(problem: Problem) -> bool:
 SITUATIONS = (
     Situation(
         "scenarios, few numbers",
-        few_scenarios,
+        lambda problem: problem.scenarios is not None and is_small(problem),
         (
             ChosenSolver("stochastic", "samples of its scenarios differ, and it follows the mean of their gradients"),
             ChosenSolver("evolution", "values show where a motion ends early, and gradients do not"),
@@ -119,7 +114,7 @@ SITUATIONS = (
     ),
     Situation(
         "controls over time, squares at instants",
-        lambda problem: staged(problem) and squares(problem) and not along(problem) and numbers(problem) <= FEW,
+        lambda problem: staged(problem) and squares(problem) and not along(problem) and is_small(problem),
         (
             ChosenSolver("least_squares", "squares at a few instants make a Jacobian of few rows"),
             ChosenSolver("ilqr", "its controls act over time, and feedback leads steps around kinks"),
@@ -143,7 +138,7 @@ SITUATIONS = (
     ),
     Situation(
         "few numbers, squares",
-        lambda problem: squares(problem) and numbers(problem) <= FEW,
+        lambda problem: squares(problem) and is_small(problem),
         (
             ChosenSolver("least_squares", "a few numbers set what is squared"),
             ChosenSolver("cma", "among few numbers a search needs no gradient, and passes kinks and plateaus"),
@@ -151,7 +146,7 @@ SITUATIONS = (
     ),
     Situation(
         "few numbers, other costs",
-        lambda problem: numbers(problem) <= FEW,
+        is_small,
         (
             ChosenSolver("ipopt", "its costs are no squares, and a few numbers set them"),
             ChosenSolver("cma", "among few numbers a search needs no gradient, and passes kinks and plateaus"),
@@ -163,4 +158,4 @@ SITUATIONS = (
         (ChosenSolver("gradient", "a gradient costs the same for any number of them"),),
     ),
 )
-"""In the order in which they are asked."""
+"""In order of precedence: the first that holds decides."""

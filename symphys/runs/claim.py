@@ -1,4 +1,4 @@
-"""The right to work in a run folder: claimed by a folder in it, so that any number of commands share a batch.
+"""The lock of a run folder, held by a folder in it, so that any number of commands can share a batch.
 
 A claim is a folder ``.claim/TOKEN`` in the run folder, with a text that says who holds it. It is made under a name of
 its own, and the folder around it is renamed to ``.claim``. That works only where ``.claim`` is missing or empty, so
@@ -33,30 +33,32 @@ from symphys import json_values as values
 BEAT = 10.0
 """[s] between two touches of a claim."""
 LEASE = 120.0
-"""[s] without a touch after which a claim of another machine is over; longer than any call that stops all threads."""
+"""[s] without a touch after which a claim of another machine is over; longer than any call that blocks all threads."""
 HELD = ".claim"
 """The folder that holds the claim of a run folder."""
 ASIDE = ".claim-"
-"""What the names begin with under which claims are made and put away."""
+"""Prefix of the names under which claims are made and put away."""
 OWNER = "owner"
-"""The file of a claim that says who holds it."""
+"""The file of a claim that names its owner."""
 TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOENT)
-"""How a claim fails where another is, or where another has tidied up what was made for it."""
+"""Errors of a rename where another claim exists, or where another process has removed the prepared folder."""
+seen: dict[Path, tuple[int, float]] = {}
+"""Claims that this process waits for: the time of the last touch, and since when [s] this process has seen it."""
 
 
 class FolderBusy(files.FileError):
-    """Another process is working in the folder."""
+    """Raised where another process is working in the folder."""
 
 
 @dataclass(frozen=True)
 class Owner:
-    """Who holds a claim.
+    """The process that holds a claim.
 
     Attributes:
-        host: the machine's name, for people.
-        machine: what tells it from others: boot, and the space that process numbers are in.
+        host: the name of the machine, for messages.
+        machine: identifies it: boot id and the namespace of process numbers.
         process: its number.
-        begun: when the process began, as the system counts; empty where that is not known.
+        begun: the start of the process in ticks; empty where that is not known.
         token: different for each claim.
     """
 
@@ -67,7 +69,7 @@ class Owner:
     token: str = ""
 
     def __str__(self) -> str:
-        """For messages."""
+        """Return a description for messages."""
         return f"process {self.process} on {self.host}" if self.host else "another process"
 
     @property
@@ -89,7 +91,7 @@ class Owner:
 
 @cache
 def machine() -> str:
-    """What tells this machine, since it was started, from all others; empty where processes cannot be asked after."""
+    """Return an identifier of this machine since its boot; empty where processes cannot be looked up."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="utf-8").strip()
         return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
@@ -98,7 +100,7 @@ def machine() -> str:
 
 
 def beginning(process: int) -> str:
-    """When a process of this machine began, in ticks since its boot; empty where that is not known, or it is over."""
+    """Return the start of a process in ticks since boot; empty if unknown, "over" if the process has ended."""
     try:
         fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
     except OSError:
@@ -107,13 +109,13 @@ def beginning(process: int) -> str:
 
 
 def myself() -> Owner:
-    """This process, for a new claim."""
+    """Return this process as the owner of a new claim."""
     return Owner(*this_process(os.getpid()), uuid.uuid4().hex)
 
 
 @cache
 def this_process(number: int) -> tuple[str, str, int, str]:
-    """What does not change in the life of a process: host, machine, number, beginning."""
+    """Return the constants of a process: host, machine, number, start."""
     return socket.gethostname(), machine(), number, beginning(number)
 
 
@@ -131,12 +133,12 @@ class Claim:
 
     @property
     def path(self) -> Path:
-        """Its folder."""
+        """The folder of the claim."""
         return self.folder / HELD / self.owner.token
 
     @property
     def held(self) -> bool:
-        """Whether it still counts: nobody has taken the run over since, as after a sleep that was longer than LEASE."""
+        """Whether the claim still counts; after a long sleep another process may have taken the run over."""
         return self.path.is_dir()
 
     def check(self) -> None:
@@ -145,7 +147,7 @@ class Claim:
             raise self.lost()
 
     def publish(self, name: str, content: bytes) -> None:
-        """Put a file into the run folder, whole, at an instant at which the claim is held.
+        """Move a complete file into the run folder, at an instant at which the claim is held.
 
         Raises:
             FolderBusy: it is not held any more; nothing was written.
@@ -163,7 +165,7 @@ class Claim:
             raise files.FileError(f"cannot write {path}: {files.reason(error)}") from error
 
     def touch(self) -> None:
-        """Say that this process is at work."""
+        """Show that this process is still at work."""
         with contextlib.suppress(OSError):
             os.utime(self.path)
 
@@ -190,17 +192,17 @@ class Claim:
         return True
 
     def release(self) -> None:
-        """Let others in, unless another has taken the run over."""
+        """Release the lock, unless another process has taken the run over."""
         evict(self.path)
 
     def lost(self) -> FolderBusy:
-        """The error of a holder that is none any more."""
+        """Return the error for a claim that was taken over."""
         return FolderBusy(f"{self.folder} was taken over by another command while this one stood still")
 
 
 @contextlib.contextmanager
 def claimed(folder: Path) -> Iterator[Claim]:
-    """Hold the folder; it is made if there is none.
+    """Hold the claim of a folder, which is made if there is none.
 
     Raises:
         FolderBusy: another process is at work there, or may be.
@@ -216,7 +218,7 @@ def claimed(folder: Path) -> Iterator[Claim]:
 
 
 def take(folder: Path) -> Claim:
-    """Claim a folder; see ``claimed``."""
+    """Claim a folder; raises as ``claimed`` does."""
     while True:
         files.make_folder(folder)
         for path in occupied(folder):
@@ -230,7 +232,7 @@ def take(folder: Path) -> Claim:
 
 
 def occupied(folder: Path) -> list[Path]:
-    """The claims in a run folder: one at most, unless somebody else has put something there."""
+    """Return the claims in a run folder: one at most, unless something else was put there."""
     try:
         return sorted((folder / HELD).iterdir())
     except OSError:
@@ -271,30 +273,26 @@ def put(path: Path, content: bytes) -> None:
 
 
 def holder(folder: Path) -> tuple[Path, Owner] | None:
-    """The claim in a folder, and who holds it as far as its file says; None for none."""
+    """Return the claim in a folder and its owner; None if there is none."""
     return next(((path, read_owner(path)) for path in occupied(folder)), None)
 
 
 def owner(folder: Path) -> Owner | None:
-    """Who is at work in a folder, as far as its files say; None: nobody."""
+    """Return the process at work in a folder, as far as its files say; None if there is none."""
     found = holder(folder)
     return None if found is None or (found[1].here and not found[1].alive) else found[1]
 
 
 def read_owner(path: Path) -> Owner:
-    """The owner that a claim names; one without a name if it cannot be read."""
+    """Return the owner of a claim; an anonymous one if its file cannot be read."""
     try:
         return values.record(Owner, json.loads(files.read_text(path / OWNER)), values.verbatim)
     except (ValueError, RecursionError, files.FileError):
         return Owner()
 
 
-seen: dict[Path, tuple[int, float]] = {}
-"""Of claims that this process waits for: when the folder was last touched, and since when [s] that has been so here."""
-
-
 def is_over(path: Path, found: Owner) -> bool:
-    """Whether nobody stands behind a claim any more."""
+    """Whether the process behind a claim has ended."""
     if found.here:
         return not found.alive
     try:
@@ -309,10 +307,10 @@ def is_over(path: Path, found: Owner) -> bool:
 
 
 class Heart:
-    """Touches the claims of this process, in a thread of its own."""
+    """A thread that touches the claims of this process."""
 
     def __init__(self) -> None:
-        """No claim is held."""
+        """Start without claims."""
         self.claims: set[Claim] = set()
         self.lock = threading.Lock()
         self.thread: threading.Thread | None = None
@@ -328,12 +326,12 @@ class Heart:
                 self.thread.start()
 
     def drop(self, claim: Claim) -> None:
-        """Let it rest."""
+        """Stop touching a claim."""
         with self.lock:
             self.claims.discard(claim)
 
     def run(self) -> None:
-        """Touch all claims, for ever."""
+        """Touch all claims, forever."""
         while True:
             time.sleep(BEAT)
             with self.lock:
@@ -343,4 +341,4 @@ class Heart:
 
 
 HEART = Heart()
-"""Of this process."""
+"""The one thread of this process."""

@@ -1,34 +1,73 @@
-"""One run from its beginning to a finished folder."""
+"""One run from its beginning to a finished folder: claim it, solve, judge by the exact rollout, examine, write."""
 
 from __future__ import annotations
 
 import contextlib
+import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from time import monotonic
+from typing import Any
 
 from symphys import files
+from symphys import verification as trust
+from symphys.codegen.backends import PRECISIONS, require_kernels
 from symphys.errors import SymphysError, Unavailable
-from symphys.results.file_names import CHECKPOINT, LOG, RESULT
+from symphys.findings.examination import Examination
+from symphys.findings.obstacles import obstacles
+from symphys.findings.writing import capital
+from symphys.problem import Problem
+from symphys.results.file_names import CHECKPOINT, GAINS, GUESS, LOG, MULTIPLIERS, RESULT, SCENE, TRAJECTORY
 from symphys.results.result import Result
+from symphys.results.scene_of_problem import make_scene
 from symphys.results.table.journal import Journal
 from symphys.runs.claim import Claim, FolderBusy, claimed, clear
+from symphys.runs.inspection import UNFINISHED, RunInspection, RunState, inspect_run
 from symphys.runs.job import Job
-from symphys.runs.record import checkpoint_rows, failure, interruption
-from symphys.runs.requirements import transcribed
-from symphys.runs.solving import silent, solve
-from symphys.runs.standing import MISSING, Standing, Stands, standing
-from symphys.runs.transcription_cache import Transcriptions
-from symphys.solvers import Monitor, Outcome
+from symphys.runs.record import Judgement, checkpoint_rows, failure, interruption, judged, make_result, trace_row, used
+from symphys.shooting import ShootingProblem
+from symphys.solvers import OUTCOME, Keep, Monitor, Outcome, Status, plain_outcome, revived_outcome, solver
+from symphys.transcription import Transcription, guessed
+from symphys.types import Array
 
-KEPT = 10.0
-"""[s] between two checkpoints of a run that goes on, at least."""
+Transcribe = Callable[[Problem, bool], Transcription]
+"""(problem, whether it is only ever evaluated without smoothing) -> its transcription."""
+Transcriptions = Callable[[Job], Transcription]
+"""Job -> the transcription of its problem, such as a ``TranscriptionCache``."""
+SAMPLES = "samples of [[scenario]] tables are evaluated by compiled kernels, and none can be made here"
+SMOOTHED = (
+    "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing, or add a stage at 0, "
+    "such as smoothing = [0.1, 0.01, 0]"
+)
+DIFFERENTIATING = ("gradient", "least_squares", "ipopt", "stochastic")
+"""Solvers that use the backend's gradients; those that solve stage by stage always have double precision."""
+JUDGING = "rolling it out exactly"
+"""The progress message with which judging a solution begins."""
+CHECKPOINT_INTERVAL = 10.0
+"""[s] at least between two checkpoints of a run."""
 SHARE = 50
-"""A checkpoint takes at most one of so many seconds."""
+"""Writing checkpoints takes at most one second in so many."""
 
 
-def unheard(resumed: bool) -> None:
-    """Tell nobody that a run begins."""
+def no_callback(_: object) -> None:
+    """No-op."""
+
+
+class TranscriptionCache:
+    """The transcription of the most recent problem; only one is kept, since one problem's functions may be large."""
+
+    def __init__(self, transcribe: Transcribe) -> None:
+        """Start empty."""
+        self.transcribe = transcribe
+        self.made: tuple[object, Transcription] | None = None
+
+    def __call__(self, job: Job) -> Transcription:
+        """Return the transcription of the job's problem, with the job's guess."""
+        if self.made is None or self.made[0] != job.subject:
+            self.made = None
+            self.made = (job.subject, self.transcribe(job.problem, not job.smooth))
+        return guessed(self.made[1], job.problem) if job.guess.digest else self.made[1]
 
 
 def execute(
@@ -36,23 +75,23 @@ def execute(
     monitor: Monitor,
     transcriptions: Transcriptions,
     solved: Outcome | None = None,
-    tell: Callable[[str], None] = silent,
-    begin: Callable[[bool], None] = unheard,
+    tell: Callable[[str], None] = no_callback,
+    begin: Callable[[bool], None] = no_callback,
     bounded: bool = False,
 ) -> Result:
-    """Do the run, or go on with it, unless it is over; write its folder; return what it found.
+    """Do the run, or resume it, unless it is over; write its folder; return the result.
 
-    ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can go on later.
-    ``solved``: what its solver has found already, side by side with other seeds. ``tell``: see ``solving.solve``.
-    ``begin``: is called with whether it goes on, once it is claimed; not for a run that was over.
-    ``bounded``: whether a limit may kill this process, so that checkpoints are kept as often as they are cheap.
-    A run that fails is a result with the status "failed", and so is one whose folder cannot be written.
+    ``monitor`` sees each iteration and may raise KeyboardInterrupt, which ends the run so that it can resume later.
+    ``solved``: the outcome if seeds were solved side by side. ``tell``: see ``solve``. ``begin`` is called once the run
+    is claimed, with whether it resumes; not for a run that was over. ``bounded``: whether a limit may kill this
+    process, so that checkpoints are written as often as they are cheap.
+    A run that fails gives a result with the status "failed", as does one whose folder cannot be written.
 
     Raises:
-        FolderBusy: another process is at this run, or has taken it over.
+        FolderBusy: another process is working on this run, or has taken it over.
     """
-    found = standing(job)
-    if found.result and over(job, found):
+    found = inspect_run(job)
+    if found.result and is_over(job, found):
         return found.result
     try:
         with claimed(job.folder.path) as claim:
@@ -69,40 +108,21 @@ def with_claim(
     monitor: Monitor,
     transcriptions: Transcriptions,
     solved: Outcome | None = None,
-    tell: Callable[[str], None] = silent,
-    begin: Callable[[bool], None] = unheard,
+    tell: Callable[[str], None] = no_callback,
+    begin: Callable[[bool], None] = no_callback,
     bounded: bool = False,
 ) -> Result:
-    """``execute`` for a run that this process has claimed; FileError for a folder that cannot be written."""
-    found = standing(job)
-    if found.result and over(job, found):
+    """Do what ``execute`` does for a run that this process has claimed; FileError if the folder cannot be written."""
+    found = inspect_run(job)
+    if found.result and is_over(job, found):
         return found.result
     begin(found.checkpoint is not None)
-    return proceed(job, claim, found, monitor, transcriptions, solved, tell, bounded)
-
-
-def over(job: Job, found: Standing) -> bool:
-    """Whether there is nothing to do, as the run is over and not to be made again."""
-    return found.stands not in MISSING and (not job.outdated or found.stamp != job.outdated)
-
-
-def proceed(
-    job: Job,
-    claim: Claim,
-    found: Standing,
-    monitor: Monitor,
-    transcriptions: Transcriptions,
-    solved: Outcome | None,
-    tell: Callable[[str], None],
-    bounded: bool = False,
-) -> Result:
-    """Solve and write down what came of it."""
     job.folder.clear()
     clear(job.folder.path, claim)
     if not found.checkpoint:
         job.folder.begin(job.config, job.problem.text)
     log = Log(job)
-    keeper = CheckpointKeeper(claim, log, 0.0 if bounded else KEPT)
+    keeper = CheckpointKeeper(claim, log, 0.0 if bounded else CHECKPOINT_INTERVAL)
     try:
         result = solve(job, transcribed(job, transcriptions), claim, monitor, log, keeper, found, solved, tell, bounded)
     except files.FileError:
@@ -118,15 +138,197 @@ def proceed(
         with contextlib.suppress(files.FileError):  # a full disk is reported by what comes after
             claim.check()
             log.write()
-    finish(job, claim, result)
+    # the result is written last, so that it exists only where the other files are whole
+    write_result(job, claim, result)
+    if not (result.interrupted or result.again) and claim.held:
+        files.remove(job.folder.path / CHECKPOINT)
     return result
 
 
+def is_over(job: Job, found: RunInspection) -> bool:
+    """Whether there is nothing to do: the run is over and not to be repeated."""
+    return found.state not in UNFINISHED and (not job.outdated or found.stamp != job.outdated)
+
+
+def transcribed(job: Job, transcriptions: Transcriptions) -> Transcription:
+    """Transcribe the job's problem.
+
+    Raises:
+        Unavailable: the machine lacks what the job's solver needs. Raised before anything is built where possible.
+        SymphysError: the job's backend cannot evaluate what its solver draws.
+    """
+    backend, wants = job.config.backend, solver(job.config.solver).scenarios
+    # a solver that is for all problems uses samples only where the backend can evaluate them
+    if job.problem.scenarios is None or not (wants or (wants is None and backend in PRECISIONS)):
+        return transcriptions(job)
+    if backend not in PRECISIONS:
+        raise SymphysError(
+            f"the solver {job.config.solver} draws samples of [[scenario]] tables, which the backend {backend} cannot "
+            f"evaluate: use {', '.join(list(PRECISIONS)[:-1])} or {list(PRECISIONS)[-1]}"
+        )
+    try:
+        require_kernels(backend)
+    except Unavailable as error:
+        raise Unavailable(f"{SAMPLES}: {error}") from error
+    found = transcriptions(job)
+    if found.shooting.scenario is None:
+        raise Unavailable(found.backend.note)
+    return found
+
+
+def solve(
+    job: Job,
+    transcription: Transcription,
+    claim: Claim,
+    monitor: Monitor,
+    log: Callable[[str], None],
+    keep: Keep,
+    found: RunInspection,
+    solved: Outcome | None = None,
+    tell: Callable[[str], None] = no_callback,
+    bounded: bool = False,
+) -> Result:
+    """Solve from the seed's guess, or resume from the checkpoint in ``found``; write all files but the result.
+
+    ``solved``: the outcome if seeds were solved side by side; its seconds are those of the group. ``tell`` is called
+    with a few words before each part of judging. ``bounded``: whether a limit may kill the process, so that the
+    solver's outcome is saved before it is judged.
+    """
+    shooting = replace(transcription.shooting, multipliers=job.guess.multipliers)
+    log(f"evaluated by {transcription.backend}")
+    for note in job.guess.notes:
+        log(f"guess from {job.guess.folder}: {note}")
+    start = shooting.start(job.config.seed)
+    at_once = found.result is not None  # without an earlier result nothing counts before the new one is written
+    claim.check()
+    files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays(), at_once)
+    if solved is None:
+        single = transcription.backend.precision == "single"
+        outcome, spent = solve_alone(job, shooting, start, monitor, log, keep, found.checkpoint, single)
+        if doubt := transcription.backend.later():
+            log(doubt)
+        keep_outcome(job, claim, outcome, spent + spent_before(found), bounded)
+    else:
+        log("solved side by side with other seeds: the seconds are those of all")
+        outcome, spent = solved, solved.trace[-1].seconds if solved.trace else 0.0
+    spent += spent_before(found)
+    judgement = judge(transcription, outcome, job.examine, tell)
+    price = transcription.prices(used(outcome.counts))
+    claim.check()
+    write(job, transcription, outcome, judgement, price, at_once)
+    seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
+    return make_result(job, transcription, outcome, judgement, price, seconds)
+
+
+def solve_alone(
+    job: Job,
+    shooting: ShootingProblem,
+    start: Array,
+    monitor: Monitor,
+    log: Callable[[str], None],
+    keep: Keep,
+    checkpoint: dict[str, Any] | None,
+    single: bool,
+) -> tuple[Outcome, float]:
+    """Return the outcome and the seconds it took; an outcome that the checkpoint holds already is taken from there.
+
+    ``single``: whether gradients are in single precision.
+    """
+    if checkpoint and OUTCOME in checkpoint:
+        log("solved before; what it found is judged")
+        return revived_outcome(checkpoint, job.config.solver), 0.0
+    chosen = solver(job.config.solver)
+    chosen.prepare()
+    began = time.perf_counter()
+    if single and job.config.solver in DIFFERENTIATING:
+        log("comparing the first gradient with double precision")  # by the kernel, see backends.precision
+        shooting.evaluator.gradient(start[None], getattr(job.options, "smoothing", (0.0,))[0])
+    outcome = chosen.solve(
+        shooting, start, job.options, job.config.seed, monitor=monitor, checkpoint=checkpoint, log=log, keep=keep
+    )
+    return outcome, time.perf_counter() - began
+
+
+def keep_outcome(job: Job, claim: Claim, outcome: Outcome, seconds: float, bounded: bool) -> None:
+    """Save what the solver needs to resume, or, where a limit may end the judging, its outcome."""
+    if outcome.status is Status.INTERRUPTED:
+        claim.publish(CHECKPOINT, files.json_text(outcome.checkpoint).encode())
+    elif bounded:
+        kept = plain_outcome(outcome, job.config.solver, seconds)
+        claim.publish(CHECKPOINT, files.json_text(kept).encode())
+
+
+def spent_before(found: RunInspection) -> float:
+    """Return the time of solving [s] before the checkpoint; if the process was killed, up to its last iteration."""
+    if not found.checkpoint:
+        return 0.0
+    if found.result:
+        return found.result.seconds.get("solve", 0.0)
+    seconds = found.checkpoint.get("seconds", 0.0)
+    return float(seconds) if isinstance(seconds, int | float) else 0.0
+
+
+def judge(
+    transcription: Transcription, outcome: Outcome, examine: bool = True, tell: Callable[[str], None] = no_callback
+) -> Judgement:
+    """Roll the solution out exactly and examine it; ``tell`` as in ``solve``."""
+    tell(JUDGING)
+    try:
+        verdict = transcription.judge(outcome.z)
+        taken = transcription.record(outcome.z)
+        examined: dict[str, Any] | None = None
+        if outcome.status is not Status.INTERRUPTED:
+            examined = trust.examine(transcription, taken.z, tell) if examine else trust.survey(transcription, taken)
+    except SymphysError as error:
+        return Judgement(None, None, None, f"{outcome.advice} {error}".strip())
+    smoothed = outcome.status is Status.MET and not verdict.solved and outcome.trace[-1].smoothing > 0
+    well = verdict.solved and outcome.status in (Status.MET, Status.CONVERGED)
+    known = Examination.from_json(files.strict(examined or {}))
+    found = () if well else obstacles(known, judged(verdict))
+    # more iterations do not help where the costs outweigh a target
+    rest = "" if found and known.outweighed else outcome.advice or SMOOTHED * smoothed
+    return Judgement(verdict, taken.motion, examined, sentences([*found, rest]))
+
+
+def sentences(clauses: list[str]) -> str:
+    """Join clauses to sentences, without empty ones; the first keeps its case, and the last has no full stop."""
+    known = [clause for clause in clauses if clause]
+    return ". ".join([*known[:1], *map(capital, known[1:])])
+
+
+def write(
+    job: Job,
+    transcription: Transcription,
+    outcome: Outcome,
+    judgement: Judgement,
+    price: Mapping[str, float],
+    at_once: bool,
+) -> None:
+    """Write trace, gains, motion, scene and multipliers."""
+    job.folder.write_trace([trace_row(row, price) for row in outcome.trace], at_once)
+    if outcome.gains:
+        files.write_npz(job.folder.path / GAINS, outcome.gains, at_once)
+    if judgement.trajectory is not None:
+        files.write_npz(job.folder.path / TRAJECTORY, judgement.trajectory.arrays(), at_once)
+        z = transcription.shooting.by_block(outcome.z)
+        scene = make_scene(job.problem, z, judgement.trajectory)
+        files.write_json(job.folder.path / SCENE, scene.to_json(), at_once)
+    if outcome.multipliers:
+        files.write_npz(job.folder.path / MULTIPLIERS, outcome.multipliers, at_once)
+
+
+def write_result(job: Job, claim: Claim, result: Result) -> None:
+    """Write result.json unless the run was taken over, and record the run in the table of all runs."""
+    found = files.strict(result.to_json())
+    claim.publish(RESULT, files.json_text(found).encode())
+    Journal(job.folder.path.parents[1]).add(job.folder.path, (files.strict(job.config.to_json()), found))
+
+
 class Log:
-    """The text of log.txt: messages of the solver, line by line; a continued run adds to what is there."""
+    """The text of log.txt: messages of the solver, line by line; a resumed run appends."""
 
     def __init__(self, job: Job) -> None:
-        """Start from what an interrupted run wrote."""
+        """Start with the text of an interrupted run, if there is any."""
         self.path = job.folder.path / LOG
         self.text = ""
         with contextlib.suppress(files.FileError):
@@ -142,15 +344,15 @@ class Log:
 
 
 class CheckpointKeeper:
-    """Writes a checkpoint now and then, so that a run whose process is killed goes on from there."""
+    """Saver of checkpoints at intervals, from which a run resumes if its process is killed."""
 
     def __init__(self, claim: Claim, log: Log, every: float) -> None:
-        """Write none before ``every`` [s] have passed, at the beginning and after each checkpoint."""
+        """Write no checkpoint before ``every`` [s] have passed since the start or the last one."""
         self.claim, self.log, self.every = claim, log, every
         self.due = monotonic() + every
 
     def __call__(self, make: Callable[[], dict[str, object]]) -> None:
-        """Take an offered checkpoint, if one is due; a folder that cannot be written now may be so later."""
+        """Write the offered checkpoint if one is due; a folder that cannot be written is tried again later."""
         began = monotonic()
         if began < self.due:
             return
@@ -164,25 +366,8 @@ class CheckpointKeeper:
         self.due = monotonic() + max(self.every, SHARE * (monotonic() - began))
 
 
-def finish(job: Job, claim: Claim, result: Result) -> None:
-    """Write the result, last of all files, so that it exists only where the others are whole.
-
-    The checkpoint stays where the same command goes on from there.
-    """
-    write_result(job, claim, result)
-    if not (result.interrupted or result.again) and claim.held:
-        files.remove(job.folder.path / CHECKPOINT)
-
-
-def write_result(job: Job, claim: Claim, result: Result) -> None:
-    """Write result.json if the run was not taken over, and keep the row of the run in the table of all runs."""
-    found = files.strict(result.to_json())
-    claim.publish(RESULT, files.json_text(found).encode())
-    Journal(job.folder.path.parents[1]).add(job.folder.path, (files.strict(job.config.to_json()), found))
-
-
 def stop_at_limit(job: Job, message: str) -> Result:
-    """Write that a limit ended the run's process, with the best point of its checkpoint, from where it can go on."""
+    """Write that a limit ended the run's process; the result has the best point of the checkpoint to resume from."""
 
     def stopped() -> Result:
         checkpoint = job.folder.checkpoint()
@@ -194,23 +379,23 @@ def stop_at_limit(job: Job, message: str) -> Result:
 
 
 def give_up(job: Job, message: str, again: bool) -> Result:
-    """Write that the run failed; see ``failure``."""
+    """Write that the run failed, and return the ``failure``."""
     failed = failure(job, message, again)
     return write_end(job, lambda: failed) or failed
 
 
 def write_end(job: Job, make: Callable[[], Result]) -> Result | None:
-    """Write how a run ended whose process is gone, and return what its folder says.
+    """Write how a run ended whose process is gone, and return the result that its folder holds.
 
-    A folder that says how the run ended is left as it is. One that another process works in, or that cannot be read,
-    is not touched: None. What ``make`` returns is the result even where it cannot be written.
+    A folder that has a result already is left as it is. A folder in which another process works, or that cannot be
+    read, is not touched, and None is returned. The result of ``make`` is returned even where it cannot be written.
     """
     result = None
     with contextlib.suppress(files.FileError), claimed(job.folder.path) as claim:
-        found = standing(job)
-        if found.result and over(job, found):
+        found = inspect_run(job)
+        if found.result and is_over(job, found):
             return found.result
-        if found.stands in (Stands.NEW, Stands.CHANGED, Stands.DAMAGED):
+        if found.state in (RunState.NEW, RunState.CHANGED, RunState.DAMAGED):
             job.folder.begin(job.config, job.problem.text)
         result = make()
         write_result(job, claim, result)

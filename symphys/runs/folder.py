@@ -1,4 +1,4 @@
-"""A run's folder: where its files are, and how they are begun."""
+"""The folder of a run: its files, and how a run begins there."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from symphys.results.file_names import (
 from symphys.results.trace import trace_text
 
 WRITTEN = (RESULT, CHECKPOINT, CONFIG, TRAJECTORY, GUESS, GAINS, MULTIPLIERS, SCENE, TRACE, LOG)
-"""What a run writes beside the problem; the result first, since nothing counts without it."""
+"""Files of a run besides the problem; the result is removed first, since nothing counts without it."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,7 +50,7 @@ class RunFolder:
         return cls(out / case_name(problem, settings or {}, guess) / f"{solver}-seed{seed}")
 
     def checkpoint(self) -> dict[str, object] | None:
-        """Where an interrupted run stopped; None if that is not known."""
+        """Return the checkpoint of an interrupted run; None if there is none that can be read."""
         try:
             value = files.numbers(files.read_json(self.path / CHECKPOINT))
         except files.FileError:
@@ -58,7 +58,7 @@ class RunFolder:
         return value if isinstance(value, dict) else None
 
     def begin(self, config: Config, problem_text: str) -> None:
-        """Take away what an earlier run of another configuration left, then write down what is asked for."""
+        """Remove the files of an earlier configuration, then write problem.toml and config.json."""
         files.make_folder(self.path)
         for name in WRITTEN:
             files.remove(self.path / name)
@@ -66,7 +66,7 @@ class RunFolder:
         files.write_json(self.path / CONFIG, config.to_json(), at_once=False)
 
     def clear(self) -> None:
-        """Take away what killed processes left under temporary names; whoever calls has claimed the folder."""
+        """Remove temporary files of killed processes; the caller must hold the claim of the folder."""
         begun = tuple(f".{name}." for name in (PROBLEM, *WRITTEN))
         for path in self.path.iterdir():
             if path.name.startswith(begun):

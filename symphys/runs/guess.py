@@ -1,4 +1,4 @@
-"""Another run as the guess: its variables by name, its motion, its multipliers."""
+"""Another run as the guess: its variables by name, resampled onto the problem's knots, its motion, its multipliers."""
 
 from __future__ import annotations
 
@@ -19,17 +19,16 @@ from symphys.results.discovery import is_run, run_folders
 from symphys.results.file_names import CONFIG, MULTIPLIERS, PROBLEM, TRAJECTORY
 from symphys.results.run import read_run
 from symphys.results.trajectories import read_trajectory
-from symphys.runs.knots import resampled
 from symphys.trajectory import Trajectory
 from symphys.types import Array
 
 DIGITS = 8
-"""Of the digest, in the names of folders."""
+"""Digits of the digest in the names of folders."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunGuess:
-    """What a run found, as the guess of others.
+    """The solution of a run, as the initial guess of others.
 
     Attributes:
         folder: of the run, as it was given.
@@ -50,7 +49,7 @@ class RunGuess:
 
 @dataclass(frozen=True)
 class GuessOrigin:
-    """Where a problem's guess was taken from, and how.
+    """The run from which the guess of a problem was taken.
 
     Attributes:
         folder: of the run, as it was given.
@@ -66,16 +65,16 @@ class GuessOrigin:
 
     @property
     def word(self) -> str:
-        """The part of a folder's name; empty without a guess."""
+        """The part of a folder's name that tells guesses apart; empty without one."""
         return f"guess={self.digest[:DIGITS]}" if self.digest else ""
 
 
 OWN_GUESS = GuessOrigin()
-"""That of the problem's file."""
+"""The guess of the problem file itself."""
 
 
 def read_guess_run(folder: str | Path) -> RunGuess:
-    """What a run found; SymphysError where the folder is none of a run, or the run found nothing."""
+    """Read the solution of a run; SymphysError if the folder is not that of a run, or the run has no solution."""
     path = Path(folder)
     if not path.is_dir() or not is_run([each.name for each in path.iterdir()]):
         inside = run_folders(path)[:1] if path.is_dir() else []
@@ -97,7 +96,7 @@ def read_guess_run(folder: str | Path) -> RunGuess:
 
 
 def interpolations(path: Path) -> dict[str, str]:
-    """Of the variables that act over time, as the problem in a run folder has them; empty if it cannot be read."""
+    """Return the interpolation of each control of the problem in a run folder; empty if it cannot be read."""
     try:
         problem = load_problem(path / PROBLEM, read_config(path / CONFIG).settings)
     except SymphysError:
@@ -106,7 +105,7 @@ def interpolations(path: Path) -> dict[str, str]:
 
 
 def with_guess(problem: Problem, guess: RunGuess) -> tuple[Problem, GuessOrigin]:
-    """The problem with a run's variables and motion as its guess; SymphysError where nothing of the run fits.
+    """Return the problem with a run's variables and motion as its guess; SymphysError where nothing of the run fits.
 
     Knots of another number, or of a motion of another duration, lie at the same shares of the duration. The motion
     takes the duration of the problem, and rates change with it. Variables keep what the problem says where the run has
@@ -132,12 +131,12 @@ def with_guess(problem: Problem, guess: RunGuess) -> tuple[Problem, GuessOrigin]
 
 
 def words(names: Iterable[str]) -> str:
-    """Names for a message."""
+    """Join names for a message."""
     return ", ".join(names) or "no variables"
 
 
 def taken_value(variable: Variable, guess: RunGuess) -> tuple[Array | None, str]:
-    """(components * knots,) a variable's guess within its bounds, or None; and a note, or nothing."""
+    """Return a variable's guess (components * knots,) within its bounds, or None; and a note, or an empty text."""
     name = variable.name
     if name not in guess.values:
         return None, f"{name}: the run has no variable of this name; its guess is the problem's"
@@ -154,7 +153,7 @@ def taken_value(variable: Variable, guess: RunGuess) -> tuple[Array | None, str]
 
 
 def guessed_motion(problem: Problem, motion: Trajectory | None) -> GuessedMotion | None:
-    """The motion over the duration of the problem's file, at the pace of the duration that is guessed."""
+    """Return the motion over the duration of the problem's file, with rates for the duration that is guessed."""
     if motion is None or not motion.time[-1] > 0:
         return None
     taken = float(motion.time[-1])
@@ -163,3 +162,40 @@ def guessed_motion(problem: Problem, motion: Trajectory | None) -> GuessedMotion
     recorded = {name: motion[name] for name in motion.units if len(motion[name]) == len(motion.time)}
     pace = taken / (chosen[0] if chosen else duration)
     return recorded_guess(problem.world(), motion.time * (duration / taken), recorded, pace)
+
+
+def resampled(values: Array, before: str, count: int, after: str) -> Array:
+    """Return the control (components, count) on other knots, at the same fractions of the duration.
+
+    Args:
+        values: (components, knots).
+        before: its interpolation: "constant", each knot over an equal part of the duration, or "linear", knots at equal
+            distances from the start to the end.
+        count: of the new knots.
+        after: their interpolation. Linear knots are values of the control, whose constant parts are joined at their
+            middles; constant ones are its means over their parts.
+    """
+    knots = values.shape[1]
+    if knots == count and (before == after or count == 1):
+        return values
+    steps = before == "constant" or knots == 1
+    if after == "linear" and count > 1:
+        places = (np.arange(knots) + 0.5) / knots if steps else np.linspace(0, 1, knots)
+        return np.stack([np.interp(np.linspace(0, 1, count), places, row) for row in values])
+    edges = np.linspace(0, 1, count + 1)
+    return np.stack([np.diff(step_areas(row, edges) if steps else line_areas(row, edges)) * count for row in values])
+
+
+def step_areas(row: Array, edges: Array) -> Array:
+    """Integrate from 0 to the edges over steps of equal length on [0, 1]."""
+    areas = np.concatenate([[0], np.cumsum(row)]) / len(row)
+    return np.asarray(np.interp(edges, np.linspace(0, 1, len(row) + 1), areas))
+
+
+def line_areas(row: Array, edges: Array) -> Array:
+    """Integrate from 0 to the edges over line segments between equidistant numbers on [0, 1]."""
+    knots = np.linspace(0, 1, len(row))
+    places = np.union1d(knots, edges)
+    values = np.interp(places, knots, row)
+    areas = np.concatenate([[0], np.cumsum(np.diff(places) * (values[1:] + values[:-1]) / 2)])
+    return np.asarray(np.interp(edges, places, areas))

@@ -1,4 +1,4 @@
-"""A run that is asked for: which problem, which solver, which seed, and where it is written."""
+"""Jobs: runs that are asked for, with problem, solver, seed and folder."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from symphys.solvers import SOLVERS, recorded_options, solver
 
 @dataclass(frozen=True)
 class Job:
-    """Everything that a run needs; may be sent to another process.
+    """A run that is asked for, with everything it needs; may be sent to another process.
 
     Attributes:
         problem: what to solve.
-        config: what exactly is asked for, by plain values.
+        config: the exact request, as plain values.
         options: of the solver, validated.
         folder: where the run is written.
-        command: what was typed.
+        command: as typed.
         examine: whether the solution is examined.
-        outdated: the stamp, see ``standing``, of a result that is to be made again although it is there.
-        chosen: why it has its solver, where none was named.
+        outdated: the stamp (see ``RunInspection``) of a result that is to be replaced.
+        chosen: the reason for its solver, where none was named.
         guess: where the guess of the problem was taken from, if from a run.
     """
 
@@ -45,7 +45,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """For messages: ``ball_throw gradient seed 0``."""
+        """The name for messages: ``ball_throw gradient seed 0``."""
         return f"{self.case} {self.config.solver} seed {self.config.seed}"
 
     @property
@@ -55,12 +55,12 @@ class Job:
 
     @property
     def subject(self) -> Hashable:
-        """What is transcribed for it: jobs of one subject share their functions."""
+        """The key of the transcription: jobs of one subject share their functions."""
         return self.problem.file, self.problem.identity, repr(self.config.settings), self.smooth
 
     @property
     def size(self) -> int:
-        """How much work an evaluation is, roughly: time steps times the length of what is simulated."""
+        """The approximate work of an evaluation: time steps times the length of the problem's text."""
         return self.problem.simulation.steps * len(self.problem.text)
 
     @property
@@ -80,7 +80,7 @@ def make_jobs(
     examine: bool = True,
     guess: RunGuess | None = None,
 ) -> list[Job]:
-    """Every problem with every solver and seed, below the folder ``out``; other settings, another folder.
+    """Return the jobs of every problem with every solver and seed, below ``out``; other settings have other folders.
 
     ``solvers`` None: those that each problem names, or those that are chosen for it, see ``choice``.
 
@@ -109,7 +109,7 @@ def make_jobs(
 
 
 def solver_options(problem: Problem, name: str) -> Any:
-    """The options that the file's [solver.NAME] table sets, the others at their defaults; ProblemError if bad."""
+    """Return the options of the file's [solver.NAME] table, others at their defaults; ProblemError if they are bad."""
     table = problem.solver_tables.get(name, {})
     return validate_options(solver(name).Options, table, problem.file, f"solver.{name}")
 

@@ -1,4 +1,4 @@
-"""Where a run comes from: versions, machine, process and working copy, as result.json records them."""
+"""The provenance of a run: versions, machine, process and working copy, as result.json records them."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from symphys import files
 from symphys.version import __version__
 
 PACKAGES = ("casadi", "numpy", "scipy", "cma")
-"""Whose versions decide the last digits of a result."""
-PATIENCE = 2.0
-"""[s] that a program of the system may take for an answer."""
+"""Packages whose versions decide the last digits of a result."""
+ANSWER_TIMEOUT = 2.0
+"""[s] after which a program of the system is not waited for any more."""
 COMMIT = re.compile("[0-9a-f]{40}|[0-9a-f]{64}")
 MOST_LINKS = 5
-"""References that lead from one to the next."""
+"""Symbolic references that are followed."""
 MOST_LINE, MOST_PACKED = 4096, 64 * 2**20
-"""[bytes] of a file that holds one line, and of one that holds all references."""
+"""[bytes] Largest file with one line, and with all references."""
 
 
 def provenance() -> dict[str, Any]:
-    """The machine, this process and the working copy; what is not known is left out.
+    """Return machine, process and working copy as a table; unknown entries are left out.
 
-    Keys: "host", "processor", "python_platform" (that Python is built for), "pid", "peak_memory" [bytes] of this
+    Keys: "host", "processor", "python_platform" (the target of this Python), "pid", "peak_memory" [bytes] of this
     process so far, "commit" of the working folder where it is in a git repository. Whether files differ from the
     commit is not known: see ``working_copy``.
     """
@@ -41,7 +41,7 @@ def provenance() -> dict[str, Any]:
 
 @cache
 def versions() -> dict[str, str]:
-    """Of everything that takes part, and the platform; packages that are not installed are left out."""
+    """Return the versions of all packages that take part, and the platform; packages that are missing are left out."""
     found = {"symphys": __version__, "python": platform.python_version()}
     for name in PACKAGES:
         try:
@@ -53,12 +53,12 @@ def versions() -> dict[str, str]:
 
 @cache
 def machine() -> dict[str, str]:
-    """The "host", its "processor" and the "python_platform"; empty texts for what is not known."""
+    """Return "host", "processor" and "python_platform"; empty texts for unknown ones."""
     return {"host": platform.node(), "processor": processor_name(), "python_platform": sysconfig.get_platform()}
 
 
 def processor_name() -> str:
-    """As the maker calls it; empty where the system does not say."""
+    """Return the maker's name of the processor; empty where the system does not know it."""
     if sys.platform == "darwin":
         return answer("sysctl", "-n", "machdep.cpu.brand_string") or platform.processor()
     try:
@@ -70,14 +70,14 @@ def processor_name() -> str:
 
 
 def peak_memory() -> int | None:
-    """[bytes] The most memory that this process has held so far; None where the system does not say.
+    """Return the largest memory [bytes] that this process has held so far; None where the system does not know it.
 
-    Linux says it in /proc. There ``getrusage`` counts that of the process that started this one, too.
+    On Linux it is read from /proc, since ``getrusage`` includes the memory of the parent process.
     """
     try:
         lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
         return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
-    except (OSError, StopIteration):  # no Linux, or one whose /proc does not say it
+    except (OSError, StopIteration):  # not Linux, or /proc has no such line
         pass
     try:
         import resource
@@ -89,7 +89,7 @@ def peak_memory() -> int | None:
 
 @cache
 def working_copy() -> dict[str, Any]:
-    """The "commit" of the folder in which this process works; read once per process, empty outside a git repository.
+    """Return the "commit" of the working folder, read once per process; empty outside a git repository.
 
     The files of the repository are read, and git is not asked: what is in a folder may name programs in its
     ``.git/config`` that git runs as soon as it looks for changes (filters, hooks, fsmonitor).
@@ -104,9 +104,10 @@ def working_copy() -> dict[str, Any]:
 
 
 def commit_of(git: Path) -> str:
-    """The commit that is checked out; empty where there is none yet, or where it is not written in files like these."""
+    """Return the commit that is checked out; empty if there is none, or if it is stored in an unknown way."""
     if not git.is_dir():  # of a worktree or a submodule: a file that names the folder
-        git = git.parent / named_in(git, "gitdir:")
+        line = line_of(git)
+        git = git.parent / (line.removeprefix("gitdir:").strip() if line.startswith("gitdir:") else "")
     common = git / (line_of(git / "commondir") or ".")
     value = line_of(git / "HEAD")
     for _ in range(MOST_LINKS):
@@ -119,25 +120,19 @@ def commit_of(git: Path) -> str:
     return value if COMMIT.fullmatch(value) else ""
 
 
-def named_in(path: Path, key: str) -> str:
-    """What follows a word at the beginning of a file; empty if there is no such file."""
-    line = line_of(path)
-    return line.removeprefix(key).strip() if line.startswith(key) else ""
-
-
 def packed(path: Path, name: str) -> str:
-    """The commit of a reference in a list of many; empty if it is not there."""
+    """Return the commit of a reference in packed-refs; empty if it is not there."""
     rows = (line.split() for line in read(path, MOST_PACKED).splitlines())
     return next((row[0] for row in rows if len(row) == 2 and row[1] == name), "")
 
 
 def line_of(path: Path) -> str:
-    """The text of a short file without spaces around it; empty if there is none."""
+    """Return the stripped text of a short file; empty if there is none."""
     return read(path, MOST_LINE).strip()
 
 
 def read(path: Path, most: int) -> str:
-    """The text of a regular file of so many bytes at most; empty if there is none.
+    """Return the text of a regular file of at most ``most`` bytes; empty if there is none.
 
     Most of the files that are looked for are missing, as each reference is kept in one of three places.
     """
@@ -151,7 +146,7 @@ def read(path: Path, most: int) -> str:
 
 
 def answer(program: str, *arguments: str) -> str | None:
-    """What a program prints; None if it is not there, fails, or takes longer than PATIENCE. Never raises."""
+    """Return the output of a program; None if it is missing, fails, or exceeds ANSWER_TIMEOUT. Never raises."""
     path = shutil.which(program)
     if path is None:
         return None
@@ -162,7 +157,7 @@ def answer(program: str, *arguments: str) -> str | None:
             capture_output=True,
             text=True,
             errors="replace",
-            timeout=PATIENCE,
+            timeout=ANSWER_TIMEOUT,
             check=False,
         )
     except (OSError, subprocess.SubprocessError):

@@ -1,4 +1,4 @@
-"""What a run writes of its outcome: result.json with its provenance, and the rows of trace.csv."""
+"""The contents of result.json and trace.csv, made from the outcome of a solver."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from symphys.transcription.decision_variables import blocks as blocks_of
 from symphys.types import Array
 
 JUDGED = frozenset(("objective", "costs", "outputs", "checks"))
-"""What is not known where the exact rollout cannot be simulated."""
+"""Fields that are unknown where the exact rollout cannot be simulated."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def make_result(
     price: dict[str, float],
     seconds: dict[str, float],
 ) -> Result:
-    """The result of a run that its solver ended."""
+    """Return the result of a run that its solver ended."""
     verdict = judgement.verdict
     found: dict[str, Any] = {}
     if verdict:
@@ -95,12 +95,12 @@ def make_result(
 
 
 def failure(job: Job, message: str, again: bool = False) -> Result:
-    """The result of a run that could not be done; ``again``: the same command is to try it again."""
+    """Return the result of a run that could not be done; ``again``: the same command should try it again."""
     return Result(**provenance(job), solved=False, status="failed", advice=message, again=again, absent=REACHED)
 
 
 def interruption(job: Job, message: str, checkpoint: Mapping[str, object] | None) -> Result:
-    """The result of a run whose process a limit has ended: the best point of its checkpoint, not judged."""
+    """Return the result of a run that a limit ended: the best point of its checkpoint, not judged."""
     kept = checkpoint or {}
     known: dict[str, Any] = {}
     rows = checkpoint_rows(checkpoint)
@@ -125,7 +125,7 @@ def interruption(job: Job, message: str, checkpoint: Mapping[str, object] | None
 
 
 def checkpoint_rows(checkpoint: Mapping[str, object] | None) -> list[dict[str, object]]:
-    """The iterations of a checkpoint as lines of trace.csv; none of one that cannot be read."""
+    """Return the iterations of a checkpoint as rows of trace.csv; none if it cannot be read."""
     rows = (checkpoint or {}).get("rows")
     names = [each.name for each in fields(TraceRow)]
     whole = [row for row in rows if isinstance(row, list) and len(row) == len(names)] if isinstance(rows, list) else []
@@ -136,14 +136,14 @@ def checkpoint_rows(checkpoint: Mapping[str, object] | None) -> list[dict[str, o
 
 
 def judged(verdict: Assessment | None) -> Judged:
-    """What is known of how the exact rollout does."""
+    """Return the summary of an exact rollout; NaN where there is none."""
     if verdict is None:
         return Judged(np.nan, np.nan, met=False, checked=False)
     return Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks))
 
 
 def variables(problem: Problem, blocks: Iterable[VariableBlock], z: Array) -> dict[str, VariableRecord]:
-    """The variables by name."""
+    """Return the variables by name."""
     sets = {v.name: tuple(slot.name for slot in v.slots) for v in problem.variables}
 
     def block(flat: Array, shape: tuple[int, int]) -> Array:
@@ -160,14 +160,14 @@ def variables(problem: Problem, blocks: Iterable[VariableBlock], z: Array) -> di
 
 
 def guess_values(transcription: Transcription, seed: int) -> dict[str, float]:
-    """The exact rollout of the start of a seed."""
+    """Judge the starting point of a seed by the exact rollout."""
     exact = transcription.judge(transcription.shooting.start(seed))
     outputs = {OUTPUT + name: value for name, value in exact.outputs.items()}
     return {"objective": exact.objective, "worst": exact.worst, **outputs}
 
 
 def stage_record(transcription: Transcription, stage: StageResult, price: Mapping[str, float]) -> StageRecord:
-    """A stage of a solve; its point is judged by the exact rollout, which is no part of its time."""
+    """Return the record of a stage; its point is judged by the exact rollout, outside its time."""
     exact = transcription.judge(stage.z)
     return StageRecord(
         smoothing=stage.smoothing,
@@ -184,7 +184,7 @@ def stage_record(transcription: Transcription, stage: StageResult, price: Mappin
 
 
 def trace_row(row: TraceRow, price: Mapping[str, float]) -> dict[str, object]:
-    """An iteration as a line of trace.csv."""
+    """Return an iteration as a row of trace.csv."""
     values = {each.name: getattr(row, each.name) for each in fields(row)}
     numbers = {name: value for name, value in values.items() if not isinstance(value, Mapping)}
     outputs = {OUTPUT + name: value for name, value in row.outputs.items()}
@@ -192,40 +192,40 @@ def trace_row(row: TraceRow, price: Mapping[str, float]) -> dict[str, object]:
 
 
 def used(counts: Counts) -> list[str]:
-    """The kinds of evaluation whose price matters here."""
+    """Return the kinds of evaluation whose price matters for these counts."""
     return ["gradient", *(kind for kind, count in priced(counts).items() if count and kind != "gradient")]
 
 
 def priced(counts: Counts | TraceRow) -> dict[str, int]:
-    """How often each kind of evaluation that is dearer than a rollout was done."""
+    """Return the number of evaluations of each kind that costs more than a rollout."""
     return {"gradient": counts.gradients, "jacobian": counts.jacobians, "hessian": counts.hessians}
 
 
 def equivalents(counts: Counts | TraceRow, price: Mapping[str, float]) -> float:
-    """The cost in rollouts: every evaluation times its measured price."""
+    """Return the cost in rollouts: each evaluation times its measured price."""
     return float(counts.rollouts + sum(count * price[kind] for kind, count in priced(counts).items() if count))
 
 
 def provenance(job: Job, flags: Sequence[str] = ()) -> dict[str, Any]:
-    """The fields of a result that are known however the run ends: which run, and where it comes from.
+    """Return the fields of a result that are known however the run ends: identity and origin of the run.
 
     ``flags``: with which a compiler made what evaluated; none where nothing was compiled.
     """
-    told = {"flags": " ".join(flags), "chosen": job.chosen, "guess": job.guess.folder}
+    known = {"flags": " ".join(flags), "chosen": job.chosen, "guess": job.guess.folder}
     return {
         "problem": job.config.problem,
         "title": job.problem.title,
         "solver": job.config.solver,
         "seed": job.config.seed,
         "versions": versions(),
-        "provenance": origin() | {key: text for key, text in told.items() if text},
+        "provenance": origin() | {key: text for key, text in known.items() if text},
         "when": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "command": job.command,
     }
 
 
 def evaluated_by(backend: Description) -> BackendRecord:
-    """The ``backend`` of a result."""
+    """Return the ``backend`` entry of a result."""
     compiled = "" if backend.cached is None else "warm" if backend.cached else "cold"
     return BackendRecord(
         backend.name, backend.lanes, backend.threads, backend.precision, backend.compiler, backend.said(), compiled

@@ -1,4 +1,4 @@
-"""How far a gradient and a solution through contact can be trusted: one examination, for ``check`` and for every solve.
+"""The examination of how far a gradient and a solution can be trusted, for ``check`` and for every solve.
 
 Its numbers are explained in words by ``symphys.findings``.
 """

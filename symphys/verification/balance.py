@@ -1,6 +1,8 @@
-"""Energy and momentum over a motion: what forces and contacts did, and whether it adds up.
+"""Conservation over a motion: energy and momentum against forces and contacts, and places against velocities.
 
-Angular momentum is left out: where surfaces touched is not recorded.
+Angular momentum is left out, since the points of contact are not recorded. Bodies and joints that are, after a step,
+where no velocity of the step takes them show in neither energy nor momentum: what a coupling puts back, or a body that
+is moved out of another at once, is counted among the effects of contacts and joints.
 """
 
 from __future__ import annotations
@@ -9,7 +11,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.dynamics.motion import momentum
 from symphys.maths import rotation
@@ -17,23 +18,24 @@ from symphys.model.state_layout import Layout, input_columns, inputs_size
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout, plain
 from symphys.types import Array
-from symphys.verification.bodies import bodies, parameters
+from symphys.verification.bodies import bodies, coordinates, floating, joint_work, parameters, rotor_energy, uncounted
 from symphys.verification.contacts import acting, slip_speeds, touching
-from symphys.verification.joints import floating, joint_work, rotor_energy, uncounted
 from symphys.verification.sensitivity_growth import samples
 
 MOST_SAMPLES = 400
 MOST_GAINS = 5
-GAIN = 1e-6
-"""Of the largest kinetic energy: what a contact must add in a step to be reported."""
-STOP = 0.05
-"""Of the largest kinetic energy: what contacts must take in a step, beyond the slip, for a body to be stopped."""
+MIN_GAIN = 1e-6
+"""Energy that a contact must add in a step to be reported, as a share of the largest kinetic energy."""
+MIN_STOP = 0.05
+"""Energy that contacts take, beyond the slip, when they stop a body, as a share of the largest kinetic energy."""
 ACROSS = 0.5
-"""Cosine of the angle to what bore a body before, below which a force meets it from the side."""
+"""Cosine of the angle to the force that bore a body before, below which a force counts as sideways."""
+MARGIN = 1.5
+"""Places may move by this factor times the larger speed at a step's ends, since speeds between them may be larger."""
 
 
 def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
-    """What became of energy and momentum.
+    """Account for energy and momentum over a motion.
 
     Returns:
         "energy": at some 400 instants "time" [s], "kinetic" and "potential" [J] (0 at the origin), and up to then
@@ -60,9 +62,10 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
     by_joints = uncounted(rollout, record)
     touched = (np.abs(motion.contact_force).sum(axis=(1, 2)) > 0) | by_joints
     contact = np.where(touched, surplus, 0.0)
-    rigid = _rigid_alone(rollout, motion) & ~by_joints
+    soft = np.array([pair.law.soft for pair in rollout.world.pairs], bool)
+    rigid = ~acting(motion)[:, soft].any(axis=1) & ~by_joints
     gains = np.where(rigid, contact, 0.0)
-    floor = GAIN * kinetic.max() + 1e-12 * np.abs(potential).max()
+    floor = MIN_GAIN * kinetic.max() + 1e-12 * np.abs(potential).max()
     gains = np.where(gains > floor, gains, 0.0)
     first = np.argsort(-gains, kind="stable")[:MOST_GAINS]
     free = np.where(touched, 0.0, surplus)
@@ -71,7 +74,7 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
         "energy": _thinned(motion.time, kinetic, potential, applied, contact),
         "gains": [_gain(motion, int(k), float(gains[k])) for k in first if gains[k] > 0],
         "gained": float(gains.sum()),
-        "stops": _stops(rollout, record, np.where(rigid, -contact, 0.0), STOP * kinetic.max()),
+        "stops": _stops(rollout, record, np.where(rigid, -contact, 0.0), MIN_STOP * kinetic.max()),
         "drift": float(np.abs(free).max()),
         "unexplained": float(np.abs(unknown).max()),
         "drift_at": float(motion.time[int(np.abs(unknown).argmax())]),
@@ -81,7 +84,7 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
 
 
 def _stops(rollout: Rollout, record: Record, taken: Array, least: float) -> list[dict[str, Any]]:
-    """The steps in which contacts took more than ``least`` [J] by a force from another side; ``taken`` (N,) [J]."""
+    """Return the steps in which contacts took more than ``least`` [J] by a sideways force; ``taken`` (N,) [J]."""
     motion = record.motion
     if not (motion.contact_names and (taken > least).any()):
         return []
@@ -93,10 +96,9 @@ def _stops(rollout: Rollout, record: Record, taken: Array, least: float) -> list
 
 
 def _sideways(rollout: Rollout, motion: Trajectory, k: int) -> bool:
-    """Whether a contact in step k pushes a body from another side than what bore it in the step before."""
+    """Whether a contact in step k pushes a body from another side than the one that bore it in the step before."""
     bore = np.zeros((len(motion.body_names), 3))
-    sides = [(c, side.body, sign) for c, pair in enumerate(rollout.world.pairs)
-             for side, sign in ((pair.first, 1.0), (pair.second, -1.0)) if side.body is not None]  # fmt: skip
+    sides = contact_sides(rollout)
     for c, body, sign in sides:
         bore[body] += sign * motion.contact_force[k - 1, c]
     for c, body, sign in sides:
@@ -108,7 +110,7 @@ def _sideways(rollout: Rollout, motion: Trajectory, k: int) -> bool:
 
 
 def momentum_gap(rollout: Rollout, record: Record) -> float:
-    """The largest unexplained change of momentum in a step, of bodies or groups that joints connect; see ``balance``.
+    """Return the largest unexplained change of momentum in a step, of bodies or groups that joints connect.
 
     Momenta are those of the leapfrog: without what persistent forces, half a step ahead, have done already.
     """
@@ -127,17 +129,22 @@ def momentum_gap(rollout: Rollout, record: Record) -> float:
 
 
 def contact_forces(rollout: Rollout, motion: Trajectory) -> Array:
-    """(N, B, 3) [N]: the sum of the contacts on each body."""
+    """Return the sum of contact forces on each body (N, B, 3) [N], world."""
     total = np.zeros_like(motion.force)
-    for c, pair in enumerate(rollout.world.pairs):
-        for side, sign in ((pair.first, 1.0), (pair.second, -1.0)):
-            if side.body is not None:
-                total[:, side.body] += sign * motion.contact_force[:, c]
+    for c, body, sign in contact_sides(rollout):
+        total[:, body] += sign * motion.contact_force[:, c]
     return total
 
 
+def contact_sides(rollout: Rollout) -> list[tuple[int, int, float]]:
+    """Return (contact, body, sign of the contact's force on it) for every body of every contact."""
+    numbered = enumerate(rollout.world.pairs)
+    sides = [(c, side.body, sign) for c, pair in numbered for side, sign in ((pair.first, 1.0), (pair.second, -1.0))]
+    return [(c, body, sign) for c, body, sign in sides if body is not None]
+
+
 def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
-    """Kinetic and potential energy (N + 1,) and the work of applied forces in each step (N,) [J]."""
+    """Return kinetic and potential energy (N + 1,), and the work of applied forces in each step (N,) [J]."""
     world, layout, p = rollout.world, Layout(rollout.world), parameters(rollout)
     x, after = ca.SX.sym("x", layout.size), ca.SX.sym("after", layout.size)
     u = ca.SX.sym("u", inputs_size(world, rollout.inputs))
@@ -163,17 +170,11 @@ def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
 
 
 def _potential(rollout: Rollout, record: Record) -> tuple[Array, Array]:
-    """(N + 1,) [J] the potential energy; and (N,) what it gains after each step as the next phase changes gravity."""
+    """Return the potential energy (N + 1,) [J], and its gain after each step (N,) as the next phase changes gravity."""
     numbers = bodies(rollout, record)
     moments = np.einsum("b,kbi->ki", numbers.mass, record.motion.position)
     gravity = np.concatenate([numbers.gravity, numbers.gravity[-1:]])
     return -(gravity * moments).sum(axis=1), -(np.diff(gravity, axis=0) * moments[1:]).sum(axis=1)
-
-
-def _rigid_alone(rollout: Rollout, motion: Trajectory) -> NDArray[np.bool_]:
-    """(N,) where no soft contact acts."""
-    soft = np.array([pair.law.soft for pair in rollout.world.pairs], bool)
-    return np.logical_not(acting(motion)[:, soft].any(axis=1))
 
 
 def _gain(motion: Trajectory, k: int, energy: float) -> dict[str, Any]:
@@ -185,3 +186,32 @@ def _thinned(time: Array, kinetic: Array, potential: Array, applied: Array, cont
     given, taken = (np.concatenate([[0.0], np.cumsum(part)]) for part in (applied, contact))
     columns = {"time": time, "kinetic": kinetic, "potential": potential, "applied": given, "contact": taken}
     return {name: column[keep].tolist() for name, column in columns.items()}
+
+
+def jumps(rollout: Rollout, record: Record) -> dict[str, Any]:
+    """Find the largest jump.
+
+    Returns:
+        "jump": how far it is beyond what the velocities explain, as a share: of a body's radius of gyration; of the
+        smallest one for sliders; of a radian for hinges. "jump_at": None, or its "name" of a body or joint, "time" [s]
+        and "size" [m] or [rad].
+    """
+    motion, dt, sizes = record.motion, rollout.dt, bodies(rollout, record).size
+    moving = [
+        (name, np.linalg.norm(np.diff(motion.position[:, b], axis=0), axis=1), motion.velocity[:, b], float(sizes[b]))
+        for b, name in enumerate(motion.body_names)
+        if np.isfinite(sizes[b])
+    ]
+    for joint, value, rate in coordinates(rollout, record):
+        for i, coordinate in enumerate(joint.kind.coordinates):
+            size = 1.0 if coordinate.turns else float(sizes.min())
+            moving.append((joint.name, np.abs(np.diff(value[:, i])), rate[:, [i]], size))
+    found: dict[str, Any] = {"jump": 0.0, "jump_at": None}
+    for name, step, velocity, size in moving:
+        speed = np.linalg.norm(velocity, axis=1)
+        beyond = step - MARGIN * dt * np.maximum(speed[:-1], speed[1:])
+        k = int(beyond.argmax())
+        if size > 0 and beyond[k] > found["jump"] * size:
+            at = {"name": name, "time": float(motion.time[k]), "size": float(step[k])}
+            found = {"jump": float(beyond[k] / size), "jump_at": at}
+    return found

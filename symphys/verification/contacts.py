@@ -1,4 +1,4 @@
-"""How cleanly contacts were resolved, and how surfaces slid on each other."""
+"""The accuracy with which contacts were resolved, and the sliding of surfaces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_SLIDES = 5
 
 
 def contacts(rollout: Rollout, record: Record) -> dict[str, Any]:
-    """What is to be said of the contacts.
+    """Return how cleanly the contacts were resolved.
 
     Returns:
         "residual" [N s]: the largest change of an impulse in a last sweep, at "residual_at" [s]; "impulse" [N s]: the
@@ -44,22 +44,22 @@ def contacts(rollout: Rollout, record: Record) -> dict[str, Any]:
 
 
 def surface(contact: str) -> str:
-    """The name of the two surfaces of a contact, without the number of the point in which they touch."""
+    """Return the name of the two surfaces of a contact, without the number of the point."""
     return contact.partition(":")[0]
 
 
 def acting(motion: Trajectory) -> NDArray[np.bool_]:
-    """(N, C): whether a contact gives an impulse in a step."""
+    """Return whether a contact gives an impulse in a step (N, C)."""
     return np.asarray(np.abs(motion.contact_force).sum(axis=2) > 0)
 
 
 def touching(motion: Trajectory, k: int) -> list[str]:
-    """The surfaces that act on each other in step k."""
+    """Return the surfaces that act on each other in step k."""
     return list(dict.fromkeys(surface(motion.contact_names[c]) for c in np.flatnonzero(acting(motion)[k])))
 
 
 def slides(rollout: Rollout, record: Record) -> list[dict[str, Any]]:
-    """The contacts that slid furthest; of surfaces that touch in several points the one that slides furthest.
+    """Return the contacts that slid furthest; of surfaces with several points, the point that slid furthest.
 
     Returns:
         Each with its "contact", "distance" [m], largest "speed" [m/s] and when, "time" [s]. Sliding is measured at the
@@ -84,7 +84,7 @@ def slides(rollout: Rollout, record: Record) -> list[dict[str, Any]]:
 
 
 def slip_speeds(rollout: Rollout, record: Record) -> Array:
-    """(N, C) [m/s]: how fast the surfaces of a contact move across its normal at the start of each step."""
+    """Return the tangential speed at each contact at the start of each step (N, C) [m/s]."""
     scheme = rollout.parameters.scheme(rollout.problem.simulation)
     slip = slip_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols).map(rollout.steps)
     arrays = record.arrays

@@ -9,15 +9,13 @@ import numpy as np
 
 from symphys.transcription import Record, Transcription, first_non_finite, first_non_finite_derivative
 from symphys.types import Array
-from symphys.verification import gradient, refinement, smoothing
-from symphys.verification.balance import balance
+from symphys.verification import gradient, refinement
+from symphys.verification.balance import balance, jumps
 from symphys.verification.contacts import contacts, slides
 from symphys.verification.held_bounds import held_bounds
-from symphys.verification.jumps import jumps
-from symphys.verification.near_misses import near_misses
+from symphys.verification.near_misses import near_misses, tunnelling
 from symphys.verification.sensitivity_growth import sensitivity_growth
 from symphys.verification.target_conflicts import target_conflicts
-from symphys.verification.tunnelling import tunnelling
 
 Tell = Callable[[str], None]
 
@@ -38,7 +36,7 @@ shipped problems, beside some 8 for building the problem."""
 
 @np.errstate(invalid="ignore", over="ignore")  # numbers that are not finite are reported as such
 def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: None) -> dict[str, Any]:
-    """The "trust" object of a result, for the exact rollout of ``z`` (n,).
+    """Return the "trust" object of a result, for the exact rollout of ``z`` (n,).
 
     Each module of this room says what its numbers are. "fault" is a clause on the first number or derivative that is
     not finite, empty if all are. ``tell`` is called with a few words before each part that takes time. Where contacts
@@ -67,7 +65,7 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
         "gradient": compared,
         **finer,
         "growth": grown,
-        "smoothed": smoothing.smoothed(transcription, record),
+        "smoothed": refinement.smoothed(transcription, record),
         **motion,
         **refinement.settling(transcription, z, motion["residual"], motion["impulse"]),
         "misses": near,
@@ -78,6 +76,7 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
 
 
 def _fault(transcription: Transcription, record: Record, compared: list[dict[str, Any]]) -> str:
+    """Return a clause on the first number or derivative that is not finite; empty if all are."""
     verdict = transcription.judge(record.z)
     numbers = [verdict.objective, *verdict.costs.values(), *(check.error for check in verdict.checks)]
     if not np.isfinite([*numbers, *record.arrays.x.ravel()]).all():
@@ -89,7 +88,7 @@ def _fault(transcription: Transcription, record: Record, compared: list[dict[str
 
 @np.errstate(invalid="ignore", over="ignore", divide="ignore")  # numbers that are not finite are reported as such
 def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
-    """Energy and momentum, jumps, contacts, and tunnelling; it takes little beside a solve.
+    """Measure energy, momentum, jumps, contacts and tunnelling, which takes little time beside a solve.
 
     Where impulses of contacts have not settled, steps or the motion are simulated again with other numbers of sweeps.
 

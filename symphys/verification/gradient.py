@@ -22,7 +22,7 @@ NOTICED = 1e-4
 
 
 def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
-    """Adjoint against central differences, per variable.
+    """Compare the adjoint with central differences, per variable.
 
     What is differentiated is the transcription's ``Probe``, whose gradient does not vanish at a solution.
 
@@ -58,19 +58,19 @@ def _compare_block(value: Values, block: VariableBlock, z: Array, slope: Array) 
 
 
 def _best(mismatches: Callable[[Sequence[float]], Array]) -> tuple[float, float]:
-    """(error, step): the least error of all steps, the worst of all directions; NaN if no step gives a number."""
+    """Return (error, step): the least error over the steps, the worst over the directions; NaN if there is none."""
     errors = [max_or_nan(row) for row in mismatches(DIFFERENCE_STEPS)]
     known = [pair for pair in zip(errors, DIFFERENCE_STEPS, strict=True) if not np.isnan(pair[0])]
     return min(known, default=(np.nan, np.nan))
 
 
 def max_or_nan(numbers: Array) -> float:
-    """The largest; NaN if one is."""
+    """Return the largest number; NaN if one is NaN."""
     return float(np.max(numbers, initial=0.0))
 
 
 def _directions(block: VariableBlock, size: int, n: int) -> Array:
-    """(k, n): unit steps in the scale of each component, or random combinations of many."""
+    """Return unit steps (k, n) in the scale of each component, or random combinations of many."""
     inside = np.eye(size)
     if size > EVERY_COMPONENT:
         inside = np.random.default_rng(1).standard_normal((EVERY_COMPONENT, size))
@@ -81,7 +81,7 @@ def _directions(block: VariableBlock, size: int, n: int) -> Array:
 
 
 def _mismatches(value: Values, z: Array, slope: Array, directions: Array, steps: Sequence[float]) -> Array:
-    """(steps, k): of each step along each direction."""
+    """Return the error of central differences for each step and direction (steps, k)."""
     high, low = np.moveaxis(_beside(value, z, directions, steps, (1, -1)), -1, 0)
     sizes, known = np.array(steps)[:, None], directions @ slope
     found: Array = abs((high - low) / (2 * sizes) - known) / np.linalg.norm(directions, axis=1)
@@ -89,7 +89,7 @@ def _mismatches(value: Values, z: Array, slope: Array, directions: Array, steps:
 
 
 def _mismatches_beside(value: Values, z: Array, slope: Array, directions: Array, steps: Sequence[float]) -> Array:
-    """(steps, k): the larger error of either side's derivative at z, from three points beside it: of second order."""
+    """Return the larger error of both one-sided second-order derivatives, without z itself (steps, k)."""
     points = _beside(value, z, directions, steps, (1, 2, 3, -1, -2, -3))
     sizes, known, errors = np.array(steps)[:, None], directions @ slope, list[Array]()
     for side, (one, two, three) in (
@@ -102,7 +102,7 @@ def _mismatches_beside(value: Values, z: Array, slope: Array, directions: Array,
 
 
 def _beside(value: Values, z: Array, directions: Array, steps: Sequence[float], places: Sequence[int]) -> Array:
-    """(steps, k, places): values at z and so many steps from it along each direction, all in one batch."""
+    """Return values (steps, k, places) at multiples of each step from z along each direction, in one batch."""
     offsets = np.multiply.outer(np.multiply.outer(np.array(steps), places), directions)
     points = z + np.moveaxis(offsets, 2, 1)
     return value(points.reshape(-1, z.size)).reshape(points.shape[:-1])

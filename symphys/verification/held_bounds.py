@@ -14,11 +14,11 @@ from symphys.types import Array
 AT = 1e-9
 """A component lies at a bound within this share of 1 + the bound."""
 FALLS = 1e-6
-"""What a change by its scale gains, as a share of 1 + |merit|; a bound that gains less holds nothing back."""
+"""Gain of a change by the scale, as a share of 1 + |merit|, below which a bound does not count as active."""
 
 
 def held_bounds(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
-    """The bounds that ``z`` (n,) lies at while the merit would fall beyond them, those that gain most first.
+    """Return the bounds at ``z`` (n,) beyond which the merit would fall, the largest gain first.
 
     Returns:
         Each with its "variable", "component" of "components", "side" ("lower" or "upper"), and "bound", NaN where it is
@@ -42,13 +42,13 @@ def held_bounds(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
 
 
 def lies_at(z: Array, bound: Array) -> NDArray[np.bool_]:
-    """(n,): whether z lies at a bound (n,), which may be infinite."""
+    """Return whether z lies at a bound (n,), which may be infinite."""
     finite = np.where(np.isfinite(bound), bound, 0.0)
     return np.asarray(np.isfinite(bound) & (np.abs(z - finite) <= AT * (1 + np.abs(finite))))
 
 
 def _rows(block: VariableBlock, side: str, gains: Array, least: float) -> list[dict[str, Any]]:
-    """Those of one variable; ``gains`` (n,): of each component of z."""
+    """Return the rows of one variable; ``gains`` (n,): of each component of z."""
     components, knots = block.shape
     gain = gains[block.start : block.stop].reshape(knots, components)
     bounds = getattr(block, side).reshape(knots, components)

@@ -1,4 +1,4 @@
-"""The answer and its gradient under finer time steps and more sweeps."""
+"""The answer and its gradient under finer time steps, more sweeps, and smoothing."""
 
 from __future__ import annotations
 
@@ -15,30 +15,31 @@ from symphys.shooting import VariableBlock
 from symphys.trajectory import NotFinite
 from symphys.transcription import Record, Rollout, Transcription, transcribe
 from symphys.types import Array
-from symphys.verification.bodies import Bodies, bodies
-from symphys.verification.joints import floating
+from symphys.verification.bodies import Bodies, bodies, floating
 
 FINER_DT, FINEST_DT, MORE_SWEEPS, ONE_MORE = "dt / 2", "dt / 4", "sweeps x 2", "sweeps + 1"
 TOLD = {what: f"simulating with {what}" for what in (FINER_DT, FINEST_DT, MORE_SWEEPS)}
-"""What announces each refinement, in their order."""
+"""The message that announces each refinement, in order."""
 SETTLED = 1e-3
-"""Residuals below this share of the largest impulse are not looked into."""
+"""Residuals below this share of the largest impulse are negligible."""
 UNSETTLED = 5e-2
-"""Residuals above this share of the largest impulse say that impulses have not settled."""
+"""Residuals above this share of the largest impulse mean that impulses have not settled."""
 LEFT = 1e-4
-"""Residuals below this share of the largest impulse leave no velocity that matters."""
+"""Residuals below this share of the largest impulse leave no significant velocity error."""
 CYCLING = 0.5
-"""Where twice the sweeps leave more than this share of a residual, more of them do not settle it."""
+"""Share of a residual left by twice the sweeps above which the solver cycles and more sweeps do not help."""
 MOST_STEPS = 5
-"""Steps that are looked at for what stays of a velocity that sweeps have not found."""
+"""Steps with the largest velocity errors, which are followed further."""
 LATER = 10
-"""Steps after which it counts."""
+"""Steps after which a velocity error counts."""
 ROUNDING = 1e-9
-"""Relative changes below this say nothing about the order of convergence."""
+"""Relative changes below this are rounding, and show no order of convergence."""
+TRIED = (1e-3, 1e-2, 1e-1)
+"""[m/s] Smoothings that are tried where the problem itself has none."""
 
 
 def refine(transcription: Transcription, z: Array, tell: Callable[[str], None] = lambda what: None) -> dict[str, Any]:
-    """How ``z`` does in finer discretisations; ``tell`` is called with the words of each before it is simulated.
+    """Judge ``z`` in finer discretisations; ``tell`` is called with the name of each before it is simulated.
 
     Returns:
         "refined": for dt / 2, dt / 4 and twice the sweeps the "objective", the "worst" error / tolerance, and
@@ -61,7 +62,7 @@ def refine(transcription: Transcription, z: Array, tell: Callable[[str], None] =
 
 
 def settling(transcription: Transcription, z: Array, residual: float, impulse: float) -> dict[str, float]:
-    """Whether more sweeps would settle the contacts: "residual_finer" [N s], what twice the sweeps leave.
+    """Return "residual_finer" [N s], the residual with twice the sweeps, if the residual is not negligible.
 
     Nothing where the ``residual`` is small beside the largest ``impulse`` of a contact in a step [N s].
     """
@@ -75,7 +76,7 @@ def settling(transcription: Transcription, z: Array, residual: float, impulse: f
 
 
 def resettled(transcription: Transcription, z: Array, residual: float, impulse: float) -> dict[str, Any]:
-    """What becomes of ``z`` where impulses have not settled, if the sweeps end elsewhere.
+    """Judge ``z`` with other numbers of sweeps, if impulses have not settled.
 
     Projections that go round in a cycle mostly do so in two turns, so that one sweep more ends in the other turn, and
     twice as many show the cycle further on.
@@ -94,7 +95,7 @@ def resettled(transcription: Transcription, z: Array, residual: float, impulse: 
 
 
 def left(transcription: Transcription, record: Record, residual: float, impulse: float) -> dict[str, Any]:
-    """The velocities of bodies without joints that the sweeps of a step have not found, and more of them would.
+    """Estimate the velocities of bodies without joints that the sweeps of a step have missed.
 
     Each recorded step is taken again from its state with twice the sweeps, so that what a motion makes of a small
     difference later does not count. What is left falls in the same ratio as the residual: a velocity that changes by d
@@ -135,7 +136,7 @@ def left(transcription: Transcription, record: Record, residual: float, impulse:
 
 
 def speeds(rollout: Rollout, numbers: Bodies, x: Array) -> Array:
-    """(N, B) [m/s] of states or differences of states (N, nx): of bodies' centres, or at the radius of gyration."""
+    """Return speeds (N, B) [m/s] of states or their differences (N, nx): of centres, or at the radius of gyration."""
     layout, names = Layout(rollout.world), [body.name for body in rollout.world.bodies]
     linear, angular = (
         np.stack([np.linalg.norm(x[:, layout[f"{name}.{field}"]], axis=1) for name in names], axis=1)
@@ -146,14 +147,14 @@ def speeds(rollout: Rollout, numbers: Bodies, x: Array) -> Array:
 
 
 def change(block: VariableBlock, before: Array, after: Array) -> float | None:
-    """|after - before| / |before| of one variable's part of a gradient, in its scale; None where it is flat."""
+    """Return |after - before| / |before| of one variable's part of a gradient, in its scale; None where it is flat."""
     part = slice(block.start, block.stop)
     norm = float(np.linalg.norm(before[part] * block.scale))
     return float(np.linalg.norm((after - before)[part] * block.scale)) / norm if norm else None
 
 
 def order(values: Sequence[ArrayLike]) -> float | None:
-    """p of an error like dt^p, from values (of any one shape) at dt, dt / 2 and dt / 4; None within rounding."""
+    """Return p of an error like dt^p, from values at dt, dt / 2 and dt / 4; None within rounding."""
     coarse, middle, fine = (np.asarray(value, float) for value in values)
     first, second = float(np.linalg.norm(coarse - middle)), float(np.linalg.norm(middle - fine))
     least = ROUNDING * float(np.linalg.norm(fine))
@@ -164,7 +165,7 @@ def order(values: Sequence[ArrayLike]) -> float | None:
 
 @lru_cache(maxsize=len(TOLD) + 1)
 def finer_problem(transcription: Transcription, what: str) -> Transcription:
-    """Refined so; made once for all runs of a problem."""
+    """Transcribe the refined problem; once for all runs of a problem."""
     problem = transcription.problem
     simulation = problem.simulation
     finer = {
@@ -174,3 +175,33 @@ def finer_problem(transcription: Transcription, what: str) -> Transcription:
         ONE_MORE: replace(simulation, sweeps=simulation.sweeps + 1),
     }
     return transcribe(replace(problem, simulation=finer[what]), backend="casadi")
+
+
+def smoothed(transcription: Transcription, record: Record) -> list[dict[str, Any]]:
+    """Compare the exact motion of ``record`` with smoothed rollouts.
+
+    Returns:
+        For each "smoothing" [m/s] of the problem's own stages, or of ``TRIED`` where it has none, the "objective" and
+        the "worst" error / tolerance and "costs", the sum of what is minimised; "own" says which of the two it is.
+        "moved": how far bodies get from their places in the exact motion, as a share of the longest way of one.
+    """
+    z = record.z
+    own = [smoothing for smoothing in transcription.problem.simulation.smoothing if smoothing > 0]
+    rows = []
+    for smoothing in own or TRIED:
+        verdict = transcription.judge(z, smoothing)
+        found = {"objective": verdict.objective, "worst": verdict.worst, "costs": sum(verdict.costs.values())}
+        moved = _moved(record, transcription, smoothing)
+        rows.append({"smoothing": smoothing, "own": bool(own), **found, "moved": moved})
+    return rows
+
+
+def _moved(record: Record, transcription: Transcription, smoothing: float) -> float:
+    """Return the "moved" of a smoothing; NaN if there is no such motion, or no body moves."""
+    place = record.motion.position
+    way = float(np.linalg.norm(place - place[0], axis=2).max(initial=0.0))
+    try:
+        other = transcription.simulate(record.z, smoothing).position
+    except NotFinite:
+        return float("nan")
+    return float(np.linalg.norm(other - place, axis=2).max(initial=0.0)) / way if way else float("nan")

@@ -1,4 +1,4 @@
-"""How much the end of a motion depends on its state at every instant before: |dx_T/dx_t|.
+"""The sensitivity of the end of a motion to its state at every earlier instant: |dx_T/dx_t|.
 
 A few random directions of the final state are swept backwards through the exact trajectory by the adjoint of the step.
 The largest singular value of what they become estimates the norm from below: in a chain of collisions it grows
@@ -22,7 +22,7 @@ MOST_SAMPLES = 200
 
 
 def sensitivity_growth(transcription: Transcription, record: Record) -> dict[str, list[float]]:
-    """The sensitivity of the end along the horizon.
+    """Estimate the sensitivity of the final state along the horizon.
 
     Returns:
         "time" [s], some 200 instants, and "factor", the estimate of |dx_T/dx_t| there, 1 at the end; NaN where the
@@ -42,12 +42,12 @@ def sensitivity_growth(transcription: Transcription, record: Record) -> dict[str
 
 
 def samples(count: int, most: int) -> NDArray[np.intp]:
-    """Indices below ``count``, evenly spread, ``most`` at most, the first and the last among them."""
+    """Return at most ``most`` indices below ``count``, evenly spread, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.intp))
 
 
 def backwards(transcription: Transcription, record: Record, ends: Array) -> Iterator[tuple[int, Array]]:
-    """From the last state to the first: its number k, and d (ends . x_T) / dx_k (n, m).
+    """Yield from the last state to the first its number k and d (ends . x_T) / dx_k (n, m).
 
     Args:
         transcription: of the problem.
@@ -67,14 +67,14 @@ def backwards(transcription: Transcription, record: Record, ends: Array) -> Iter
 
 
 def state_columns(rollout: Rollout) -> NDArray[np.intp]:
-    """(n,) the columns of the state that say where bodies are and how they move: no memory of forces."""
+    """Return the columns (n,) of the state with poses and velocities of bodies, without the memory of forces."""
     layout = Layout(rollout.world)
     parts = [layout[f"{body.name}.{field}"] for body in rollout.world.bodies for field in GIVEN]
     return np.concatenate([np.arange(part.start, part.stop) for part in parts])
 
 
 def state_units(rollout: Rollout, record: Record) -> Array:
-    """(n,) what a change by 1 of each of ``state_columns`` counts as, in m or m/s."""
+    """Return the weight (n,) of a change by 1 of each of ``state_columns``, in m or m/s."""
     units = []
     for size in bodies(rollout, record).size:
         weights = {"position": 1.0, "orientation": 2 * size, "velocity": 1.0, "angular_velocity": size}
@@ -83,7 +83,7 @@ def state_units(rollout: Rollout, record: Record) -> Array:
 
 
 def _turned(rollout: Rollout, x: Array, adjoint: Array) -> Array:
-    """The adjoint (nx, m) without what would change a quaternion's length."""
+    """Return the adjoint (nx, m) without the part that would change a quaternion's length."""
     layout, result = Layout(rollout.world), adjoint.copy()
     for body in rollout.world.bodies:
         part = layout[f"{body.name}.orientation"]

@@ -23,23 +23,23 @@ from symphys.verification.held_bounds import lies_at
 from symphys.verification.sensitivity_growth import DIRECTIONS
 
 MOST_COMPONENTS = 16
-"""Components of targets up to which contradictions are looked for."""
+"""Components of targets up to which contradictions are searched."""
 MORE_SAMPLES = 2
-"""Points beside z beyond one for each component."""
+"""Points beside z in addition to one for each component."""
 NEAREST, FURTHEST = 1e-2, 0.5
-"""Between these distances from z the points lie, in units of the variables' scales."""
+"""Range of distances of the points from z, in units of the variables' scales."""
 DEPENDENT = 1e-6
-"""Changes whose combination is below this share of theirs depend on each other."""
-STILL = 1e-9
+"""Changes with a combination below this share of their size are linearly dependent."""
+NO_CHANGE = 1e-9
 """A component that changes by less, relative to 1 + its size, does not change."""
 OPPOSED = 1e-2
-"""Gradients whose sum is below this share of the sum of their lengths hold each other."""
+"""Gradients cancel where their sum is below this share of the sum of their lengths."""
 BALANCED = 0.05
 """The gradients of targets and of all else cancel where their sum is below this share of the sum of their lengths."""
 NEARER = 0.5
 """A step towards targets that can be met leaves less than this share of what is missed; a linear one leaves 0.25."""
 SHARE = 0.05
-"""Who takes part in less than this share of the largest part is not named."""
+"""Targets with less than this share of the largest part are not named."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class TargetSample:
 
 
 def target_conflicts(transcription: Transcription, record: Record) -> dict[str, Any]:
-    """Which targets stand against each other at the z of ``record``.
+    """Find targets that conflict with each other at the z of ``record``.
 
     Returns:
         "equations", the number of components of all targets, and "unknowns", that of the components of z that may vary;
@@ -92,7 +92,7 @@ def target_conflicts(transcription: Transcription, record: Record) -> dict[str, 
 
 
 def target_samples(rollout: Rollout, record: Record, functions: Sequence[ca.Function]) -> list[TargetSample]:
-    """Every target of a rollout, whose formulas are compiled to these ``functions``."""
+    """Evaluate every target of a rollout, whose formulas are compiled to ``functions``."""
     arrays, found = record.arrays, []
     for target, function in zip(rollout.problem.targets, functions, strict=True):
         k = rollout.tick(target.at)
@@ -104,7 +104,7 @@ def target_samples(rollout: Rollout, record: Record, functions: Sequence[ca.Func
 
 
 def target_slopes(transcription: Transcription, record: Record, samples: list[TargetSample]) -> Array | None:
-    """(T, n): of weight * |value|^2 by z.
+    """Return the derivatives of weight * |value|^2 by z (T, n).
 
     None where a formula depends on inputs, on a whole motion or on the time of a free duration, or for problems with
     large nets.
@@ -130,7 +130,7 @@ def target_slopes(transcription: Transcription, record: Record, samples: list[Ta
 
 
 def _by_arguments(sample: TargetSample) -> tuple[Array, Array, Array] | None:
-    """Derivatives of weight * |value|^2 by x, p and z; None where inputs or whole motions have a part in it."""
+    """Return derivatives of weight * |value|^2 by x, p and z; None if it depends on inputs or whole motions."""
     if sample.target.formula.parts:
         return None
     inputs = sample.function.sx_in()
@@ -144,25 +144,25 @@ def _by_arguments(sample: TargetSample) -> tuple[Array, Array, Array] | None:
 
 
 def pushed(shooting: ShootingProblem, z: Array, slope: Array) -> NDArray[np.bool_]:
-    """(n,): which components lie at a bound that a step down the slope would leave."""
+    """Return which components lie at a bound that a step down the slope would leave (n,)."""
     lower, upper = (lies_at(z, shooting.stacked(side)) for side in ("lower", "upper"))
     return np.asarray((lower & (slope > 0)) | (upper & (slope < 0)))
 
 
 def opposed(slopes: Array, fixed: NDArray[np.bool_]) -> list[int]:
-    """Which of the gradients (T, n), ``fixed`` (n,) components left out, cancel; none or at least two."""
+    """Return which of the gradients (T, n) cancel, without ``fixed`` (n,) components; none or at least two."""
     slopes = np.where(fixed, 0.0, slopes)
     lengths = np.linalg.norm(slopes, axis=1)
     if float(np.linalg.norm(slopes.sum(axis=0))) > OPPOSED * float(lengths.sum()):
         return []
-    parts = np.flatnonzero(lengths > max(SHARE * float(lengths.max(initial=0.0)), STILL))
+    parts = np.flatnonzero(lengths > max(SHARE * float(lengths.max(initial=0.0)), NO_CHANGE))
     return parts.tolist() if parts.size > 1 else []
 
 
 def outweighed(
     transcription: Transcription, record: Record, samples: Sequence[TargetSample], slopes: Array
 ) -> list[int]:
-    """Which missed targets the costs hold back at z: their gradients (T, n) cancel that of all else.
+    """Return which missed targets the costs hold back at z: their gradients (T, n) cancel that of everything else.
 
     Where no point nearby meets the targets better, the costs are not to blame: this is tried with one step down the
     targets' gradient, to where it would be halfway to 0 if it were linear.
@@ -189,14 +189,14 @@ def outweighed(
 
 
 def penalty(samples: Sequence[TargetSample]) -> float:
-    """The sum of weight * |value|^2 of targets, as the objective has it."""
+    """Return the sum of weight * |value|^2 of targets, as in the objective."""
     return float(sum(each.target.weight * float(each.value @ each.value) for each in samples))
 
 
 def contradicting(
     transcription: Transcription, samples: list[TargetSample], z: Array, free: NDArray[np.bool_]
 ) -> list[int]:
-    """Which targets cannot all be met near z; none or at least two.
+    """Return which targets cannot all be met near z; none or at least two.
 
     Points beside z show which combinations of components stay the same. As these do not change, no z nearby makes all
     components, in units of their tolerances, smaller than their part in such combinations. Where that is longer than
@@ -219,12 +219,12 @@ def contradicting(
 
 
 def constant_part(values: Array, changes: Array, sizes: Array) -> Array:
-    """(m,): the part of ``values`` (m,) in the combinations that ``changes`` (m, k) leave as they are.
+    """Return the part of ``values`` (m,) in the combinations that ``changes`` (m, k) leave constant.
 
     A component that does not change at all, beside rounding of ``sizes`` (m,) + |values|, takes no part.
     """
     lengths = np.linalg.norm(changes, axis=1)
-    moving = lengths > STILL * (sizes + np.abs(values))
+    moving = lengths > NO_CHANGE * (sizes + np.abs(values))
     part = np.zeros(values.size)
     if moving.sum() < 2:
         return part
@@ -237,14 +237,14 @@ def constant_part(values: Array, changes: Array, sizes: Array) -> Array:
 
 
 def joined(samples: Sequence[TargetSample]) -> Array:
-    """(m,): the values of all targets, one after the other."""
+    """Return the values of all targets, stacked (m,)."""
     return np.concatenate([sample.value for sample in samples])
 
 
 def _changes(
     transcription: Transcription, samples: Sequence[TargetSample], z: Array, free: NDArray[np.bool_]
 ) -> Array | None:
-    """(m, k >= m): what the components change by from z to points beside it; None where too few are simulated."""
+    """Return the changes of the components from z to points beside it (m, k >= m); None if too few are simulated."""
     shooting, rng = transcription.shooting, np.random.default_rng(3)
     here, lower, upper = joined(samples), shooting.stacked("lower"), shooting.stacked("upper")
     changes = []

@@ -21,7 +21,7 @@ from symphys.batches import run_batch
 from symphys.problem import Problem, load_problem
 from symphys.runs import Job, make_jobs
 from symphys.runs.choice import chosen
-from symphys.runs.solving import JUDGING
+from symphys.runs.execute import JUDGING
 from symphys.solvers import TraceRow
 from symphys.transcription import transcribe
 from symphys.verification.examination import PARTS

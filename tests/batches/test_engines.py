@@ -52,7 +52,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Drivers are waited for, however long they take to start and to end."""
     monkeypatch.setattr(following, "GRACE", FOREVER)
     if find_spec("distributed"):
-        monkeypatch.setattr("symphys.batches.engines.dask.PATIENCE", FOREVER)
+        monkeypatch.setattr("symphys.batches.engines.dask.TIMEOUT", FOREVER)
 
 
 @pytest.fixture
@@ -158,8 +158,7 @@ def test_slurm_is_asked_for_what_was_said(monkeypatch: pytest.MonkeyPatch, make:
     """A stand-in for Slurm keeps the script of the job, and what is cancelled at the end."""
     pytest.importorskip("submitit")
     from symphys.batches.engines import EngineError, open_engine
-    from symphys.batches.engines.board import Board
-    from symphys.batches.engines.driver import DriverTask
+    from symphys.batches.engines.driver import Board, DriverTask
 
     tools = {"sbatch": 'cp "$1" ../asked; echo Submitted batch job 7', "scancel": 'echo "$@" > CANCELLED', "srun": ""}
     for name, does in tools.items():
@@ -168,7 +167,7 @@ def test_slurm_is_asked_for_what_was_said(monkeypatch: pytest.MonkeyPatch, make:
         (tmp_path / name).chmod(0o755)
     monkeypatch.setenv("PATH", os.pathsep.join((str(tmp_path), os.environ["PATH"])))
     engine = open_engine("slurm", "partition=short,mem_gb=4,timeout_min=90", 1, tmp_path / "out")
-    task = DriverTask(Board.hang(tmp_path / "out"), tuple(make("one")), transcribe, BatchLimits())
+    task = DriverTask(Board.create(tmp_path / "out"), tuple(make("one")), transcribe, BatchLimits())
     engine.start(task)
     script = (tmp_path / "asked").read_text("utf-8")
     wanted = ("--partition=short", "--mem=4GB", "--time=90", "--job-name=symphys", "--cpus-per-task=1")
@@ -184,6 +183,6 @@ def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPat
     pytest.importorskip("distributed")
     from symphys.batches.engines import EngineError, dask, open_engine
 
-    monkeypatch.setattr(dask, "PATIENCE", 0.2)
+    monkeypatch.setattr(dask, "TIMEOUT", 0.2)
     with pytest.raises(EngineError, match=r"tcp://127\.0\.0\.1:1"):
         open_engine("dask", "tcp://127.0.0.1:1", 1, tmp_path)

@@ -18,8 +18,7 @@ from tools.waiting import FOREVER, until
 
 from symphys.batches import BatchLimits, BatchResult, following, limits, run_on
 from symphys.batches.engines import EngineError, driver, open_engine
-from symphys.batches.engines.board import BEGUN, NOTE, OVER, Board
-from symphys.batches.engines.driver import DriverTask, drive
+from symphys.batches.engines.driver import BEGUN, NOTE, OVER, Board, DriverTask, drive
 from symphys.files import FileError
 from symphys.runs import Job
 from symphys.runs.claim import claimed
@@ -32,7 +31,7 @@ MakeJob = Callable[..., Job]
 def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, recorder: Any) -> Callable[..., tuple[BatchResult, Threads]]:
     """Run jobs by two drivers of this process; and the engine."""
     monkeypatch.setattr(following, "TICK", 0.01)
-    monkeypatch.setattr(driver, "LOOK", 0.0)
+    monkeypatch.setattr(driver, "POLL_INTERVAL", 0.0)
 
     def made(jobs: list[Job], engine: Threads | None = None, **how: Any) -> tuple[BatchResult, Threads]:
         engine = engine or Threads()
@@ -168,7 +167,7 @@ def test_a_run_that_kills_its_drivers_is_given_up_and_the_same_command_tries_it_
 
 
 def test_a_machine_that_does_not_see_the_folder_says_so(make_job: MakeJob, tmp_path: Path) -> None:
-    board = Board.hang(tmp_path / "out")
+    board = Board.create(tmp_path / "out")
     task = DriverTask(board, (make_job(0),), transcribe, BatchLimits())
     shutil.rmtree(tmp_path / "out")
     with pytest.raises(FileError, match="out: "):
@@ -177,8 +176,8 @@ def test_a_machine_that_does_not_see_the_folder_says_so(make_job: MakeJob, tmp_p
 
 def test_a_driver_that_begins_when_all_is_over_does_nothing(make_job: MakeJob, tmp_path: Path) -> None:
     job = make_job(0)
-    board = Board.hang(tmp_path / "out")
-    board.take_down()
+    board = Board.create(tmp_path / "out")
+    board.remove()
     drive(DriverTask(board, (job,), transcribe, BatchLimits()))
     assert not job.folder.path.exists()
 
@@ -202,7 +201,7 @@ def test_a_run_of_another_command_is_waited_for(run: Any, make_job: MakeJob, rec
 
 
 def test_news_come_once_and_damage_is_passed_over(tmp_path: Path) -> None:
-    board = Board.hang(tmp_path)
+    board = Board.create(tmp_path)
     board.tell(OVER, 3)
     board.tell(BEGUN, 3, "me")
     board.note("something")
@@ -211,18 +210,18 @@ def test_news_come_once_and_damage_is_passed_over(tmp_path: Path) -> None:
     assert found == [(NOTE, -1, "something"), (BEGUN, 3, "me"), (OVER, 3, "")]
     assert board.news() == []
     assert board.is_over(3) and not board.is_over(4)
-    board.take_back(3)
+    board.clear_done(3)
     assert not board.is_over(3) and not board.stopped
     board.stop("late")
     assert board.stopped and board.reason == "late"
-    board.take_down()
+    board.remove()
     assert board.stopped and board.news() == []
 
 
 def test_a_driver_leaves_out_what_another_has_ended(make_job: MakeJob, tmp_path: Path) -> None:
     """Also a run that would be done again: one that was stopped after its timeout, say."""
     jobs = tuple(replace(make_job(seed)) for seed in range(3))
-    board = Board.hang(tmp_path / "out")
+    board = Board.create(tmp_path / "out")
     board.tell(OVER, 1)
     drive(DriverTask(board, jobs, transcribe, BatchLimits(), first=2))
     assert [job.folder.path.exists() for job in jobs] == [True, False, True]

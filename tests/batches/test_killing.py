@@ -22,7 +22,7 @@ from tools.repeats import thorough
 from worlds.toys import require
 
 from symphys.results.result import read_result
-from symphys.runs.standing import stamped
+from symphys.runs.inspection import file_stamp
 
 PROBLEM = """
 title = "A throw to be found by trial"
@@ -74,7 +74,7 @@ class Watcher:
         count = 0
         for path in self.out.glob("*/*-seed*"):
             self.begun.add(path)
-            stamp = stamped(path / "result.json")
+            stamp = file_stamp(path / "result.json")
             if path in self.seen and stamp != self.seen[path]:
                 self.again.add(path)
             if stamp:

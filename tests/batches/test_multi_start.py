@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from symphys.batches import run_batch
-from symphys.batches.multi_start import groups
+from symphys.batches.batch import groups
 from symphys.problem import load_problem
 from symphys.runs import Job, make_jobs
 from symphys.solvers import TraceRow
@@ -71,6 +71,6 @@ def test_one_that_fails_spoils_no_other(
     def broken(*_: Any) -> Any:
         raise RuntimeError("out of order")
 
-    monkeypatch.setattr("symphys.batches.multi_start.solve_multi_start", broken)
+    monkeypatch.setattr("symphys.batches.batch.solve_multi_start", broken)
     batch = run_batch(jobs_of(problem_file, tmp_path), 1, recorder, transcribe, multi_start=True)
     assert batch.accepted

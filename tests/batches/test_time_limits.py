@@ -23,7 +23,7 @@ from tools.repeats import few
 from tools.waiting import assert_gone, wait_for
 
 from symphys.batches import BatchLimits, limits, pool, run_batch
-from symphys.batches.process_tree import end_tree
+from symphys.batches.pool import end_tree
 from symphys.problem import load_problem
 from symphys.results.result import Result, read_result
 from symphys.results.trace import read_trace
@@ -65,7 +65,7 @@ def transcribe(problem, exact=False):
                 hang()
         Driver.commit = commit
     if at == "judging":
-        sys.modules["symphys.runs.solving"].judge = hang
+        sys.modules["symphys.runs.execute"].judge = hang
     return honest(problem, backend="casadi")
 """
 

@@ -22,8 +22,7 @@ from symphys.problem import load_problem
 from symphys.results.result import read_result
 from symphys.runs import Job, make_jobs
 from symphys.runs.claim import claimed
-from symphys.runs.execute import with_claim
-from symphys.runs.transcription_cache import TranscriptionCache
+from symphys.runs.execute import TranscriptionCache, with_claim
 from symphys.transcription import transcribe
 
 HURT = """
@@ -150,16 +149,13 @@ def test_a_folder_that_cannot_be_written_fails_its_run_alone(make_job: Callable[
 
 KILLED = """
 import os, pickle, signal, sys
-from symphys.batches import run_batch
+from symphys.batches import Observer, run_batch
 from symphys.transcription import transcribe
 import symphys.runs
 execution = sys.modules["symphys.runs.execute"]
-execution.KEPT = execution.SHARE = 0
+execution.CHECKPOINT_INTERVAL = execution.SHARE = 0
 
-class Killer:
-    rows = 0
-    def started(self, job, resumed): pass
-    def ended(self, job, result, skipped): pass
+class Killer(Observer):
     def advanced(self, job, row):
         if row.iteration == 1:
             os.kill(os.getpid(), signal.SIGKILL)
@@ -188,7 +184,7 @@ def test_a_killed_run_goes_on_from_its_checkpoint(make: Any, recorder: Any) -> N
 ORPHAN = """
 import multiprocessing, pickle, sys
 from symphys.batches.worker import Worker
-from symphys.runs.transcription_cache import TranscriptionCache
+from symphys.runs.execute import TranscriptionCache
 from symphys.transcription import transcribe
 
 ours, theirs = multiprocessing.Pipe()

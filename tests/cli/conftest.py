@@ -38,9 +38,9 @@ Run = Callable[..., tuple[int, str, str]]
 @pytest.fixture(autouse=True)
 def _without_lines_of_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lines that come every few seconds have tests of their own; a slow machine puts them between any others."""
-    monkeypatch.setattr("symphys.cli.watching.plain.monotonic", lambda: 0.0)
+    monkeypatch.setattr("symphys.cli.watching.observers.monotonic", lambda: 0.0)
     monkeypatch.setattr("symphys.cli.watching.heartbeat.EVERY", FOREVER)
-    monkeypatch.setattr("symphys.cli.finding.shown.QUIET", FOREVER)
+    monkeypatch.setattr("symphys.cli.run_tables.QUIET", FOREVER)
 
 
 @pytest.fixture

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import click
 import pytest
 
 from symphys.cli.arguments import UsageFault
-from symphys.cli.batch_options import read_time
+from symphys.cli.solve import read_time
 
 QUICK = ("--backend", "casadi", "--unexamined", "--solver", "least_squares", "--no-report")
 RUN = Path("reports/throw/least_squares-seed0")
@@ -18,10 +20,10 @@ Run = Callable[..., tuple[int, str, str]]
 
 def test_times_have_units() -> None:
     texts = ("90", "90s", "1.5 min", "2h", "1d")
-    assert [read_time("--budget", text) for text in texts] == [90, 90, 90, 7200, 86400]
+    assert [read_time(None, click.Option(["--budget"]), text) for text in texts] == [90, 90, 90, 7200, 86400]
     for text in ("0", "-1", "ten", "5 m", "1..2", ""):
         with pytest.raises(UsageFault, match=r"--budget .*10min"):
-            read_time("--budget", text)
+            read_time(None, click.Option(["--budget"]), text)
 
 
 def test_a_dry_run_says_what_would_be_done_and_why_and_does_nothing(run: Run, throw: Path) -> None:
@@ -95,7 +97,7 @@ def test_quiet_says_what_fails_with_the_end_of_its_log(run: Run, throw: Path, mo
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError("something nobody thought of")
 
-    monkeypatch.setattr("symphys.runs.solving.judge", broken)
+    monkeypatch.setattr(sys.modules["symphys.runs.execute"], "judge", broken)
     code, out, err = run("solve", throw, "--quiet", "--rerun", "all", *QUICK)
     assert (code, out) == (1, "")
     assert err.startswith(

@@ -13,15 +13,14 @@ import pytest
 from rich.console import Console
 from tools.waiting import until
 
-from symphys.batches import progress as batch_progress
-from symphys.batches.progress import BatchShare, StepProgress
 from symphys.cli.watching import heartbeat as heartbeats
-from symphys.cli.watching import plain as plain_lines
+from symphys.cli.watching import observers as plain_lines
+from symphys.cli.watching import progress as batch_progress
 from symphys.cli.watching import watch, working
 from symphys.cli.watching.heartbeat import heartbeat
-from symphys.cli.watching.plain import Plain
-from symphys.cli.watching.words import batch_words, percent, step_words, use_words
-from symphys.cli.wording import time_words
+from symphys.cli.watching.observers import Plain
+from symphys.cli.watching.progress import BatchShare, StepProgress
+from symphys.cli.wording import batch_words, percent, step_words, time_words, use_words
 from symphys.solvers import CmaOptions, TraceRow
 from symphys.solvers.core.budget import BudgetUse
 
@@ -164,7 +163,7 @@ def test_live_lines_are_wrapped_and_not_cut(monkeypatch: pytest.MonkeyPatch) -> 
     def console(**given: Any) -> Console:
         return Console(file=buffer, force_terminal=True, width=80, color_system=None)
 
-    monkeypatch.setattr("symphys.cli.watching.choice.Console", console)
+    monkeypatch.setattr("symphys.cli.watching.observers.Console", console)
     outputs = {"height of the hand [m]": 1.25, "speed of the ball [m/s]": 12.5}
     with watch(1) as live:
         live.started(Job(), resumed=False)  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from symphys.cli.watching.words import at
+from symphys.cli.wording import at
 from symphys.results.case_name import case_name
 from symphys.runs import read_result
 from symphys.solvers import TraceRow

@@ -10,8 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from symphys.cli.summary import advice, fitting_table, missed, table
-from symphys.cli.watching.live import Live
-from symphys.cli.watching.plain import Notes, Plain
+from symphys.cli.watching.observers import Live, Notes, Plain
 from symphys.results.result import CheckRecord
 from symphys.runs import Result
 from symphys.solvers import CmaOptions, TraceRow

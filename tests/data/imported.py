@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 import symphys
-from symphys.importing.findings import Finding
-from symphys.importing.options import ImportOptions
-from symphys.importing.source import Source
-from symphys.importing.tables import tables_of
+from symphys.importing.records import CompiledModel, Finding, ImportOptions
+from symphys.importing.robot import tables_of
 from symphys.types import Array
 
 Tables = dict[str, Any]
@@ -30,7 +28,7 @@ def model_of(xml: str) -> Any:
 
 def read(xml: str, **options: Any) -> tuple[Tables, tuple[Finding, ...]]:
     """Tables and findings of a text."""
-    return tables_of(Source(Path("robot.xml"), "mjcf", model_of(xml)), ImportOptions(**options))
+    return tables_of(CompiledModel(Path("robot.xml"), "mjcf", model_of(xml)), ImportOptions(**options))
 
 
 def problem_of(tables: Tables, duration: float = 0.3, dt: float = 0.01, **more: Any) -> symphys.Problem:

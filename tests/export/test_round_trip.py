@@ -12,7 +12,7 @@ from tools.repeats import first
 from tools.same_worlds import compared, differences
 
 from symphys.export import MjcfModel, problem_model
-from symphys.importing.options import ImportOptions
+from symphys.importing.records import ImportOptions
 from symphys.importing.robot import read_robot
 from symphys.problem import Problem, problem_of_tables
 

@@ -11,7 +11,7 @@ import pytest
 
 from symphys import simulate
 from symphys.export import problem_model
-from symphys.importing.options import ImportOptions
+from symphys.importing.records import ImportOptions
 from symphys.importing.robot import read_robot
 from symphys.problem import Problem, problem_of_tables
 

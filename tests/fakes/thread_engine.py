@@ -31,12 +31,9 @@ class Threads:
         except FileError as error:
             self.heard.append(str(error))
 
-    def alive(self) -> int:
-        return sum(each.is_alive() for each in self.drivers)
-
-    def faults(self) -> list[str]:
+    def poll(self) -> tuple[int, list[str]]:
         found, self.heard = self.heard, []
-        return found
+        return sum(each.is_alive() for each in self.drivers), found
 
     def close(self) -> None:
         for each in self.drivers:

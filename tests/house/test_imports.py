@@ -78,7 +78,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "solve, judge, examine, write one run, and who may",
     ),
     "batches": (
-        "errors files interrupts results runs solvers suggest threads verification",
+        "errors files interrupts results runs solvers suggest threads",
         "dask distributed submitit",
         "many runs, in any number of processes and commands",
     ),

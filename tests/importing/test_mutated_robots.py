@@ -14,7 +14,7 @@ from tools.repeats import few
 
 import symphys
 from symphys.errors import SymphysError
-from symphys.importing.findings import Finding
+from symphys.importing.records import Finding
 from symphys.importing.robot import read_robot
 
 pytest.importorskip("mujoco")

@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 from tools.waiting import FOREVER
 
-from symphys.importing.options import ImportOptions
-from symphys.importing.problem import ImportProblem
-from symphys.importing.reading import isolated
+from symphys.importing import source as reading_process
 from symphys.importing.reading.checking import check_model
 from symphys.importing.reading.folders import Folders
+from symphys.importing.records import ImportOptions, ImportProblem
 from symphys.importing.source import read_source
 
 mujoco = pytest.importorskip("mujoco")
@@ -53,7 +52,7 @@ def test_files_outside_are_refused_before_mujoco_sees_the_model(
     inside: Path, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = model(inside, text.format(outside=inside.parent))
-    monkeypatch.setattr(isolated, "run", lambda *_: pytest.fail("MuJoCo was started"))
+    monkeypatch.setattr(reading_process, "run", lambda *_: pytest.fail("MuJoCo was started"))
     with pytest.raises(ImportProblem, match="--assets ") as caught:
         read_source(file)
     assert str(caught.value).startswith(f"{file}: line 1: <")
@@ -140,8 +139,8 @@ def test_included_files_are_checked_too(tmp_path: Path) -> None:
 def test_a_crash_or_a_hang_of_mujoco_is_a_message(
     tmp_path: Path, code: str, limit: float, why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(isolated, "CALL", code)
-    monkeypatch.setattr(isolated, "LONGEST", limit)
+    monkeypatch.setattr(reading_process, "CALL", code)
+    monkeypatch.setattr(reading_process, "TIMEOUT", limit)
     with pytest.raises(ImportProblem, match=why):
         read_source(model(tmp_path, ""))
 

@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from tools.repeats import few
 
-from symphys.importing.findings import Finding
-from symphys.importing.options import ImportOptions
-from symphys.importing.problem import ImportProblem
+from symphys.importing.records import CompiledModel, Finding, ImportOptions, ImportProblem
 from symphys.importing.robot import Imported, read_robot
-from symphys.importing.source import Source, read_source
+from symphys.importing.source import read_source
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -38,7 +36,7 @@ ARM = (
 WALKER = link("base") + link("left") + link("right") + hinge("a", "base", "left") + hinge("b", "base", "right")
 
 
-def source_of(folder: Path, inside: str, **options: object) -> Source:
+def source_of(folder: Path, inside: str, **options: object) -> CompiledModel:
     file = folder / "robot.urdf"
     file.write_text(f'<robot name="r">{inside}</robot>', encoding="utf-8")
     return read_source(file, ImportOptions(**options))  # type: ignore[arg-type]

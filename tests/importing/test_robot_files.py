@@ -12,8 +12,7 @@ import pytest
 import symphys
 from symphys.cli import main
 from symphys.errors import ProblemError
-from symphys.importing.findings import Finding
-from symphys.importing.problem import ImportProblem
+from symphys.importing.records import Finding, ImportProblem
 from symphys.importing.robot import Imported, read_robot
 from symphys.importing.writing import number, robot_text
 

@@ -10,7 +10,7 @@ from data.imported import by_name, model_of, problem_of, read, texts
 
 import symphys
 from symphys.expression import parse
-from symphys.importing.problem import ImportProblem
+from symphys.importing.records import ImportProblem
 from symphys.model.state_layout import input_sizes
 from symphys.problem.checks.start import at_guess, formula_names
 from symphys.problem.checks.start_values import StartValues

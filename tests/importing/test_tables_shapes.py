@@ -11,9 +11,9 @@ from data.imported import by_name, model_of, problem_of, read, texts
 from tools.repeats import few
 
 from symphys.importing import fitting
-from symphys.importing.options import ImportOptions
+from symphys.importing.records import ImportOptions
+from symphys.importing.robot import tables_of
 from symphys.importing.source import read_source
-from symphys.importing.tables import tables_of
 from symphys.model.shapes import Box, Sphere
 
 mujoco = pytest.importorskip("mujoco")
@@ -201,11 +201,11 @@ def test_massless_ends_and_impossible_inertias_are_mended() -> None:
     xml = """<compiler boundmass="0"/><worldbody><body name="arm" pos="0 0 1"><joint axis="0 1 0"/><geom size="0.1"/>
     <body name="tip" pos="0.5 0 0"><joint name="wrist" axis="1 0 0"/><inertial pos="0 0 0" mass="1e-9"
     diaginertia="1e-12 1e-12 1e-12"/></body></body></worldbody>"""
-    from symphys.importing.source import Inertial, Source
+    from symphys.importing.records import CompiledModel, Inertial
 
     light = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
     bent = Inertial(2.0, np.array([0.1, 0, 0]), np.diag([0.1, 0.1, 0.3]))
-    source = Source(Path("robot.urdf"), "urdf", model_of(xml), {"tip": light, "arm": bent})
+    source = CompiledModel(Path("robot.urdf"), "urdf", model_of(xml), {"tip": light, "arm": bent})
     tables, findings = tables_of(source, ImportOptions())
     assert [body["name"] for body in tables["body"]] == ["arm"]
     assert tables["body"][0]["inertia"] == pytest.approx([0.1, 0.1, 0.2])

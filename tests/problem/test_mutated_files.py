@@ -34,10 +34,10 @@ from tools.repeats import thorough
 
 import symphys
 import symphys.problems
-from symphys.cli.finding.best import best
-from symphys.cli.finding.ls import ls
+from symphys.cli.best import best
+from symphys.cli.ls import ls
 from symphys.errors import SymphysError
-from symphys.importing.reading import isolated
+from symphys.importing import source as model_source
 from symphys.importing.reading.child import main as read_in_this_process
 from symphys.problem import load, load_problem
 from symphys.report.pages.run import write_light_report
@@ -271,7 +271,7 @@ def test_a_thousand_broken_files_are_read_or_become_messages(
         monkeypatch.setattr(load, "check_overlap", lambda *_: None)
     if kind == "robot":
         pytest.importorskip("mujoco")
-        monkeypatch.setattr(isolated, "run", lambda place, _: read_in_this_process(place) or 0)
+        monkeypatch.setattr(model_source, "run", lambda place, _: read_in_this_process(place) or 0)
     attempt = KINDS[kind](tmp_path)
     bad = {number: found for number in range(1000) if len(found := outcome(attempt, kind, number)) > len("message")}
     assert bad == {}

@@ -18,7 +18,7 @@ from symphys.results.result import Result, read_result
 from symphys.results.run import read_run
 from symphys.results.scene import read_scene
 from symphys.runs import Job, execute
-from symphys.runs.transcription_cache import TranscriptionCache
+from symphys.runs.execute import TranscriptionCache
 from symphys.trajectory import Trajectory, shapes
 from symphys.transcription import transcribe
 

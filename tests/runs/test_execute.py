@@ -18,8 +18,8 @@ from symphys import files, solvers
 from symphys.problem import load_problem
 from symphys.runs import Job, Result, execute, make_jobs
 from symphys.runs.claim import FolderBusy, claimed
-from symphys.runs.standing import standing
-from symphys.runs.transcription_cache import TranscriptionCache
+from symphys.runs.execute import TranscriptionCache
+from symphys.runs.inspection import inspect_run
 from symphys.solvers import Outcome, Status, TraceRow
 from symphys.transcription import transcribe
 
@@ -57,7 +57,7 @@ def test_a_run_leaves_every_file(make_job: MakeJob) -> None:
         "trace.csv",
         "log.txt",
     }
-    assert standing(job).result == result
+    assert inspect_run(job).result == result
     assert (job.folder.path / "problem.toml").read_text(encoding="utf-8") == job.problem.text
 
 
@@ -97,7 +97,7 @@ def test_what_is_met_by_a_motion_that_cannot_be_is_not_solved(problem_file: Path
         assert all(check.met for check in result.checks)
         assert (result.solved, result.accepted, result.verdict) == (False, False, "doubted")
         assert any("ball-ground" in doubt and "t = 0 s" in doubt for doubt in result.doubts), result.doubts
-        assert standing(job).result == result
+        assert inspect_run(job).result == result
 
 
 @pytest.mark.slow
@@ -255,7 +255,7 @@ def test_an_expected_failure_is_a_result_with_the_message(make_job: MakeJob) -> 
     result = run(job)
     assert (result.status, result.solved, result.advice) == ("failed", False, "cannot do that")
     assert "Traceback" not in (job.folder.path / "log.txt").read_text(encoding="utf-8")
-    assert standing(job).result == result
+    assert inspect_run(job).result == result
 
 
 def test_an_unexpected_failure_puts_its_traceback_into_the_log_only(make_job: MakeJob) -> None:

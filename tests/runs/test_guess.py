@@ -15,8 +15,7 @@ from symphys import Problem, Solution, SymphysError
 from symphys.report import write_light_report
 from symphys.results.file_names import LOG, MULTIPLIERS, TRAJECTORY
 from symphys.runs import make_jobs, read_guess_run
-from symphys.runs.guess import with_guess
-from symphys.runs.knots import resampled
+from symphys.runs.guess import resampled, with_guess
 from symphys.solvers import SOLVERS
 from symphys.transcription import transcribe
 

@@ -21,7 +21,7 @@ from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.problem import load_problem
 from symphys.report import outdated, write_run_report
 from symphys.runs import Job, execute
-from symphys.runs.transcription_cache import TranscriptionCache
+from symphys.runs.execute import TranscriptionCache
 from symphys.solvers import solver
 from symphys.transcription import transcribe
 

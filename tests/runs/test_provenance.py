@@ -13,8 +13,8 @@ from symphys import files
 from symphys.results.file_names import RESULT
 from symphys.results.result import read_result
 from symphys.runs import Job, execute, provenance
+from symphys.runs.execute import TranscriptionCache
 from symphys.runs.record import failure
-from symphys.runs.transcription_cache import TranscriptionCache
 from symphys.transcription import transcribe
 
 MakeJob = Callable[..., Job]
@@ -152,7 +152,7 @@ def test_odd_repositories_have_no_commit(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_program_that_does_not_answer_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(provenance, "PATIENCE", 0.05)
+    monkeypatch.setattr(provenance, "ANSWER_TIMEOUT", 0.05)
     monkeypatch.setenv("PATH", f"{tmp_path}:/bin")
     for text in ("#!/bin/sh\nexec sleep 100000\n", "#!/nowhere\n", "#!/bin/sh\nexit 3\n"):
         (tmp_path / "sysctl").write_text(text, encoding="utf-8")

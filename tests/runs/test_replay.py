@@ -15,9 +15,7 @@ from symphys.problem import load_problem
 from symphys.results.config import read_config
 from symphys.results.file_names import CONFIG, PROBLEM, RESULT, TRAJECTORY
 from symphys.runs import make_jobs
-from symphys.runs.replay import replay
-from symphys.runs.replay.comparison import compare_arrays, compare_numbers
-from symphys.runs.replay.replay import ReplayError
+from symphys.runs.replay import ReplayError, compare_arrays, compare_numbers, replay
 
 TABLES = {
     "simulation": {"duration": 0.2, "dt": 0.02},

@@ -19,7 +19,7 @@ from symphys.codegen import KernelUnavailable
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.problem import load_problem
 from symphys.runs import Job, Result, execute, make_jobs, read_result
-from symphys.runs.transcription_cache import TranscriptionCache
+from symphys.runs.execute import TranscriptionCache
 from symphys.solvers import TraceRow
 from symphys.transcription import Transcription, transcribe
 

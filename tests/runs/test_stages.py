@@ -17,7 +17,7 @@ from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.results.result import StageRecord
 from symphys.runs import Job, Result, execute, make_jobs, read_result
-from symphys.runs.transcription_cache import TranscriptionCache
+from symphys.runs.execute import TranscriptionCache
 from symphys.solvers import TraceRow
 from symphys.transcription import Transcription, transcribe
 

@@ -15,7 +15,7 @@ from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD
 from symphys.findings.physics import jump_findings
 from symphys.transcription import Record, Transcription, transcribe
-from symphys.verification.jumps import jumps
+from symphys.verification.balance import jumps
 
 Make = Callable[..., Transcription]
 BOUNCE = """

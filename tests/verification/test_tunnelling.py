@@ -7,7 +7,7 @@ import pytest
 from tools.repeats import few
 
 from symphys.transcription import Transcription
-from symphys.verification.tunnelling import tunnelling
+from symphys.verification.near_misses import tunnelling
 
 SHOT = """
 [simulation]

@@ -9,13 +9,13 @@ from typing import Any
 
 import submitit
 
+from symphys.batches.engines import EngineError
 from symphys.batches.engines.driver import DriverTask, drive
-from symphys.batches.engines.interface import EngineError
 from symphys.interrupts import ignoring_interrupts
 from symphys.suggest import hint
 
 FOLDER = ".slurm"
-"""In the folder of the batch: scripts and outputs of the jobs."""
+"""Folder for scripts and outputs of the jobs, inside the folder of the batch."""
 LOCAL = "local"
 ASKED: dict[str, Callable[[str], Any]] = {
     "timeout_min": int,
@@ -28,14 +28,14 @@ ASKED: dict[str, Callable[[str], Any]] = {
     "exclude": str,
     "gres": str,
 }
-"""What ``--scheduler`` may set, and of which type."""
+"""The keys of ``--scheduler``, with their types."""
 SHARED = ("timeout_min", "mem_gb", "cpus_per_task")
-"""Those that have the same name for all executors of submitit."""
+"""Keys with the same name for all executors of submitit."""
 DEFAULTS = {"timeout_min": 60, "cpus_per_task": 1}
 
 
 def opened(scheduler: str, count: int, out: Path) -> SlurmEngine:
-    """An engine for what is asked for: ``partition=short,timeout_min=60,mem_gb=4``, or ``local``."""
+    """Make an engine for a request such as ``partition=short,timeout_min=60,mem_gb=4``, or ``local``."""
     here, asked = read_asked(scheduler)
     missing = next((name for name in ("sbatch", "srun") if shutil.which(name) is None), "")
     if missing and not here:
@@ -49,7 +49,7 @@ def opened(scheduler: str, count: int, out: Path) -> SlurmEngine:
 
 
 def read_asked(scheduler: str) -> tuple[bool, dict[str, Any]]:
-    """(whether to stay on this machine, what is asked for); EngineError for what cannot be."""
+    """Return (whether to stay on this machine, the request by key); EngineError for a request that is not valid."""
     words = [word.strip() for word in scheduler.split(",") if word.strip()]
     asked = {}
     for word in words:
@@ -66,42 +66,35 @@ def read_asked(scheduler: str) -> tuple[bool, dict[str, Any]]:
 
 
 class SlurmEngine:
-    """Drivers as jobs."""
+    """Drivers as jobs of Slurm."""
 
     def __init__(self, executor: Any) -> None:
-        """None is submitted."""
+        """Start without jobs."""
         self.executor = executor
         self.jobs: list[Any] = []
-        self.heard: list[str] = []
 
     def start(self, task: DriverTask) -> None:
-        """Submit one more."""
+        """Submit one more job."""
         try:
             with ignoring_interrupts():
                 self.jobs.append(self.executor.submit(drive, task))
         except (submitit.core.utils.FailedJobError, OSError) as error:
             raise EngineError(f"Slurm does not take the job: {last_line(error)}") from error
 
-    def alive(self) -> int:
-        """Jobs that wait or run."""
+    def poll(self) -> tuple[int, list[str]]:
+        """Return how many jobs wait or run, and why others ended since the last call."""
         over = [job for job in self.jobs if job.done()]
-        self.heard += filter(None, map(ended, over))
         self.jobs = [job for job in self.jobs if job not in over]
-        return len(self.jobs)
-
-    def faults(self) -> list[str]:
-        """What ended jobs."""
-        found, self.heard = self.heard, []
-        return found
+        return len(self.jobs), list(filter(None, map(cause_of, over)))
 
     def close(self) -> None:
-        """Cancel what is left."""
+        """Cancel the jobs that are left."""
         for job in self.jobs:
             job.cancel(check=False)
 
 
-def ended(job: Any) -> str:
-    """What ended a job, in a line; empty if it ended by itself."""
+def cause_of(job: Any) -> str:
+    """Return why a job ended, in a line; empty if it ended by itself."""
     if not job.paths.result_pickle.exists():  # submitit would wait for it
         return f"the job {job.job_id} was ended ({job.state}); see {job.paths.stderr}"
     error = job.exception()
@@ -109,6 +102,6 @@ def ended(job: Any) -> str:
 
 
 def last_line(error: BaseException) -> str:
-    """Of what submitit tells at length, the end, where the reason is."""
+    """Return the last line of a long message of submitit, which has the reason."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return lines[-1] if lines else type(error).__name__

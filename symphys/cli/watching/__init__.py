@@ -1,10 +1,9 @@
-"""What is shown while work goes on: live lines on a terminal, plain ones elsewhere, events for other programs.
+"""Progress while work goes on: live lines on a terminal, plain ones elsewhere, events for other programs.
 
-A share done and a time left go with them: of a run from its budget, of a batch from the runs that are over, of other
-work from the parts that it is known to have.
+The share done and the time left come from the budget of a run, the finished runs of a batch, or known parts of work.
 """
 
-from symphys.cli.watching.choice import watch
 from symphys.cli.watching.heartbeat import working
+from symphys.cli.watching.observers import watch
 
 __all__ = ["watch", "working"]

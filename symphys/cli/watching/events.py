@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symphys import files
-from symphys.cli.watching.plain import Notes
+from symphys.batches import Observer
+from symphys.cli.watching.progress import Notes
 
 if TYPE_CHECKING:
     from symphys.batches import BatchResult
@@ -30,11 +31,11 @@ EVERY = 1.0
 """[s] between two iterations of a run that are reported."""
 
 
-class Events:
-    """Writes each event as it happens."""
+class Events(Observer):
+    """An observer that writes each event as a line of JSON on stdout."""
 
     def __init__(self) -> None:
-        """Nothing has happened."""
+        """Start without events."""
         self.notes = Notes()
         self.reported: dict[str, float] = {}
 
@@ -44,7 +45,7 @@ class Events:
         click.echo(files.printable(line))
 
     def started(self, job: Job, resumed: bool) -> None:
-        """A run begins, or goes on."""
+        """Write that a run starts or resumes."""
         asked = job.config
         self.tell(
             "began",
@@ -58,7 +59,7 @@ class Events:
         )
 
     def advanced(self, job: Job, row: TraceRow) -> None:
-        """A run has come to an iteration."""
+        """Write an iteration, at most one in EVERY seconds for each run."""
         now = monotonic()
         if now - self.reported.get(job.name, -EVERY) < EVERY:
             return
@@ -67,11 +68,11 @@ class Events:
         self.tell("advanced", run=job.name, iteration=row.iteration, **numbers)
 
     def judging(self, job: Job, what: str) -> None:
-        """A part of judging begins."""
+        """Write that a part of judging begins."""
         self.tell("judging", run=job.name, what=what)
 
     def ended(self, job: Job, result: Result, skipped: bool) -> None:
-        """A run is over."""
+        """Write how a run ended."""
         self.notes.new(result, skipped)
         self.reported.pop(job.name, None)
         named = ("status", "verdict", "solved", "objective", "iterations", "seconds", "advice")
@@ -81,11 +82,11 @@ class Events:
         )
 
     def note(self, text: str) -> None:
-        """Something that people should know."""
+        """Write a message."""
         self.tell("note", text=text)
 
     def finished(self, batch: BatchResult, code: int) -> None:
-        """All is over."""
+        """Write the end of the batch."""
         known = [result for result in batch.results if result]
         self.tell(
             "finished",

@@ -1,4 +1,4 @@
-"""Work whose parts are known beforehand, shown while it goes on; and what is done every so many seconds."""
+"""Calls at intervals while work goes on, and the progress of work whose parts are known beforehand."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import click
 from rich.console import Console
 from rich.text import Text
 
-from symphys.batches.progress import StepProgress
-from symphys.cli.watching.words import step_words
+from symphys.cli.watching.progress import StepProgress
+from symphys.cli.wording import step_words
 
 EVERY = 5.0
 """[s] between plain lines while work goes on."""
 TICK = 1.0
-"""[s] between two looks at the clock of a live line."""
+"""[s] between two updates of a live line."""
 
 
 @contextmanager
 def heartbeat(beat: Callable[[], None], every: float) -> Iterator[None]:
-    """Call ``beat`` every so many seconds from a thread of its own, while the body runs."""
+    """Call ``beat`` every ``every`` seconds from a thread, while the body runs."""
     over = Event()
 
     def run() -> None:
@@ -38,21 +38,33 @@ def heartbeat(beat: Callable[[], None], every: float) -> Iterator[None]:
 
 
 @contextmanager
-def working(name: str, parts: Mapping[str, float]) -> Iterator[Callable[[str], None]]:
-    """What takes the words that announce a part of a work, see ``StepProgress``; ``name``: of the work."""
-    steps, console = StepProgress(parts), Console(stderr=True)
+def live_line(name: str, words: Callable[[], str]) -> Iterator[Callable[[], None]]:
+    """Show ``words()`` on stderr while the body runs: a live line on a terminal, elsewhere a plain one at intervals.
+
+    Yields a function that redraws the line at once. ``name`` begins plain lines.
+    """
+    console = Console(stderr=True)
     if not console.is_terminal:
-        with heartbeat(lambda: click.echo(f"{name}: {step_words(steps)}", err=True), EVERY):
-            yield steps.tell
+        with heartbeat(lambda: click.echo(f"{name}: {words()}", err=True), EVERY):
+            yield lambda: None
         return
     with console.status("") as status:
+
+        def show() -> None:
+            status.update(Text(words()))
+
+        with heartbeat(show, TICK):
+            yield show
+
+
+@contextmanager
+def working(name: str, parts: Mapping[str, float]) -> Iterator[Callable[[str], None]]:
+    """Show the progress of work in known parts, see ``StepProgress``; yields the function that announces a part."""
+    steps = StepProgress(parts)
+    with live_line(name, lambda: step_words(steps)) as show:
 
         def tell(what: str) -> None:
             steps.tell(what)
             show()
 
-        def show() -> None:
-            status.update(Text(step_words(steps)))
-
-        with heartbeat(show, TICK):
-            yield tell
+        yield tell

@@ -16,10 +16,9 @@ from symphys.codegen.emit.plan import FAST_MEMORY, plan
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.batch import RolloutBatch
-from symphys.codegen.runtime.kernel import Kernel
+from symphys.codegen.runtime.kernel import BuildReport, Kernel
 from symphys.codegen.runtime.library import RowSource
 from symphys.codegen.toolchain.build import names_of
-from symphys.codegen.toolchain.report import BuildReport
 
 WARPS = 4
 """Of a block. The table robot's step has 102 levels, whose dearest shares are 2.2 times less work than all calls with

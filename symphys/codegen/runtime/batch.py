@@ -1,4 +1,4 @@
-"""Arguments and results of a batch of rollouts, checked, and cut into parts for threads."""
+"""The arrays of a batch of rollouts, checked, and cut into parts for threads."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CHUNKS = 4
 
 
 class RolloutBatch:
-    """One call's arrays; those of one row serve all lanes.
+    """The arrays of one call; arrays of one row serve all lanes.
 
     Attributes:
         inputs: by the names "z", "parameters" and "seed", (rows, words), or (words,) for all.
@@ -28,7 +28,7 @@ class RolloutBatch:
     """
 
     def __init__(self, inputs: Mapping[str, tuple[ArrayLike, int]]) -> None:
-        """Check name -> (values, words in a row); ProgramError says which shape was wanted."""
+        """Check name -> (values, words in a row); ProgramError names the shape that is needed."""
         self.inputs: dict[str, Array] = {}
         self.results: dict[str, Array] = {}
         self.place, self.count, self.discount, self.skipped = Place(0, 0), 0, 0.0, 0
@@ -43,15 +43,15 @@ class RolloutBatch:
         self.rows = lengths.pop() if lengths else 1
 
     def outputs(self, width: int) -> Array:
-        """Ask for the outputs; returns the array that they will be written to."""
+        """Ask for the outputs; return the array that they will be written to."""
         return self._result("outputs", (self.rows, width))
 
     def gradient(self, width: int) -> Array:
-        """Ask for the gradient."""
+        """Ask for the gradient; return its array."""
         return self._result("gradient", (self.rows, width))
 
     def trajectory(self, place: Place, count: int) -> Array:
-        """Ask for the words of a place at ``count`` steps."""
+        """Ask for the words of a place at ``count`` steps; return their array."""
         self.place, self.count = place, count
         return self._result("trajectory", (self.rows, count, place.size))
 
@@ -60,16 +60,17 @@ class RolloutBatch:
         return self.results[name]
 
     def parts(self, lanes: int, threads: int) -> list[BatchData]:
-        """The batch in parts of whole blocks, a few for each thread."""
+        """Cut the batch into parts of whole blocks, a few for each thread."""
         blocks = -(-self.rows // lanes)
         count = 1 if threads == 1 else min(blocks, CHUNKS * threads)
         ends = [lanes * (blocks * i // count) for i in range(count)] if count else []
         return [self.part(a, min(b, self.rows)) for a, b in zip(ends, [*ends[1:], self.rows], strict=True)]
 
     def part(self, start: int, end: int) -> BatchData:
-        """The rows from start to end; the arrays must outlive it."""
+        """Return the rows from start to end; the arrays must outlive it."""
         sources = [_rows(self.inputs.get(name), start) for name in INPUTS]
-        results = [_address(self.results.get(name), start) for name in RESULTS]
+        arrays = [self.results.get(name) for name in RESULTS]
+        results = [None if each is None else each.ctypes.data + start * each.strides[0] for each in arrays]
         place = self.place
         numbers = place.offset, place.size, place.stride, self.count, self.discount, self.skipped
         return BatchData(end - start, *sources, *results, *numbers)
@@ -80,7 +81,3 @@ def _rows(array: Array | None, start: int) -> RowSource:
         return RowSource(None, 0)
     stride = array.shape[1] if array.ndim == 2 else 0
     return RowSource(array.ctypes.data + 8 * start * stride, stride)
-
-
-def _address(array: Array | None, start: int) -> int | None:
-    return None if array is None else array.ctypes.data + start * array.strides[0]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symphys.codegen.emit.guarding import WIDTHS, Guarding
+from symphys.codegen.emit.guarding import WIDTHS
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Place, Program
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 TABLES = ("prologue", "body", "epilogue", "again", "back_body", "back_prologue", "back_epilogue")
 INPUTS, RESULTS = ("z", "parameters", "seed"), ("outputs", "gradient", "trajectory")
-"""Of a batch, as the driver's ``batch`` lists them."""
+"""Names of the arrays of a batch, in the order of the driver's ``batch``."""
 WORD = ctypes.c_int64
 Memory = Any
 """(words, lanes) float64 or float32, aligned: the values, the tape and the adjoints"""
@@ -38,7 +38,7 @@ class RowSource(ctypes.Structure):
 
 
 def program_fields(phase: type) -> Any:
-    """Of a driver's ``program``, whose phases are of this type."""
+    """Return the fields of a driver's ``program``, whose phases are of this type."""
     return (
         ("size", WORD),
         ("tape", WORD),
@@ -77,7 +77,7 @@ class LinkedCodes:
     """Codes in this process's memory, for blocks of so many lanes; see ``emit/codes.py``."""
 
     def __init__(self, codes: Codes, lanes: int, real: Any) -> None:
-        """``real``: type of numbers."""
+        """Link codes; ``real``: type of numbers."""
         numbers = np.repeat(np.array([*codes.constants, 0.0], real)[:, None], lanes, axis=1)
         raw = np.empty(numbers.nbytes + numbers[0].nbytes, np.uint8)
         start = -raw.ctypes.data % numbers[0].nbytes
@@ -90,12 +90,12 @@ class LinkedCodes:
 
     @property
     def pointer(self) -> Any:
-        """Of the address of each function."""
+        """Pointer to the address of each function."""
         return self._addresses.ctypes.data_as(ctypes.c_void_p)
 
 
 def loaded(path: Path) -> ctypes.CDLL:
-    """A compiled library; KernelUnavailable if the system refuses."""
+    """Load a compiled library; KernelUnavailable if the system refuses."""
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
@@ -108,7 +108,7 @@ class Loaded:
     def __init__(
         self, path: Path, program: Program, plan: Plan, seeded: Sequence[str], codes: LinkedCodes | None = None
     ) -> None:
-        """Load the library; KernelUnavailable if the system refuses. ``codes``: if it is an interpreter."""
+        """Load the library; KernelUnavailable if the system refuses. ``codes``: for an interpreter."""
         library = loaded(path)
         self._evaluate = _prepared(library.evaluate, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
         self._prepare = _prepared(library.prepare, ctypes.c_void_p, ctypes.c_void_p)
@@ -129,21 +129,19 @@ class Loaded:
             setattr(self.data, name, self._list(count, words))
         self._kept.append(codes)
         self.data.written = self._list(len(plan.written), np.append(plan.written, 0))
-        if plan.guarding is not None:
-            self._guard(plan.guarding)
+        if (guarding := plan.guarding) is not None:
+            self.data.first = guarding.first
+            for name, words in guarding.rows.items():
+                rows = words if words.size else np.zeros(1, np.int64)
+                setattr(self.data, name, self._list(guarding.count(name), rows))
         if program.discounted is not None:
             state, kept = program.discounted.state, program.discounted.kept
             self.data.discounted = (WORD * 3)(state.offset, state.size, state.stride)
             self.data.kept = (WORD * 2)(*((kept.offset, kept.stride) if kept else (0, 0)))
 
-    def _guard(self, guarding: Guarding) -> None:
-        self.data.first = guarding.first
-        for name, words in guarding.rows.items():
-            setattr(self.data, name, self._list(guarding.count(name), words if words.size else np.zeros(1, np.int64)))
-
     @property
     def words(self) -> int:
-        """Of the memory of a lane: values, tape and adjoints."""
+        """Words of memory of a lane: values, tape and adjoints."""
         return int(2 * self.data.size + self.data.tape)
 
     def _list(self, count: int, words: Any) -> List:
@@ -152,7 +150,7 @@ class Loaded:
 
     @property
     def addresses(self) -> tuple[int, int]:
-        """Of the driver's ``evaluate`` and of the program that it wants."""
+        """Addresses of the driver's ``evaluate`` and of its program."""
         return ctypes.cast(self._evaluate, ctypes.c_void_p).value or 0, ctypes.addressof(self.data)
 
     def prepare(self, memory: Memory) -> None:
@@ -179,7 +177,7 @@ def _prepared(function: Any, *types: Any) -> Any:
 
 
 def data_places(program: Program, seeded: Sequence[str]) -> dict[str, Sequence[Place]]:
-    """The places that the drivers know by name."""
+    """Return the places that the drivers know by name."""
     return {
         "z": [program.z],
         "parameters": [program.parameters],
@@ -191,7 +189,7 @@ def data_places(program: Program, seeded: Sequence[str]) -> dict[str, Sequence[P
 
 
 def strided(places: Sequence[Place]) -> Any:
-    """Offset, size and stride of each, one after the other."""
+    """Return offset, size and stride of each place, one after the other."""
     return np.array([x for place in places for x in (place.offset, place.size, place.stride)] or [0], dtype=np.int64)
 
 

@@ -13,15 +13,15 @@ import numpy as np
 from symphys.codegen.runtime.library import Memory
 
 ALIGNMENT = 64
-"""Bytes of the widest vector."""
+"""[bytes] Size of the widest vector."""
 T = TypeVar("T")
 
 
 class MemoryPool:
-    """Memories of one shape, kept from call to call; a task has one for itself while it runs."""
+    """Memories of one shape that are reused; a task has one for itself while it runs."""
 
     def __init__(self, words: int, lanes: int, real: Any, prepare: Callable[[Memory], None] | None = None) -> None:
-        """Memories of (words, lanes) numbers of this type; ``prepare`` makes one ready."""
+        """Manage memories of (words, lanes) numbers of this type; ``prepare`` initialises one."""
         self._prepare = prepare
         self._shape, self._real = (words, lanes), np.dtype(real)
         self._free: list[Memory] = []
@@ -35,7 +35,7 @@ class MemoryPool:
             list(_executor(os.getpid(), threads).map(self.lend, tasks))
 
     def begin(self, tasks: Sequence[Callable[[Memory], None]], threads: int) -> list[Callable[[], None]]:
-        """Begin all tasks in their order, at most ``threads`` at once. What is returned waits for one each.
+        """Start all tasks in their order, at most ``threads`` at once; return a function that waits for each.
 
         With one thread a task is run when it is waited for.
         """
@@ -55,7 +55,7 @@ class MemoryPool:
             self._free.append(memory)
 
     def new(self) -> Memory:
-        """A memory that is the caller's."""
+        """Allocate a memory that belongs to the caller."""
         alignment = max(ALIGNMENT, self._shape[1] * self._real.itemsize)
         size = int(np.prod(self._shape)) * self._real.itemsize
         raw = np.empty(size + alignment, dtype=np.uint8)
@@ -68,5 +68,5 @@ class MemoryPool:
 
 @cache
 def _executor(process: int, threads: int) -> ThreadPoolExecutor:
-    """The threads of this process: those of a parent do not live on in a child."""
+    """Return the threads of this process: those of a parent do not survive in a child."""
     return ThreadPoolExecutor(threads, thread_name_prefix="symphys-kernel")

@@ -19,26 +19,26 @@ from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.runtime.library import BatchData, Loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
-from symphys.codegen.toolchain.background import Background
 from symphys.codegen.toolchain.cache import Cache
+from symphys.codegen.toolchain.processes import Background
 
 if TYPE_CHECKING:
     from symphys.codegen.emit.source import SourceFile
 
 NARROW = (1, 2)
-"""Lanes of the libraries for calls of so many rows."""
-PATIENCE = 2.0, 1e-4
-"""[s], and [s] for each operation of the kernel: about what compiling takes."""
+"""Lanes of the libraries for calls of few rows."""
+COMPILE_TIME = 2.0, 1e-4
+"""Estimate of the time of compiling: [s], and [s] for each operation of the kernel."""
 
 
 class Libraries(Protocol):
-    """Where the libraries of a program come from."""
+    """Source of the libraries of a program."""
 
     def find(self, lanes: int) -> Loaded | None:
-        """The one that was built before, or None; KernelUnavailable if it cannot be loaded."""
+        """Return the library that was built before, or None; KernelUnavailable if it cannot be loaded."""
 
     def build(self, lanes: int) -> Loaded:
-        """A new one; KernelUnavailable if that cannot be."""
+        """Build a new library; KernelUnavailable if that cannot be."""
 
 
 @dataclass(frozen=True)
@@ -51,19 +51,19 @@ class LoadedWidth:
 
 
 Choice = tuple[LoadedWidth, int]
-"""What computes a call, and the lanes that would suit it better; 0: none."""
+"""The library for a call, and the lanes that would suit it better; 0: none."""
 
 
 def suited(rows: int, full: int) -> int:
-    """The lanes that suit a call of so many rows best; ``full``: of a vector register."""
+    """Return the lanes that suit a call of ``rows`` best; ``full``: of a vector register."""
     return next((lanes for lanes in NARROW if rows <= lanes < full), full)
 
 
 class Widths:
     """The libraries of one program that are loaded.
 
-    A call runs on the best one that is loaded or kept in the cache. A better one is compiled when calls without it have
-    taken as long as compiling takes. So whoever never needs it does not wait for it.
+    A call runs on the best library that is loaded or kept in the cache. A better one is compiled once calls without it
+    have taken as long as compiling takes, so that nobody waits for a library that pays too little.
     """
 
     def __init__(
@@ -95,16 +95,16 @@ class Widths:
 
     @property
     def loaded(self) -> dict[int, LoadedWidth]:
-        """By lanes, what is loaded."""
+        """The loaded libraries, by lanes."""
         return dict(self._widths)
 
     @property
     def note(self) -> str:
-        """What the user should know of the library that was compiled meanwhile, or empty."""
+        """A message for the user on the library that was compiled meanwhile, or empty."""
         return self._note
 
     def compile(self, parts: Sequence[SourceFile], texts: str, cache: Cache, load: Callable[[Path], Loaded]) -> None:
-        """Compile the library of all lanes beside what runs, and change over to it when it is there.
+        """Compile the library of all lanes in the background, and change over to it once it is there.
 
         See ``Background``; ``load`` loads it.
         """
@@ -125,7 +125,7 @@ class Widths:
             self._compiling.finish()
 
     def ready(self, rows: int) -> LoadedWidth:
-        """What computes a call of so many rows now; nothing is compiled."""
+        """Return the library that computes a call of ``rows`` at present; nothing is compiled."""
         return self._chosen(rows)[0]
 
     def run(self, batch: RolloutBatch, threads: int) -> None:
@@ -138,7 +138,7 @@ class Widths:
         self._timed(*self._chosen(part.rows), [part], 1)
 
     def _chosen(self, rows: int) -> Choice:
-        """What computes calls of so many rows, and the lanes that would suit them better; 0: none."""
+        """Return the library for calls of ``rows``, and the lanes that would suit them better; 0: none."""
         choices = self._choices  # a library that comes meanwhile begins new ones
         if (choice := choices.get(rows)) is not None:
             return choice
@@ -153,6 +153,7 @@ class Widths:
         return width, missing
 
     def _timed(self, width: LoadedWidth, missing: int, parts: Sequence[BatchData], threads: int) -> None:
+        """Compute parts, and build a better library once calls without it have taken as long as compiling does."""
         began = perf_counter()
         width.pool.run([partial(width.loaded.evaluate, part) for part in parts], threads)
         if missing and self._libraries is not None:
@@ -171,7 +172,7 @@ class Widths:
                     self._add(lanes, found)
 
     def _build(self, lanes: int, libraries: Libraries) -> None:
-        """Compile a library, unless another thread does; one that cannot be made is done without."""
+        """Compile a library, unless another thread does or it cannot be made."""
         if not self._lock.acquire(blocking=False):
             return
         try:

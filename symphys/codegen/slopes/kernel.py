@@ -16,14 +16,13 @@ from symphys.codegen.emit.source import FILES, SourceFile, listed, resource, spr
 from symphys.codegen.emit.writer import write
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.program import Program
+from symphys.codegen.runtime.kernel import BuildReport
 from symphys.codegen.runtime.library import loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.slopes.plan import SlopePlan, slope_plan
 from symphys.codegen.toolchain.build import shared_library
 from symphys.codegen.toolchain.cache import Cache, default_cache
-from symphys.codegen.toolchain.compiler import processors
-from symphys.codegen.toolchain.processor import processor
-from symphys.codegen.toolchain.report import BuildReport
+from symphys.codegen.toolchain.compiler import processor, processors
 from symphys.types import Array
 
 WORD = ctypes.c_int64

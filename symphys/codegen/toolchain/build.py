@@ -19,25 +19,23 @@ import numpy as np
 from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.program.collection import uncollected
 from symphys.codegen.program.program import Program
-from symphys.codegen.runtime.kernel import ProcessorKernel
+from symphys.codegen.runtime.kernel import BuildReport, ProcessorKernel
 from symphys.codegen.runtime.library import LinkedCodes, Loaded
-from symphys.codegen.runtime.widths import PATIENCE, Widths, suited
+from symphys.codegen.runtime.widths import COMPILE_TIME, Widths, suited
 from symphys.codegen.toolchain.cache import Cache, default_cache
-from symphys.codegen.toolchain.compiler import Compiler, find_compiler
+from symphys.codegen.toolchain.compiler import Compiler, find_compiler, processor
 from symphys.codegen.toolchain.plans import KeptPlan
 from symphys.codegen.toolchain.processes import ELSEWHERE
-from symphys.codegen.toolchain.processor import processor
-from symphys.codegen.toolchain.report import BuildReport
 from symphys.codegen.toolchain.temporary import TemporaryFolder
 
 if TYPE_CHECKING:  # what writes C is imported where it is called: a second start writes none
     from symphys.codegen.emit.planned import Plan
     from symphys.codegen.emit.source import SourceFile
 
-WORTH = 20_000
-"""Operations of a kernel that takes long to compile, some seconds."""
-LONG = 30.0
-"""[s] Compiling that takes at least this long is announced."""
+LONG_COMPILATION = 20_000
+"""Operations from which a kernel takes some seconds to compile, and begins with an interpreter."""
+ANNOUNCED = 30.0
+"""[s] Estimated time of compiling from which it is announced."""
 
 
 def compile_program(
@@ -72,7 +70,7 @@ def compile_program(
 
 @dataclass(frozen=True)
 class BlockWidth:
-    """How wide the blocks of a kernel are.
+    """The width of the blocks of a kernel.
 
     Attributes:
         lanes: rollouts in one block.
@@ -99,10 +97,10 @@ def compiled(
     rows: int | None = None,
     wait: bool = True,
 ) -> tuple[ProcessorKernel, KeptPlan]:
-    """The kernel of a program, and what is to be kept of it; see ``compile_program``.
+    """Build the kernel of a program, or take it from the cache; return also its plan, to be kept.
 
-    ``wait``: for the compiler; else a kernel of ``WORTH`` begins with an interpreter, and changes over once it is
-    compiled. With $SYMPHYS_WAIT all wait.
+    ``wait``: for the compiler; else a kernel of ``LONG_COMPILATION`` operations begins with an interpreter, and changes
+    over once it is compiled. With $SYMPHYS_WAIT all wait.
     """
     from symphys.codegen.emit.alone import alone
     from symphys.codegen.emit.plan import plan
@@ -119,7 +117,7 @@ def compiled(
     lanes = suited(rows, width.lanes) if rows is not None and width.several else width.lanes
     if lanes != width.lanes:
         parts = sources(own if lanes == 1 and own else planned, lanes, width.single, narrow=True)
-    waits = wait or operations < WORTH or lanes != width.lanes or bool(os.environ.get("SYMPHYS_WAIT"))
+    waits = wait or operations < LONG_COMPILATION or lanes != width.lanes or bool(os.environ.get("SYMPHYS_WAIT"))
     if not waits and libraries.find(lanes) is None:
         with suppress(KernelUnavailable):
             first = lanes, libraries.interpreter(planned)
@@ -133,7 +131,7 @@ def compiled(
 
 
 def double_reference(program: Program, names: tuple[str, ...]) -> ProcessorKernel:
-    """A kernel in double precision for a few rows, by an interpreter where compiling would take long.
+    """Build a kernel in double precision for a few rows; an interpreter where compiling would take long.
 
     Raises:
         KernelUnavailable: there is no compiler, or no cache for the interpreter.
@@ -144,7 +142,7 @@ def double_reference(program: Program, names: tuple[str, ...]) -> ProcessorKerne
     with uncollected():
         planned = plan(program, names, width.lanes * width.real)
     operations = sum(len(graph.nodes) for graph, _ in planned.functions)
-    if operations < WORTH:
+    if operations < LONG_COMPILATION:
         return compiled(program, names, width, cache, 1)[0]
     kept = KeptPlan(program, planned, names, "", len(planned.functions), operations, None)
     libraries = KeptLibraries(kept, width, cache)
@@ -152,9 +150,9 @@ def double_reference(program: Program, names: tuple[str, ...]) -> ProcessorKerne
 
 
 def announce(operations: int, kept: bool) -> None:
-    """Say beforehand that compiling takes long, unless the library is kept; by the logger ``symphys``."""
-    seconds = PATIENCE[0] + PATIENCE[1] * operations
-    if seconds >= LONG and not kept:
+    """Log a warning before a long compilation, unless the library is kept."""
+    seconds = COMPILE_TIME[0] + COMPILE_TIME[1] * operations
+    if seconds >= ANNOUNCED and not kept:
         text = "compiling %s operations takes about %.0f s of a processor; it is done once, and kept"
         logging.getLogger("symphys").warning(text, f"{operations:,}", seconds)
 
@@ -167,7 +165,7 @@ def kernel_of(
     cached: bool = True,
     note: str = "",
 ) -> ProcessorKernel:
-    """A kernel that begins with a library of so many lanes; ``cached``: whether that was kept."""
+    """Make a kernel that begins with the library ``first``, given with its lanes; ``cached``: whether it was kept."""
     kept, width, compiler = libraries.kept, libraries.width, find_compiler()
     report = BuildReport(
         compiler=compiler.version,
@@ -182,7 +180,7 @@ def kernel_of(
         note=note,
         arena=kept.plan.guarding.arena if kept.plan.guarding else 0,
     )
-    patience = PATIENCE[0] + PATIENCE[1] * kept.operations
+    patience = COMPILE_TIME[0] + COMPILE_TIME[1] * kept.operations
     widths = Widths(width.lanes, first, report.memories, libraries if width.several else None, patience)
     return ProcessorKernel(kept.program, widths, report, kept.names, threads)
 
@@ -202,13 +200,13 @@ class KeptLibraries:
     cache: Cache
 
     def find(self, lanes: int) -> Loaded | None:
-        """See ``widths.Libraries``."""
+        """Return the library that was built before, or None; see ``widths.Libraries``."""
         compiler = find_compiler()
         path = self.cache.find(library_key(self._texts(lanes), compiler, compiler.flags(processor())))
         return None if path is None else self.load(path, lanes)
 
     def build(self, lanes: int) -> Loaded:
-        """See ``widths.Libraries``."""
+        """Build the library of ``lanes``; see ``widths.Libraries``."""
         from symphys.codegen.emit.alone import alone
         from symphys.codegen.emit.plan import plan
         from symphys.codegen.emit.source import sources
@@ -222,11 +220,11 @@ class KeptLibraries:
             return self.load(built.path, lanes)
 
     def built(self, lanes: int, parts: Sequence[SourceFile]) -> AbstractContextManager[Built]:
-        """The library of these C files; see ``shared_library``."""
+        """Build the library of these C files; see ``shared_library``."""
         return shared_library(parts, self.cache, self._texts(lanes))
 
     def interpreter(self, planned: Plan) -> Loaded:
-        """What runs the functions of a plan without compiling them; KernelUnavailable without a cache to keep it in."""
+        """Return an interpreter of a plan's functions; KernelUnavailable without a cache to keep it in."""
         from symphys.codegen.emit.codes import codes_of, interpreter
 
         lanes, single = self.width.lanes, self.width.single
@@ -237,14 +235,14 @@ class KeptLibraries:
             return Loaded(built.path, self.kept.program, self.kept.plan, self.kept.names, codes)
 
     def load(self, path: Path, lanes: int) -> Loaded:
-        """The library of a file."""
+        """Load the library of a file."""
         return Loaded(path, self.kept.program, self._plan(lanes), self.kept.names)
 
     def _plan(self, lanes: int) -> Plan:
         return self.kept.alone if lanes == 1 and self.kept.alone else self.kept.plan
 
     def _texts(self, lanes: int) -> str:
-        """Stands for the C files. Others differ by the lanes, the dialect and what stands side by side."""
+        """Return the identity of the C files, which differ by lanes, dialect and packing."""
         if lanes == self.width.lanes:
             return self.kept.texts
         from symphys.codegen.emit.source import forms_of
@@ -253,7 +251,7 @@ class KeptLibraries:
 
 
 def names_of(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:
-    """The outputs that can be differentiated; None: all. ProgramError names one that does not exist."""
+    """Return the outputs that can be differentiated; None: all. ProgramError names one that does not exist."""
     names = tuple(program.outputs if seeded is None else seeded)
     if unknown := [name for name in names if name not in program.outputs]:
         raise ProgramError(f"no output is called {unknown[0]!r}; there are {', '.join(program.outputs)}")
@@ -261,7 +259,7 @@ def names_of(program: Program, seeded: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def width_of(lanes: int | Literal["auto"], single: bool) -> int:
-    """How many lanes a block has."""
+    """Return the number of lanes of a block."""
     if lanes == "auto":
         return processor().lanes(single)
     if lanes not in range(1, 65) or lanes & (lanes - 1):
@@ -282,7 +280,7 @@ class Built:
 
 @contextmanager
 def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None = None) -> Iterator[Built]:
-    """The library of these sources; what does not go into the cache lasts as long as the context.
+    """Build the library of these sources; one that is not kept in the cache lasts as long as the context.
 
     ``texts``: what stands for the sources; None: their checksum.
     """
@@ -300,7 +298,7 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None 
 
 
 def compile_for(given: IO[bytes]) -> None:
-    """Keep the library of a ``Background``, and print where it is, or why there is none."""
+    """Keep the library that a ``Background`` asks for, and print its path, or why there is none."""
     from symphys.codegen.emit.source import SourceFile
 
     asked = json.load(given)
@@ -316,19 +314,19 @@ def compile_for(given: IO[bytes]) -> None:
 
 
 def texts_of(parts: Sequence[SourceFile]) -> str:
-    """A checksum of C files."""
+    """Return a checksum of C files."""
     return hashlib.sha256(
         "\0".join(f"{part.narrow} {part.straight} {part.gathers} {part.text}" for part in parts).encode()
     ).hexdigest()
 
 
 def library_key(texts: str, compiler: Compiler, flags: Sequence[str]) -> str:
-    """What the library of C files with that checksum is kept under."""
+    """Return the key under which the library of C files with that checksum is kept."""
     return hashlib.sha256("\0".join([texts, *compiler.command, compiler.version, *flags]).encode()).hexdigest()[:32]
 
 
 def _kept(cache: Cache, key: str, path: Path) -> tuple[Path, str]:
-    """The library in the cache, or where it is and why."""
+    """Return the library in the cache; or its path and the reason why it was not kept."""
     try:
         return cache.store(key, path), ""
     except OSError as error:
@@ -337,7 +335,7 @@ def _kept(cache: Cache, key: str, path: Path) -> tuple[Path, str]:
 
 
 def temporary_folder(kind: str) -> TemporaryFolder:
-    """See ``TemporaryFolder``; KernelUnavailable if there is no room for one."""
+    """Make a ``TemporaryFolder``; KernelUnavailable if there is no room for one."""
     try:
         return TemporaryFolder(kind)
     except OSError as error:

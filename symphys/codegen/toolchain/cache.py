@@ -34,22 +34,22 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 LIMIT = 512 * 2**20
-"""Bytes that the kernels may take together; those not used for longest go first."""
+"""[bytes] Total size of the kernels; those not used for longest go first."""
 KINDS = (".so", ".cubin")
-"""Endings of kernels for processors and for devices."""
+"""Suffixes of kernels for processors and for devices."""
 PLANS = ".plan"
-"""Ending of what lies beside kernels, so that a second start need not plan them; see ``warm_start``."""
+"""Suffix of plans beside kernels, with which a second start need not plan them; see ``warm_start``."""
 LEFT = 3600.0
-"""[s] after which an unfinished file, or a lock that nobody holds, belongs to a process that was killed."""
-PATIENCE, TICK = 900.0, 0.05
-"""[s] that another process is waited for, which may have been stopped as by Ctrl-Z; [s] between two looks."""
+"""[s] Age at which an unfinished file, or a free lock, counts as left by a killed process."""
+LOCK_TIMEOUT, TICK = 900.0, 0.05
+"""[s] to wait for another process, which may be stopped as by Ctrl-Z; [s] between two attempts."""
 AHEAD = 60.0
-"""[s] that the clocks of two machines may differ by."""
+"""[s] Largest difference between the clocks of two machines."""
 
 
 @dataclass(frozen=True)
 class CacheInfo:
-    """What a cache holds: its folder, the number of kernels, their bytes and how many it may hold."""
+    """The contents of a cache: its folder, the number of kernels, their bytes and how many it may hold."""
 
     folder: Path
     kernels: int
@@ -66,7 +66,7 @@ class Cache:
     suffix: str = KINDS[0]
 
     def distrust(self) -> str:
-        """Why kernels in the folder cannot be trusted, and what to do; empty if they can, or if there is no folder."""
+        """Return why the folder's kernels cannot be trusted, and the remedy; empty if they can, or without a folder."""
         try:
             status = self.folder.stat()
         except OSError:
@@ -87,7 +87,7 @@ class Cache:
             raise PermissionError(errno.EPERM, why, str(self.folder))
 
     def find(self, key: str) -> Path | None:
-        """The kernel of this key; None if there is none, if it is damaged, or if it cannot be trusted."""
+        """Return the kernel of a key; None if there is none, if it is damaged, or if it cannot be trusted."""
         if self.distrust():
             return None
         for path in self._files(f"{key}-*{self.suffix}"):
@@ -143,13 +143,13 @@ class Cache:
                     Path(lock.name).unlink()
 
     def info(self) -> CacheInfo:
-        """Count the kernels."""
+        """Count the kernels and their bytes."""
         entries = self._entries()
         kernels = sum(path.suffix in KINDS for _, _, path in entries)
         return CacheInfo(self.folder, kernels, sum(size for _, size, _ in entries), self.limit)
 
     def clear(self) -> int:
-        """Remove all kernels, and what lies beside them; returns how many went. Programs that use one go on."""
+        """Remove all kernels and their plans; return the number of kernels removed. Programs that use one go on."""
         gone = 0
         for _, _, path in self._entries():
             with contextlib.suppress(OSError):
@@ -159,7 +159,7 @@ class Cache:
         return gone
 
     def _sweep(self, age: float) -> None:
-        """Remove what processes that were killed have left, if its time is at least ``age`` [s] away from now."""
+        """Remove files that killed processes have left, if their time is at least ``age`` [s] away from the clock's."""
         for path in [*self._files(".new-*"), *self._files(".*.lock")]:
             with contextlib.suppress(OSError):
                 if abs(time.time() - path.stat().st_mtime) >= age and (path.suffix != ".lock" or _free(path)):
@@ -172,7 +172,7 @@ class Cache:
             return []
 
     def _entries(self) -> list[tuple[float, int, Path]]:
-        """(time of last use, bytes, path) of each file, oldest first."""
+        """Return (time of last use, bytes, path) of each file, oldest first."""
         found = []
         for path in (path for kind in (*KINDS, PLANS) for path in self._files(f"*{kind}")):
             with contextlib.suppress(OSError):
@@ -197,7 +197,7 @@ class Cache:
 
 
 def default_cache() -> Cache:
-    """The cache in $SYMPHYS_CACHE, else in the user's cache folder; KernelUnavailable if the user has none."""
+    """Return the cache in $SYMPHYS_CACHE, else in the user's cache folder; KernelUnavailable if there is none."""
     wanted = os.environ.get("SYMPHYS_CACHE")
     if wanted:
         return Cache(Path(wanted))
@@ -209,8 +209,8 @@ def default_cache() -> Cache:
 
 
 def _wait_for(lock: IO[str]) -> None:
-    """Lock an open file; go on without where files cannot be locked, and after PATIENCE."""
-    end = time.monotonic() + PATIENCE
+    """Lock an open file; continue without where files cannot be locked, and after LOCK_TIMEOUT."""
+    end = time.monotonic() + LOCK_TIMEOUT
     while True:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,11 +1,16 @@
-"""C compilers: found, asked for their version, run in parallel; every way to fail is one clear line."""
+"""C compilers and the processor that they compile for: found, asked for their version and features, run in parallel.
+
+Every failure is one clear line.
+"""
 
 from __future__ import annotations
 
 import importlib.util
 import os
+import platform
 import shlex
 import shutil
+import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,11 +20,18 @@ from typing import TYPE_CHECKING
 
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.processes import ADVICE, ELSEWHERE, run, run_all
-from symphys.codegen.toolchain.processor import Processor
 
 if TYPE_CHECKING:
     from symphys.codegen.emit.source import SourceFile
 
+AVX2 = ("avx2", "fma", "f16c", "bmi1", "bmi2")
+AVX512 = ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
+LEVELS: tuple[tuple[str, int, tuple[str, ...]], ...] = (
+    ("x86-64-v4", 64, AVX2 + AVX512),
+    ("x86-64-v3", 32, AVX2),
+    ("x86-64", 16, ()),
+)
+"""Architecture, bytes of a vector, and the features that the processor must have."""
 FLAGS = (
     *("-std=gnu11", "-O2", "-fPIC", "-fvisibility=hidden", "-w"),
     *("-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"),
@@ -36,9 +48,56 @@ GATHERS = ("-fdisable-rtl-combine",)
 NARROW = ("-fno-tree-vectorize", "-fno-tree-slp-vectorize")
 """More flags where a lane is a number, or a vector is short: packing several into one takes longer."""
 LIMIT = 600.0
-"""Seconds that a compiler may take for one file: far more than any kernel needs; one that hangs is stopped."""
+"""[s] Timeout of a compiler for one file, far above what any kernel needs."""
 ANSWER = 60.0
-"""Seconds in which it must say its version; ziglang unpacks itself on its first call."""
+"""[s] Timeout for its version; ziglang unpacks itself on its first call."""
+
+
+@dataclass(frozen=True)
+class Processor:
+    """The processor that kernels are compiled for.
+
+    Attributes:
+        architecture: its name.
+        vector_bytes: size of a vector register.
+        features: what compilers may use beyond their default.
+    """
+
+    architecture: str
+    vector_bytes: int
+    features: tuple[str, ...] = ()
+
+    def flags(self) -> tuple[str, ...]:
+        """Return the features for gcc and clang, one by one: older ones do not know the architectures by name."""
+        wide = ("-mprefer-vector-width=512",) if self.vector_bytes == 64 else ()
+        return (*(f"-m{name.replace('bmi1', 'bmi')}" for name in self.features), *wide)
+
+    def lanes(self, single: bool) -> int:
+        """Return how many numbers a vector register holds."""
+        return self.vector_bytes // (4 if single else 8)
+
+
+@cache
+def processor() -> Processor:
+    """Return the processor of this machine."""
+    machine = platform.machine().lower()
+    if machine in ("x86_64", "amd64"):
+        features = _features()
+        return next(Processor(*level) for level in LEVELS if set(level[2]) <= features)
+    return Processor(machine, 16)
+
+
+def _features() -> set[str]:
+    """Return the features that the system lists; none if it lists none."""
+    try:
+        if platform.system() == "Darwin":
+            names = ["machdep.cpu.features", "machdep.cpu.leaf7_features"]
+            listed = subprocess.run(["sysctl", "-n", *names], capture_output=True, text=True, timeout=10, check=False)
+            return set(listed.stdout.lower().replace(".", "").split())
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return set()
+    return {word for line in lines if line.startswith("flags") for word in line.split(":", 1)[1].split()}
 
 
 @dataclass(frozen=True)
@@ -47,7 +106,7 @@ class Compiler:
 
     Attributes:
         command: how it is called.
-        version: first line of what it says of itself; where it lies is in the command.
+        version: the first line of its version message; its path is in the command.
         gnu: whether it is gcc.
     """
 
@@ -56,7 +115,7 @@ class Compiler:
     gnu: bool = False
 
     def flags(self, processor: Processor) -> tuple[str, ...]:
-        """The flags of every C file: they are part of what a kernel is."""
+        """Return the flags of every C file, which are part of a kernel's identity."""
         if "ziglang" in self.command and processor.features:  # its default is the machine's own processor
             return (*FLAGS, f"-mcpu={processor.architecture.replace('-', '_')}", "-mprefer-vector-width=512")
         return (*FLAGS, *processor.flags())
@@ -68,26 +127,24 @@ class Compiler:
         for source, target in zip(sources, objects, strict=True):
             file = target.with_suffix(".c")
             _write(file, source.text)
-            commands.append([*self.command, *flags, *self._extra(source), "-c", str(file), "-o", str(target)])
+            straight, gathers = (STRAIGHT if source.straight else ()), (GATHERS if source.gathers else ())
+            extra = (*(NARROW if source.narrow else ()), *((*straight, *gathers) if self.gnu else ()))
+            commands.append([*self.command, *flags, *extra, "-c", str(file), "-o", str(target)])
         run_all(commands, LIMIT, processors(), folder)
         library = folder / "kernel.so"
         run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"], LIMIT, folder)
         return library
 
-    def _extra(self, source: SourceFile) -> tuple[str, ...]:
-        straight, gathers = (STRAIGHT if source.straight else ()), (GATHERS if source.gathers else ())
-        return (*(NARROW if source.narrow else ()), *((*straight, *gathers) if self.gnu else ()))
-
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Return how many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def find_compiler() -> Compiler:
-    """The compiler of $CC, else gcc, clang, cc or the ziglang package; KernelUnavailable if there is none."""
+    """Find the compiler of $CC, else gcc, clang, cc or the ziglang package; KernelUnavailable if there is none."""
     wanted = os.environ.get("CC", "").strip()
     if wanted:
         return _asked(tuple(shlex.split(wanted)), named=True)

@@ -1,4 +1,4 @@
-"""What a kept plan depends on, as a checksum: the data that a program is built from, and the package that builds it."""
+"""Checksums of the data that a program is built from, and of the package that builds it, for kept plans."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ PACKAGE = Path(__file__).parents[2]
 SOURCES = ("*.py", "*.c", "*.h")
 PLAIN = (str, int, bool, type(None), bytes, complex, range, slice)
 OWN = ("symphys", "casadi", "numpy", "operator", "_operator", "math", "builtins")
-"""Packages whose functions are told apart by their names: their sources or versions are part of ``package_stamp``."""
+"""Packages whose functions are identified by name: their sources or versions are part of ``package_stamp``."""
 
 
 def identity_of(*data: Any) -> str | None:
-    """Equal for equal data, in every process; None if some of it has no identity, as a Python function has none."""
+    """Return a checksum, equal for equal data in every process; None if some of it has none, as Python functions do."""
     found = hashlib.sha256()
     try:
         _add(found.update, data)
@@ -34,7 +34,7 @@ def identity_of(*data: Any) -> str | None:
 
 @cache
 def package_stamp() -> str:
-    """Of all sources of this package, and of the versions of Python, casadi and numpy."""
+    """Return the checksum of all sources of this package, and of the versions of Python, casadi and numpy."""
     found = hashlib.sha256(f"{sys.version} {ca.CasadiMeta.version()} {np.__version__}".encode())
     for path in sorted(path for pattern in SOURCES for path in PACKAGE.rglob(pattern)):
         found.update(f"\0{path.relative_to(PACKAGE)}\0".encode())
@@ -43,7 +43,7 @@ def package_stamp() -> str:
 
 
 def _add(update: Any, data: Any) -> None:
-    """Take in a tree of data; TypeError names what has no identity. Every piece says its kind and its length."""
+    """Add a tree of data to a checksum; TypeError for data without identity. Every piece has its kind and length."""
     kind = type(data)
     if kind is float:
         update(b"f" + data.hex().encode() + b";")
@@ -80,7 +80,7 @@ def _add(update: Any, data: Any) -> None:
 
 
 def _add_code(update: Any, data: Any) -> None:
-    """Take in a function or a class of OWN: its name and, of a function in a function, what that gave it."""
+    """Add a function or a class of OWN: its name and, for a nested function, its captured values."""
     if (data.__module__ or "").partition(".")[0] not in OWN:
         raise TypeError(f"{data.__qualname__} of {data.__module__} has no identity")
     inner: list[Any] = []

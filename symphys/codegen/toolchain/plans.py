@@ -1,4 +1,4 @@
-"""Plans on disk: all that running a compiled kernel takes besides its library, as numbers and names, without code."""
+"""Plans on disk: all that a compiled kernel needs besides its library, as numbers and names, without code."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from symphys.codegen.program.program import AdjointDiscount, FunctionCall, Place
 
 
 class KeptProgram(Program):
-    """A program whose calls are made only when somebody asks for them, such as to look for a NaN."""
+    """A program whose calls are made only on demand, such as to look for a NaN."""
 
     def __init__(self, fields: dict[str, Any], make: Callable[[], Program]) -> None:
-        """``fields``: all but the calls."""
+        """Keep all fields but the calls, and ``make``, which makes the whole program."""
         for name, value in (*fields.items(), ("_make", make)):
             object.__setattr__(self, name, value)
 
@@ -33,23 +33,23 @@ class KeptProgram(Program):
 
     @property
     def prologue(self) -> tuple[FunctionCall, ...]:
-        """See ``Program``."""
+        """The calls before the first step."""
         return self._whole().prologue
 
     @property
     def body(self) -> tuple[FunctionCall, ...]:
-        """See ``Program``."""
+        """The calls of a step."""
         return self._whole().body
 
     @property
     def epilogue(self) -> tuple[FunctionCall, ...]:
-        """See ``Program``."""
+        """The calls after the last step."""
         return self._whole().epilogue
 
 
 @dataclass(frozen=True)
 class KeptPlan:
-    """What is kept of a kernel.
+    """The part of a kernel that is kept on disk besides its library.
 
     Attributes:
         program: without its calls.
@@ -69,7 +69,7 @@ class KeptPlan:
     alone: Plan | None = None
 
     def write(self, path: Path) -> None:
-        """Into a file."""
+        """Write the plan to a file."""
         program, plan = self.program, self.plan
         discounted = program.discounted
         head = {
@@ -103,7 +103,7 @@ class KeptPlan:
 
     @classmethod
     def read(cls, path: Path, make: Callable[[], Program]) -> KeptPlan:
-        """From a file; ``make`` makes the program with its calls."""
+        """Read a plan from a file; ``make`` makes the program with its calls."""
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         head = json.loads(arrays.pop("head").tobytes())

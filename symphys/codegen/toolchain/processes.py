@@ -1,21 +1,33 @@
-"""Compilers as processes: side by side, with a time limit, and none left behind."""
+"""Compilers as processes: side by side, with a time limit and none left behind; or in the background of a solve.
+
+A background process ends by itself and keeps the kernel for the next start: a program that ends earlier does not wait,
+and Ctrl-C does not end it.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import subprocess
+import sys
+import tempfile
 import threading
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING
 
 from symphys.codegen.errors import KernelUnavailable
+from symphys.codegen.toolchain.cache import Cache
 
-PARTING = 10.0
-"""[s] that a thread is waited for whose compiler was stopped."""
+if TYPE_CHECKING:
+    from symphys.codegen.emit.source import SourceFile
+
+JOIN_TIMEOUT = 10.0
+"""[s] to wait for a thread whose compiler was stopped."""
 ADVICE = "install gcc or clang (or `pip install ziglang`), or set CC to a C compiler"
 ELSEWHERE = "make room there, or set TMPDIR to another folder"
 MEMORY_WORDS = (
@@ -28,12 +40,14 @@ MEMORY_WORDS = (
 )
 ROOM_WORDS = ("no space left on device", "disk quota exceeded", "read-only file system")
 Ended = SimpleQueue[BaseException | None]
-"""An error, or None, of each command that is over."""
+"""The error, or None, of each command that is over."""
+PROCESS = "import sys; from symphys.codegen.toolchain.build import compile_for; compile_for(sys.stdin.buffer)"
+Built = Callable[[Path], None]
 
 
 @dataclass
 class Running:
-    """A compiler at work; on POSIX it leads a group, so that what it starts ends with it.
+    """A compiler process; on POSIX it leads a process group, so that its children end with it.
 
     Attributes:
         name: of the program.
@@ -47,7 +61,7 @@ class Running:
     folder: Path | None = None
 
     def said(self) -> str:
-        """What it printed; KernelUnavailable says how it failed."""
+        """Return its output; KernelUnavailable says how it failed."""
         with self.process:
             try:
                 out, err = self.process.communicate(timeout=self.limit)
@@ -63,7 +77,7 @@ class Running:
         return out
 
     def stop(self) -> None:
-        """End it and all that it started."""
+        """End it and its children."""
         with contextlib.suppress(OSError):
             if self.process.poll() is None and hasattr(os, "killpg"):
                 os.killpg(self.process.pid, signal.SIGKILL)
@@ -71,15 +85,15 @@ class Running:
 
 
 def run(command: Sequence[str], limit: float, folder: Path | None = None) -> str:
-    """What a command prints, within so many seconds; KernelUnavailable says how it failed.
+    """Return the output of a command; KernelUnavailable says how it failed.
 
-    ``folder``: where the command keeps what is temporary, so that nothing of it stays when the command is killed.
+    ``folder``: for temporary files of the command, so that none is left when the command is killed.
     """
     return _start(command, limit, folder).said()
 
 
 def run_all(commands: Sequence[Sequence[str]], limit: float, at_once: int, folder: Path | None = None) -> None:
-    """Run commands side by side; the first that fails ends the others, and so does Ctrl-C. ``folder``: see ``run``."""
+    """Run commands side by side; the first that fails ends the others, as does Ctrl-C. ``folder``: see ``run``."""
     ended: Ended = SimpleQueue()
     with _interrupted(ended):
         _Crew(commands, limit, ended, folder).run(at_once)
@@ -87,7 +101,7 @@ def run_all(commands: Sequence[Sequence[str]], limit: float, at_once: int, folde
 
 @contextlib.contextmanager
 def _interrupted(ended: Ended) -> Iterator[None]:
-    """Ctrl-C is one more error that is waited for: raised wherever it strikes, it is lost in a finalizer."""
+    """Make Ctrl-C one more error that is waited for: raised inside a finalizer it would be lost."""
     ours = threading.current_thread() is threading.main_thread()
     if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
@@ -129,7 +143,7 @@ class _Crew:
                 running.stop()
             for worker in workers:
                 if worker.ident is not None:
-                    worker.join(PARTING)
+                    worker.join(JOIN_TIMEOUT)
 
     def work(self) -> None:
         """Run one command after the other; each leaves an error, or None."""
@@ -176,3 +190,73 @@ def _failure(name: str, code: int, said: str, folder: Path | None = None) -> str
         return f"the compiler {name} was killed (often: out of memory); the kernel was not built"
     line = next((line for line in said.splitlines() if "error" in line.lower()), said.splitlines()[0] if said else "")
     return f"the compiler {name} failed with code {code}: {line}"
+
+
+class Background:
+    """A process that compiles, and a thread that waits for it."""
+
+    def __init__(
+        self, parts: Sequence[SourceFile], texts: str, cache: Cache, done: Built, failed: Callable[[str], None]
+    ) -> None:
+        """Start the process; KernelUnavailable if that fails.
+
+        Args:
+            parts: C files.
+            texts: their identity, see ``shared_library``.
+            cache: where the library is kept.
+            done: called with the path of the library.
+            failed: called with the reason if there is none.
+        """
+        self._done, self._failed = done, failed
+        given = {
+            "parts": [asdict(part) for part in parts],
+            "texts": texts,
+            "cache": {"folder": str(cache.folder), "limit": cache.limit},
+        }
+        self._process = _begun(json.dumps(given).encode())
+        self._thread = threading.Thread(target=self._run, name="symphys-compiler", daemon=True)
+        self._thread.start()
+
+    @property
+    def running(self) -> bool:
+        """Whether it is still compiling."""
+        return self._thread.is_alive()
+
+    def finish(self) -> None:
+        """Wait for its end."""
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            self._done(_library(self._process))
+        except (KernelUnavailable, OSError) as error:
+            self._failed(str(error))
+
+
+def _begun(given: bytes) -> subprocess.Popen[bytes]:
+    """Start a process that reads from an unnamed file, so that its parent may end at once."""
+    try:
+        with tempfile.TemporaryFile() as file:
+            file.write(given)
+            file.seek(0)
+            return subprocess.Popen(
+                [sys.executable, "-c", PROCESS],
+                stdin=file,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            )
+    except OSError as error:
+        raise KernelUnavailable(f"no process that compiles can be started: {error.strerror or error}") from error
+
+
+def _library(process: subprocess.Popen[bytes]) -> Path:
+    """Return the library that a process compiles; KernelUnavailable says why there is none."""
+    said = process.communicate()[0]
+    if process.returncode or not said:
+        raise KernelUnavailable(f"the process that compiles ended with code {process.returncode}")
+    found = json.loads(said)
+    if "error" in found:
+        raise KernelUnavailable(found["error"])
+    return Path(found["path"])

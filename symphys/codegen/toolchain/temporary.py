@@ -19,18 +19,18 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 KINDS = ("symphys-kernel-", "symphys-external-", "symphys-cuda-")
-"""How the names of folders begin."""
+"""Prefixes of the names of folders."""
 LOCK = ".in-use"
 """The file that is locked."""
 YOUNG, OLD = 60.0, 86400.0
-"""[s] A younger folder may not have been locked yet; one without a lock that is older has no process any more."""
+"""[s] A younger folder may not be locked yet; an older one without a lock has no process any more."""
 
 
 class TemporaryFolder(tempfile.TemporaryDirectory[str]):
     """A folder that lasts as long as the context; OSError if there is no room for one."""
 
     def __init__(self, kind: str) -> None:
-        """Remove what was left behind, then make a folder; ``kind``: one of KINDS."""
+        """Remove folders that were left behind, then make one; ``kind``: one of KINDS."""
         sweep(Path(tempfile.gettempdir()))
         super().__init__(prefix=kind, ignore_cleanup_errors=True)
         self.handle = lock(Path(self.name) / LOCK, os.O_CREAT)
@@ -44,7 +44,7 @@ class TemporaryFolder(tempfile.TemporaryDirectory[str]):
 
 
 def sweep(place: Path) -> None:
-    """Remove the user's folders below a place whose processes are gone."""
+    """Remove the user's folders in a place whose processes are gone."""
     for kind in KINDS:
         for folder in place.glob(f"{kind}*"):
             with contextlib.suppress(OSError):
@@ -53,7 +53,7 @@ def sweep(place: Path) -> None:
 
 
 def is_left(folder: Path) -> bool:
-    """Whether no process uses the folder any more; False if that is not known. OSError if it has gone meanwhile."""
+    """Whether no process uses the folder any more; False if unknown. OSError if it disappears meanwhile."""
     status = folder.lstat()
     age = abs(time.time() - status.st_mtime)  # a clock that was set back makes times that are still to come
     if not stat.S_ISDIR(status.st_mode) or age < YOUNG or (hasattr(os, "geteuid") and status.st_uid != os.geteuid()):
@@ -68,7 +68,7 @@ def is_left(folder: Path) -> bool:
 
 
 def lock(path: Path, flags: int = 0) -> int | None:
-    """The handle of a file, which is locked as long as that is open; None if it is locked, or cannot be."""
+    """Lock a file as long as the returned handle is open; None if it is locked, or cannot be."""
     if fcntl is None:
         return None
     try:

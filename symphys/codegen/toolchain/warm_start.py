@@ -1,4 +1,4 @@
-"""A kernel that was built before, without building its program again.
+"""Start of a kernel that was built before, without building its program again.
 
 Beside each kernel lies its plan, under a checksum of all that the program is made from: the problem's data, the sources
 of this package and the versions of what it builds with. Where that is not known (a Python function in the problem) the
@@ -45,7 +45,7 @@ def compile_source(
     cache: Cache | None = None,
     wait: bool = True,
 ) -> ProcessorKernel:
-    """The kernel of a source; those of ``seeded`` that the program has can be differentiated.
+    """Build or find the kernel of a source; those of ``seeded`` that the program has can be differentiated.
 
     See ``compile_program`` and ``build.compiled`` for the other arguments.
     """
@@ -67,7 +67,7 @@ def compile_source(
 
 
 def _found(key: str, source: ProgramSource, cache: Cache) -> KeptPlan | None:
-    """The plan that is kept."""
+    """Return the kept plan; None if there is none."""
     path = replace(cache, suffix=PLANS).find(key)
     if path is None:
         return None
@@ -78,7 +78,7 @@ def _found(key: str, source: ProgramSource, cache: Cache) -> KeptPlan | None:
 
 
 def _keep(key: str, plan: KeptPlan, cache: Cache) -> None:
-    """Store a plan; where that cannot be it is made again next time."""
+    """Store a plan, if that is possible."""
     with contextlib.suppress(OSError), temporary_folder("symphys-plan-") as folder:
         path = Path(folder) / "plan.npz"
         plan.write(path)

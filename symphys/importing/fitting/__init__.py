@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from symphys.importing.fitting.fit import KINDS, Fit, best, fit, fits
-from symphys.importing.fitting.picture import draw_fit
+from symphys.importing.fitting.fit import KINDS, Fit, best, draw_fit, fit, fits
 
 __all__ = ["KINDS", "Fit", "best", "draw_fit", "fit", "fits"]

@@ -1,4 +1,4 @@
-"""A mesh as what can be seen of it from outside: points of its outer surface, and whether a point lies outside.
+"""The visible surface of a mesh: points of its outer surface, and whether a point lies outside.
 
 Meshes of robots are seldom closed: they have inner walls, screws and gaps. So what counts as their solid is the visual
 hull (Laurentini, "The visual hull concept for silhouette-based image understanding", 1994) with depth: a point is
@@ -19,19 +19,19 @@ from symphys.types import Array, Ints
 SAMPLES = 40_000
 """Points on the surface."""
 VIEWS = 48
-"""Directions from which it is looked at."""
+"""Number of viewing directions."""
 PIXELS = 48
-"""Of a view, along the longest side."""
+"""Pixels of a view, along the longest side."""
 WITNESSES = 4
-"""Views that must have a point before the surface."""
+"""Views that must see a point in front of the surface."""
 SURROUNDED = 5
-"""Of the eight neighbours of a pixel: as many that are nearer mean that it is a gap between samples."""
+"""Number of nearer neighbours, of eight, from which a pixel counts as a gap between samples."""
 GOLDEN = (1 + 5**0.5) / 2
 
 
 @dataclass(frozen=True)
 class DepthView:
-    """Depths of the surface as seen from a direction; ``axes`` (3, 3): right, up, towards the viewer."""
+    """The depths of a surface as seen from a direction; ``axes`` (3, 3): right, up, towards the viewer."""
 
     axes: Array
     depth: Array
@@ -39,7 +39,7 @@ class DepthView:
     pixel: float
 
     def ahead(self, points: Array) -> Array:
-        """(n,) [m]: how far points are before the surface, towards the viewer; infinite beside it."""
+        """Return how far points lie in front of the surface (n,) [m]; infinite beside it."""
         seen = points @ self.axes.T
         row, column = np.floor((seen[:, :2] - self.low) / self.pixel).astype(int).T
         rows, columns = self.depth.shape
@@ -51,7 +51,7 @@ class DepthView:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles: ``vertices`` (n, 3) [m], ``faces`` (m, 3)."""
+    """A triangle mesh: ``vertices`` (n, 3) [m], ``faces`` (m, 3)."""
 
     vertices: Array
     faces: Ints
@@ -63,7 +63,7 @@ class Mesh:
 
     @cached_property
     def samples(self) -> Array:
-        """(k, 3): points spread over all triangles by area, the same each time, and all vertices."""
+        """Points (k, 3) spread over all triangles by area, the same each time, and all vertices."""
         corners = self.vertices[self.faces]
         areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         rng = np.random.default_rng(0)
@@ -77,7 +77,7 @@ class Mesh:
 
     @cached_property
     def views(self) -> tuple[DepthView, ...]:
-        """From directions that are spread evenly over the sphere, by Fibonacci's spiral."""
+        """Views from directions that are spread evenly over the sphere by a Fibonacci spiral, and along the axes."""
         height = 1 - (2 * np.arange(VIEWS) + 1) / VIEWS
         turn, ring = 2 * np.pi * np.arange(VIEWS) / GOLDEN, np.sqrt(1 - height**2)
         fronts = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
@@ -97,26 +97,26 @@ class Mesh:
 
     @cached_property
     def outer(self) -> Array:
-        """(k, 3): the samples that are seen from outside."""
+        """The samples (k, 3) that are seen from outside."""
         slack = 1.5 * self.size / PIXELS
         return np.asarray(self.samples[self.ahead(self.samples) > -slack / 2])
 
     def ahead(self, points: Array) -> Array:
-        """(n,) [m]: how far points are before the surface as ``WITNESSES`` views see it: one may look through a gap."""
+        """Return how far points lie in front of the surface (n,) [m] for ``WITNESSES`` views: one may be a gap."""
         ahead = np.array([view.ahead(points) for view in self.views])
         return np.asarray(np.partition(ahead, -WITNESSES, axis=0)[-WITNESSES])
 
     def outside(self, points: Array) -> NDArray[np.bool_]:
-        """(n,): whether points are before the surface, from some directions.
+        """Return whether points lie in front of the surface (n,), as seen from some directions.
 
-        A pixel has the depth of its nearest sample. So what is inside is not called outside, and what is outside by
-        less than a two-hundredth of the mesh's size may be called inside.
+        A pixel has the depth of its nearest sample. So points inside never count as outside, and points outside by less
+        than a two-hundredth of the mesh's size may count as inside.
         """
         return np.asarray(self.ahead(points) > 0)
 
     @cached_property
     def filling(self) -> Array:
-        """(k, 3): points of a regular grid inside."""
+        """Points (k, 3) of a regular grid inside."""
         low, high = self.outer.min(axis=0), self.outer.max(axis=0)
         step = self.size / 40
         sides = [np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True)]
@@ -132,7 +132,7 @@ class Mesh:
         return cKDTree(self.samples)
 
     def distance(self, points: Array) -> Array:
-        """(n,) [m]: from points to the nearest triangle, exactly for the farthest of them."""
+        """Return the distances (n,) [m] to the nearest triangle, exact for the farthest points."""
         near = np.asarray(self.tree.query(points)[0], float)
         for k in np.argsort(near)[-16:]:
             near[k] = triangle_distances(self.vertices[self.faces], points[k]).min()
@@ -140,7 +140,7 @@ class Mesh:
 
 
 def filled(depth: Array) -> Array:
-    """Depths, raised to the ``SURROUNDED``-th nearest of eight neighbours: no sample may have fallen on a pixel."""
+    """Raise depths to the ``SURROUNDED``-th nearest of eight neighbours, since no sample may have fallen on a pixel."""
     padded = np.pad(depth, 1, constant_values=-np.inf)
     rows, columns = depth.shape
     shifts = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
@@ -149,7 +149,7 @@ def filled(depth: Array) -> Array:
 
 
 def triangle_distances(triangles: Array, point: Array) -> Array:
-    """(m,) [m]: from a point (3,) to each of (m, 3, 3) triangles; flat ones by their edges."""
+    """Return the distances (m,) [m] from a point (3,) to triangles (m, 3, 3); flat ones by their edges."""
     squares = []
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = (normal**2).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Solids with free numbers: how far points are from them, where they begin, and points on their surface."""
+"""Solids with free sizes and pose: distances of points, and points on the surface."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ FOOT_STEPS = 8
 """Newton steps towards the foot of a perpendicular on an ellipsoid."""
 SPREAD = 1500
 """Points on the surface of a solid."""
-ALONG = np.eye(3)[[1, 2, 0]]
 
 
 @dataclass(frozen=True)
@@ -27,15 +26,15 @@ class Placed:
     sizes: Array
 
     def distance(self, points: Array) -> Array:
-        """(n,) [m]: signed, negative inside."""
+        """Return the signed distances (n,) [m], negative inside."""
         return DISTANCES[self.kind]((points - self.centre) @ self.axes, self.sizes)
 
     def surface(self) -> Array:
-        """(k, 3): points all over its surface."""
+        """Return points (k, 3) all over the surface."""
         return np.asarray(self.centre + SURFACES[self.kind](self.sizes) @ self.axes.T)
 
     def shape(self) -> Shape:
-        """As the model has it."""
+        """Return the shape of the model."""
         centre = tuple(self.centre.tolist())
         orientation = quaternion(self.axes)
         a, *more = self.sizes.tolist()
@@ -50,30 +49,30 @@ class Placed:
 
 
 def to_sphere(p: Array, sizes: Array) -> Array:
-    """Distances from a sphere about the origin; likewise the others."""
+    """Return distances from a sphere about the origin."""
     return np.asarray(np.linalg.norm(p, axis=1) - sizes[0])
 
 
 def to_capsule(p: Array, sizes: Array) -> Array:
-    """Along z."""
+    """Return distances from a capsule along z."""
     along = np.clip(p[:, 2], -sizes[1], sizes[1])
     return np.asarray(np.sqrt(p[:, 0] ** 2 + p[:, 1] ** 2 + (p[:, 2] - along) ** 2) - sizes[0])
 
 
 def to_cylinder(p: Array, sizes: Array) -> Array:
-    """Along z."""
+    """Return distances from a cylinder along z."""
     over = np.stack([np.hypot(p[:, 0], p[:, 1]) - sizes[0], np.abs(p[:, 2]) - sizes[1]])
     return np.asarray(np.linalg.norm(np.maximum(over, 0), axis=0) + np.minimum(over.max(axis=0), 0))
 
 
 def to_box(p: Array, sizes: Array) -> Array:
-    """By half sizes."""
+    """Return distances from a box by its half sizes."""
     over = np.abs(p) - sizes
     return np.asarray(np.linalg.norm(np.maximum(over, 0), axis=1) + np.minimum(over.max(axis=1), 0))
 
 
 def to_ellipsoid(p: Array, sizes: Array) -> Array:
-    """As ``EllipsoidField`` of the collision has them."""
+    """Return distances from an ellipsoid, by the same iteration as ``EllipsoidField`` of the collision."""
     squares, scaled = sizes**2, sizes * p
     low = -0.98 * squares.min()
     m = np.maximum((np.abs(scaled) - squares).max(axis=1), low)
@@ -92,11 +91,11 @@ DISTANCES: dict[str, Callable[[Array, Array], Array]] = {
     "box": to_box,
     "ellipsoid": to_ellipsoid,
 }
-"""By the kinds of shapes."""
+"""Signed distances by the kinds of shapes."""
 
 
 def directions(count: int = SPREAD) -> Array:
-    """(count, 3): unit vectors, spread evenly by Fibonacci's spiral."""
+    """Return unit vectors (count, 3), spread evenly by a Fibonacci spiral."""
     z = 1 - (2 * np.arange(count) + 1) / count
     turn = np.pi * (1 + 5**0.5) * np.arange(count)
     ring = np.sqrt(1 - z**2)
@@ -104,7 +103,7 @@ def directions(count: int = SPREAD) -> Array:
 
 
 def capsule_surface(sizes: Array) -> Array:
-    """(k, 3): both ends and the side."""
+    """Return points (k, 3) on both ends and the side."""
     ball = sizes[0] * directions()
     ball[:, 2] += np.where(ball[:, 2] > 0, sizes[1], -sizes[1])
     turn, z = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(-sizes[1], sizes[1], 30))
@@ -113,7 +112,7 @@ def capsule_surface(sizes: Array) -> Array:
 
 
 def cylinder_surface(sizes: Array) -> Array:
-    """(k, 3): both faces and the side."""
+    """Return points (k, 3) on both faces and the side."""
     turn, z = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(-sizes[1], sizes[1], 24))
     side = np.stack([sizes[0] * np.cos(turn), sizes[0] * np.sin(turn), z], axis=-1).reshape(-1, 3)
     turn, out = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(0, 1, 10))
@@ -123,7 +122,7 @@ def cylinder_surface(sizes: Array) -> Array:
 
 
 def box_surface(sizes: Array) -> Array:
-    """(k, 3): a grid on each face."""
+    """Return points (k, 3) of a grid on each face."""
     side = np.linspace(-1, 1, 16)
     u, v = (each.ravel() for each in np.meshgrid(side, side))
     found = []
@@ -142,11 +141,11 @@ SURFACES: dict[str, Callable[[Array], Array]] = {
     "box": box_surface,
     "ellipsoid": lambda sizes: sizes * directions(),
 }
-"""By the kinds of shapes."""
+"""Points on the surface by the kinds of shapes."""
 
 
 def quaternion(axes: Array) -> tuple[float, float, float, float]:
-    """The unit quaternion w x y z of a rotation matrix."""
+    """Return the unit quaternion w x y z of a rotation matrix."""
     from scipy.spatial.transform import Rotation
 
     x, y, z, w = Rotation.from_matrix(axes).as_quat(canonical=True).tolist()
@@ -154,5 +153,5 @@ def quaternion(axes: Array) -> tuple[float, float, float, float]:
 
 
 def union_distance(solids: list[Placed], points: Array) -> Array:
-    """(n,) [m]: from the nearest of several solids."""
+    """Return the distances (n,) [m] from the nearest of several solids."""
     return np.asarray(np.min([solid.distance(points) for solid in solids], axis=0))

@@ -1,1 +1,1 @@
-"""From a file to a compiled model: its text is checked, MuJoCo reads it in a process of its own, losses are mended."""
+"""From a file to a compiled model: the text is checked, MuJoCo reads it in its own process, losses are repaired."""

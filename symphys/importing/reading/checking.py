@@ -1,4 +1,4 @@
-"""The text of a model before MuJoCo reads it: well-formed XML of a bearable size that names no file outside.
+"""Checks of a model's text before MuJoCo reads it: well-formed XML of limited size that names no file outside.
 
 MuJoCo's own parser trusts its input. A pass by a streaming parser refuses what would make it read other files, run out
 of memory, or compute without end. It reads no entities and makes no tree.
@@ -14,8 +14,8 @@ from typing import Any, Literal
 from xml.parsers import expat
 
 from symphys.files import check_regular
-from symphys.importing.problem import ImportProblem
 from symphys.importing.reading.folders import Folders, exists
+from symphys.importing.records import ImportProblem
 from symphys.suggest import quote
 
 MAX_BYTES = 50_000_000
@@ -24,9 +24,9 @@ MAX_ELEMENTS = 500_000
 MAX_FILES = 200
 """Files of one model that include each other."""
 MAX_COUNT = 1_000_000
-"""Of what one attribute may ask for: rows times columns, copies, places for data."""
+"""Largest count that one attribute may ask for: rows times columns, copies, places for data."""
 MAX_COPIES = 20_000
-"""Of the bodies that replicates and composites make, their product."""
+"""Largest product of the copies that replicates and composites make."""
 TEXTS_WORDS = (
     "name class childclass file material mesh hfield texture joint joint1 joint2 jointinparent body body1 "
     "body2 geom geom1 geom2 site site1 site2 tendon tendon1 tendon2 actuator target objname refname plugin "
@@ -40,13 +40,13 @@ UNBOUNDED = {("limit", "effort"), ("limit", "velocity")}
 COPIES = ("replicate", "composite", "flexcomp")
 COUNTED = {"hfield": ("nrow", "ncol"), "numeric": ("size",), "mesh": ("maxhullvert",)}
 IMAGES = ("texture", "skin", "material")
-"""What is not read: its files count for nothing."""
+"""Elements that are not read, so that their files do not matter."""
 EXAMPLE = "a model is MJCF, <mujoco> ... </mujoco>, or URDF, <robot> ... </robot>"
 
 
 @dataclass
 class XmlText:
-    """What a checked model says of itself.
+    """A checked model file.
 
     Attributes:
         kind: its format.
@@ -80,7 +80,7 @@ def check_model(folders: Folders) -> XmlText:
 
 
 def read_bytes(file: Path, model: Path) -> bytes:
-    """The content of a file, which is UTF-8 text of a bearable size."""
+    """Return the content of a file; ImportProblem unless it is UTF-8 text of at most ``MAX_BYTES``."""
     try:
         if file.is_dir():
             raise ImportProblem(str(model), f"{named(file, model)} is a folder; name a model file in it")
@@ -109,15 +109,15 @@ def read_bytes(file: Path, model: Path) -> bytes:
 
 
 def named(file: Path, model: Path) -> str:
-    """A file in messages about a model."""
+    """Return the name of a file for messages about a model."""
     return "the file" if file == model else str(file)
 
 
 class Checker:
-    """Reads the files of one model, element by element."""
+    """The check of the files of one model, element by element."""
 
     def __init__(self, folders: Folders) -> None:
-        """``folders``: the model, and what it may read."""
+        """Keep the folders of the model and the files it may read."""
         self.folders = folders
         self.root = ""
         self.files: list[Path] = []
@@ -145,17 +145,17 @@ class Checker:
             parser.StartElementHandler = parser.EndElementHandler = parser.StartDoctypeDeclHandler = None
 
     def problem(self, message: str, line: int | None = None) -> ImportProblem:
-        """The error at the place that is read."""
+        """Return the error at the present line."""
         at = self.parser.CurrentLineNumber if line is None else line
         inside = "" if self.file == self.folders.file else f"{self.file}, "
         return ImportProblem(str(self.folders.file), message, f"{inside}line {at}")
 
     def doctype(self, *_: Any) -> None:
-        """Entities could name files, or grow without end."""
+        """Refuse entities, which could name files or grow without end."""
         raise self.problem("a model has no DOCTYPE and no entities; take it out")
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        """One element begins."""
+        """Check the start of an element."""
         self.elements += 1
         if not self.root:
             self.root = tag
@@ -175,11 +175,11 @@ class Checker:
             self.note_files(tag, attributes)
 
     def end(self, _: str) -> None:
-        """One element ends."""
+        """Leave an element."""
         self.stack.pop()
 
     def check_numbers(self, tag: str, name: str, value: str) -> None:
-        """Numbers are finite."""
+        """Refuse numbers that are not finite."""
         if name in TEXTS or (tag, name) in UNBOUNDED or not value:
             return
         found = [number(word) for word in value.split()]
@@ -187,7 +187,7 @@ class Checker:
             raise self.problem(f'<{tag}> {name} = {quote(value)}: a finite number is needed, such as "0.5"')
 
     def copies(self, tag: str, attributes: Mapping[str, str]) -> float:
-        """How often an element is made."""
+        """Return how often an element is copied."""
         if tag not in COPIES:
             return 1.0
         product = 1.0
@@ -196,7 +196,7 @@ class Checker:
         return product
 
     def check_counts(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """No attribute asks for memory without end."""
+        """Refuse attributes that ask for memory without bound."""
         names = list(attributes) if tag == "size" else COUNTED.get(tag, ())
         product = 1.0
         for name in names:
@@ -206,7 +206,7 @@ class Checker:
                 raise self.problem(f"<{tag}> {name} = {quote(attributes[name])}: more than {MAX_COUNT} is refused")
 
     def note_files(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """Files that an element of MJCF names, and folders of files."""
+        """Collect the files that an element of MJCF names, and folders of files."""
         if tag == "compiler":
             self.asset_folders |= {
                 attributes[key] for key in ("meshdir", "assetdir", "texturedir") if key in attributes
@@ -219,7 +219,7 @@ class Checker:
         ]
 
     def follow(self) -> None:
-        """Check all files that are named; read those that are part of the model."""
+        """Check all files that are named, and read those that are part of the model."""
         done = 0
         while done < len(self.references):
             tag, value, line, file = self.references[done]
@@ -243,7 +243,7 @@ class Checker:
 
 
 def number(word: str) -> float | None:
-    """A word as a number; None if it is none."""
+    """Return a word as a number; None if it is not one."""
     try:
         return float(word)
     except ValueError:

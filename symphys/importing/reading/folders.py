@@ -1,4 +1,4 @@
-"""Which files of a model may be read, and where those are that it names by package."""
+"""The files of a model that may be read, and the search for those that it names by package."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from symphys.importing.problem import ImportProblem
+from symphys.importing.records import ImportProblem
 from symphys.suggest import quote
 
 PACKAGE = "package:"
 MOST_PARENTS = 30
-"""Folders above the model's that are tried as the folder of a package."""
+"""Number of parent folders that are searched for a package."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class Folders:
 
     @property
     def own(self) -> Path:
-        """The model's folder."""
+        """The folder of the model."""
         return self.file.parent
 
     def roots(self) -> set[Path]:
-        """All allowed folders, without links."""
+        """Return all allowed folders, with links resolved."""
         folders = {self.own, self.file.resolve().parent, *self.assets}
         return {folder.resolve() for folder in folders}
 
@@ -57,7 +57,7 @@ class Folders:
             raise ImportProblem(str(self.file), f"{text}folder is allowed: --assets {path.resolve().parent}")
 
     def mesh(self, named: str, folder: str = "") -> Path | None:
-        """The file of a mesh of a URDF; None if there is none.
+        """Return the file of a mesh of a URDF; None if there is none.
 
         ``package://name/rest`` is looked for below the folders above the model, the nearest first: in one that is
         called like the package, or that has the rest of the path, with or without its first parts. Of these, it must
@@ -80,7 +80,7 @@ class Folders:
         return next((path for base in self.assets if exists(path := base / Path(plain).name)), None)
 
     def in_package(self, named: str) -> Path | None:
-        """The file of ``package://name/rest``; see ``mesh``."""
+        """Return the file of ``package://name/rest``; see ``mesh``."""
         parts = tuple(part for part in PurePosixPath(named.removeprefix(PACKAGE).lstrip("/")).parts if part != "/")
         outside = None
         for path, package in self.candidates(parts):
@@ -95,7 +95,7 @@ class Folders:
         return None
 
     def candidates(self, parts: tuple[str, ...]) -> Iterator[tuple[Path, Path | None]]:
-        """Paths that a package's file may have, each with the package's folder if the model lies in it."""
+        """Yield paths that a package's file may have, each with the package's folder if the model lies in it."""
         for base in self.assets:
             for start in range(len(parts)):
                 yield base.joinpath(*parts[start:]), None
@@ -112,7 +112,7 @@ class Folders:
 
 
 def exists(path: Path) -> bool:
-    """Whether there is a file of that name, which may be none."""
+    """Whether there is a file of that name, which may be no valid path."""
     try:
         return path.is_file()
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""What a URDF says that MuJoCo does not keep: motors, speeds, mimics, which link is the root."""
+"""Parts of a URDF that MuJoCo does not keep: motors, speeds, mimics, and which link is the root."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from typing import Literal
 from xml.etree import ElementTree
 from xml.parsers import expat
 
-from symphys.importing.compiled import JointMotor
-from symphys.importing.findings import Finding
-from symphys.importing.wording import counted, listed
+from symphys.importing.records import Finding, JointMotor, counted, listed
 
 Base = Literal["auto", "free", "fixed"]
 WORLD = "world"
@@ -25,7 +23,7 @@ LOST = {
     "calibration": "reference positions of encoders",
     "verbose": "meshes by another name",
 }
-"""Elements that nothing reads, and what they are."""
+"""Elements that nothing reads, and their purpose."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,7 @@ def read_urdf(text: bytes) -> UrdfText:
 
 
 def tree(text: bytes) -> ElementTree.Element:
-    """The elements, with the names that the file writes: prefixes need not be bound, and often are not."""
+    """Return the elements with the names that the file writes: prefixes are often not bound."""
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate("UTF-8")
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
@@ -98,7 +96,7 @@ def tree(text: bytes) -> ElementTree.Element:
 
 
 def joint(element: ElementTree.Element) -> JointText:
-    """One joint."""
+    """Read one joint."""
     limit, mimic = element.find("limit"), element.find("mimic")
     name = element.get("name", "")
     follows = None
@@ -117,13 +115,13 @@ def joint(element: ElementTree.Element) -> JointText:
 
 
 def linked(element: ElementTree.Element, key: str) -> str:
-    """The link that a joint names."""
+    """Return the link that a joint names."""
     found = element.find(key)
     return "" if found is None else found.get("link", "")
 
 
 def value(element: ElementTree.Element | None, key: str) -> float | None:
-    """A number that an attribute gives; None if it gives none."""
+    """Return the number that an attribute gives; None if it gives none."""
     try:
         found = float("" if element is None else element.get(key, ""))
     except ValueError:
@@ -132,7 +130,7 @@ def value(element: ElementTree.Element | None, key: str) -> float | None:
 
 
 def driven_by(transmission: ElementTree.Element) -> Iterator[str]:
-    """Names of the joints that a transmission drives."""
+    """Yield the names of the joints that a transmission drives."""
     for each in transmission.iter("joint"):
         name = each.get("name") or (each.text or "").strip()
         if name:
@@ -140,7 +138,7 @@ def driven_by(transmission: ElementTree.Element) -> Iterator[str]:
 
 
 def branches(urdf: UrdfText, root: str) -> int:
-    """How many moving joints leave the root link and all that is fixed to it."""
+    """Return how many moving joints leave the root link and everything that is fixed to it."""
     held, count = [root], 0
     children: dict[str, list[JointText]] = {}
     for each in urdf.joints:
@@ -156,7 +154,7 @@ def branches(urdf: UrdfText, root: str) -> int:
 
 
 def base_floats(urdf: UrdfText, root: str, base: Base) -> tuple[bool, Finding]:
-    """Whether the root link floats, and why.
+    """Return whether the root link floats, and the finding on the reason.
 
     A file with a link "world" says what is fixed. Without one, a root from which a single moving joint leaves is the
     foot of an arm, and stands still. All others are bodies that go somewhere, and float.
@@ -177,7 +175,7 @@ def base_floats(urdf: UrdfText, root: str, base: Base) -> tuple[bool, Finding]:
 
 
 def motors(urdf: UrdfText) -> tuple[dict[str, JointMotor], list[Finding]]:
-    """Motors by name of joint: of transmissions, or, in a file without any, of all joints that say an effort."""
+    """Return motors by joint: of transmissions, or, in a file without any, of all joints with an effort."""
     found, findings = dict[str, JointMotor](), list[Finding]()
     driven = set(urdf.driven) or {each.name for each in urdf.joints}
     weak, endless = [], []
@@ -207,7 +205,7 @@ def motors(urdf: UrdfText) -> tuple[dict[str, JointMotor], list[Finding]]:
 
 
 def speeds(urdf: UrdfText) -> list[Finding]:
-    """What the file says of the fastest motions, which nothing enforces."""
+    """Return the finding on velocity limits, which nothing enforces."""
     moving = [each for each in urdf.joints if each.kind in MOVING]
     given = [each.velocity for each in moving if each.velocity and math.isfinite(each.velocity)]
     if not given:
@@ -218,12 +216,12 @@ def speeds(urdf: UrdfText) -> list[Finding]:
 
 
 def lost_elements(urdf: UrdfText) -> list[Finding]:
-    """Elements that nothing reads."""
+    """Return findings on elements that nothing reads."""
     return [Finding("left out", f"{count} <{tag}>", f"{LOST[tag]}") for tag, count in urdf.lost.items() if tag in LOST]
 
 
 def lost_mimics(urdf: UrdfText, kept: Sequence[str]) -> tuple[tuple[Mimic, ...], list[Finding]]:
-    """The mimics that a model does not have as couplings; ``kept``: joints that it couples."""
+    """Return the mimics that a model does not have as couplings, with findings; ``kept``: joints that it couples."""
     lost = tuple(each.mimic for each in urdf.joints if each.mimic is not None and each.name not in kept)
     known = {each.name for each in urdf.joints if each.kind in ("revolute", "continuous", "prismatic")}
     usable = tuple(each for each in lost if each.joint in known and each.follows in known)

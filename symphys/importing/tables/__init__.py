@@ -1,5 +1,1 @@
-"""A compiled model of MuJoCo as the tables of a problem file."""
-
-from symphys.importing.tables.assemble import tables_of
-
-__all__ = ["tables_of"]
+"""A compiled model of MuJoCo as tables of a problem file, a module for each kind of table."""

@@ -1,26 +1,52 @@
-"""Who may touch whom, and with what friction: MuJoCo's filters and coefficients."""
+"""Contacts of a model: which surfaces may touch and with what friction, as few [[pair]] tables.
+
+MuJoCo has filters and coefficients for each pair of geoms. Contacts that a world cannot have are left out: shapes
+without a rule, overlap at the start, too many points. Bodies state their friction and static surfaces none, so that the
+body's holds. Two bodies would multiply theirs; a [[pair]] table gives what they have in the model instead.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable
-from itertools import combinations
+from collections.abc import Hashable, Mapping, Sequence
+from itertools import combinations, combinations_with_replacement, product
 from typing import Any
 
 import numpy as np
 
-from symphys.importing.tables.contact_limits import few_enough, without_overlap, without_rule
-from symphys.importing.tables.contact_tables import KEYS, Law, Meetings, write_contacts
+from symphys.importing.tables.pose import at_start
 from symphys.importing.tables.reading import ModelReading, numbers
 from symphys.importing.tables.shapes import Shapes
-from symphys.model.world import mujoco_tangent
+from symphys.model.world import COMBINE, mujoco_tangent
 from symphys.types import Array
+
+Law = tuple[float, float, float]
+"""Friction, torsion [m], rolling [m]."""
+KEYS = ("friction", "torsion", "rolling")
+Meetings = dict[tuple[str, str], Law]
+"""The law of every two surfaces that may touch, by their names in alphabetical order."""
+Tables = Mapping[str, dict[str, Any]]
+"""Tables of surfaces by their names."""
+Statement = tuple[tuple[str, Any], ...]
+"""The keys of a [[pair]] table; empty where none is needed."""
+APART: Statement = (("collide", False),)
+POINTS = {
+    "sphere": {"sphere": 1, "box": 1, "capsule": 1, "cylinder": 1, "ellipsoid": 1, "convex": 1},
+    "box": {"box": 16, "capsule": 8},
+    "capsule": {"capsule": 5, "cylinder": 3, "ellipsoid": 3},
+    "plane": {"sphere": 1, "box": 8, "capsule": 2, "cylinder": 6, "ellipsoid": 1, "convex": 8},
+}
+"""Number of points in which two shapes may touch; terrain is like a plane. Other pairs have no rule."""
+MOST_POINTS = 2000
+"""Points of contact that a world may have."""
+OVERLAP = 5e-4
+"""[m] Overlap at the start beyond which contact is left out, since it would be pushed out in the first steps."""
 
 
 def read_contacts(
     reading: ModelReading, shapes: Shapes, bodies: list[dict[str, Any]], statics: dict[str, Any]
 ) -> dict[str, Any]:
-    """[[pair]] tables; bodies and statics get ``friction``, and groups. "touching": two bodies that may touch."""
+    """Return [[pair]] tables, and as "touching" the bodies that may touch; surfaces get ``friction`` and groups."""
     owners = owners_of(reading, shapes)
     meet = {} if reading.off("CONTACT") else meetings(reading, owners)
     for table in bodies:
@@ -31,15 +57,19 @@ def read_contacts(
     if "ground" in statics:
         still["ground"] = statics["ground"]
     if reading.off("CONTACT"):
-        pass_through(reading, surfaces)
+        for table in surfaces.values():
+            table["collides_with"] = []
+        if surfaces:
+            reading.note("taken", "contact", "the model's options switch it off: bodies touch nothing")
         return {"touching": set()}
     if not reading.options.self_collision:
         apart = [names for names in meet if set(names) <= surfaces.keys()]
         meet = {names: law for names, law in meet.items() if names not in set(apart)}
         if apart:
             reading.note("left out", f"contact of {len(apart)} pairs of bodies of the robot", "as the caller chose")
-    meet = without_overlap(reading, owners, without_rule(reading, surfaces, still, meet))
-    meet = few_enough(reading, owners, surfaces, still, meet)
+    kinds = {name: kinds_of(table) for name, table in {**still, **surfaces}.items()}
+    meet = without_overlap(reading, owners, without_rule(reading, kinds, meet))
+    meet = few_enough(reading, owners, surfaces, kinds, meet)
     pairs = write_contacts(reading, classes_of(reading, owners), surfaces, still, meet)
     directed = directed_pairs(reading, owners, meet)
     named = [set(table["between"]) for table in directed]
@@ -48,26 +78,8 @@ def read_contacts(
     return {"pair": pairs, "touching": set(meet)}
 
 
-def pass_through(reading: ModelReading, surfaces: dict[str, dict[str, Any]]) -> None:
-    """Where the model switches contact off."""
-    for table in surfaces.values():
-        table["collides_with"] = []
-    if surfaces:
-        reading.note("taken", "contact", "the model's options switch it off: bodies touch nothing")
-
-
-def classes_of(reading: ModelReading, owners: dict[int, str]) -> dict[str, Hashable]:
-    """Of every surface what its contacts follow from: of each of its geoms the filters and coefficients."""
-    model, found = reading.model, dict[str, set[tuple[object, ...]]]()
-    for geom, name in owners.items():
-        kind = model.geom_contype[geom], model.geom_conaffinity[geom], model.geom_condim[geom], model.geom_type[geom]
-        coefficients = (model.geom_priority[geom], *model.geom_friction[geom].tolist())
-        found.setdefault(name, set()).add((*(int(each) for each in kind), *coefficients))
-    return {name: frozenset(kinds) for name, kinds in found.items()}
-
-
 def owners_of(reading: ModelReading, shapes: Shapes) -> dict[int, str]:
-    """The name of the body, or of what stands still, of every geom that was taken."""
+    """Return the name of the body or static surface of every geom that was taken."""
     found = dict(reading.static_names)
     for top, parts in shapes.items():
         if reading.links[top].name in reading.seen:
@@ -76,8 +88,18 @@ def owners_of(reading: ModelReading, shapes: Shapes) -> dict[int, str]:
     return found
 
 
+def classes_of(reading: ModelReading, owners: dict[int, str]) -> dict[str, Hashable]:
+    """Return the class of every surface, on which its contacts depend: filters and coefficients of its geoms."""
+    model, found = reading.model, dict[str, set[tuple[object, ...]]]()
+    for geom, name in owners.items():
+        kind = model.geom_contype[geom], model.geom_conaffinity[geom], model.geom_condim[geom], model.geom_type[geom]
+        coefficients = (model.geom_priority[geom], *model.geom_friction[geom].tolist())
+        found.setdefault(name, set()).add((*(int(each) for each in kind), *coefficients))
+    return {name: frozenset(kinds) for name, kinds in found.items()}
+
+
 def meetings(reading: ModelReading, owners: dict[int, str]) -> Meetings:
-    """Which surfaces may touch: by the types of their geoms, or because a pair says so."""
+    """Return the pairs of surfaces that may touch: by the types of their geoms, or by an explicit pair."""
     model, found = reading.model, dict[tuple[str, str], list[Law]]()
     still = set(reading.static_names.values())
     named = zip(model.pair_geom1, model.pair_geom2, strict=True)
@@ -109,7 +131,7 @@ def meetings(reading: ModelReading, owners: dict[int, str]) -> Meetings:
 
 
 def may_touch(reading: ModelReading, one: int, other: int, excluded: set[tuple[int, int]]) -> bool:
-    """MuJoCo's rule: types, exclusions, and that a body does not touch what its joints hold it to."""
+    """Apply MuJoCo's rule: types, exclusions, and that a body does not touch the one its joints hold it to."""
     model = reading.model
     types, affinities = model.geom_contype, model.geom_conaffinity
     if not (int(types[one]) & int(affinities[other]) or int(types[other]) & int(affinities[one])):
@@ -125,7 +147,7 @@ def may_touch(reading: ModelReading, one: int, other: int, excluded: set[tuple[i
 
 
 def geom_law(reading: ModelReading, one: int, other: int) -> Law:
-    """MuJoCo's mixing: of the geom with the higher priority, else the larger of each."""
+    """Mix coefficients as MuJoCo does: of the geom with the higher priority, else the larger of each."""
     model = reading.model
     priorities = int(model.geom_priority[one]), int(model.geom_priority[other])
     chosen = [one, other] if priorities[0] == priorities[1] else [one if priorities[0] > priorities[1] else other]
@@ -135,13 +157,13 @@ def geom_law(reading: ModelReading, one: int, other: int) -> Law:
 
 
 def pair_law(reading: ModelReading, pair: int) -> Law:
-    """Of an explicit pair; of its coefficients along the two tangents of a contact the larger."""
+    """Return the law of an explicit pair, with the larger of its coefficients along the two tangents."""
     friction = reading.model.pair_friction[pair]
     return law_of(max(friction[:2]), friction[2], max(friction[3:5]), int(reading.model.pair_dim[pair]))
 
 
 def directed_pairs(reading: ModelReading, owners: dict[int, str], meet: Meetings) -> list[dict[str, Any]]:
-    """[[pair]] tables of what has two coefficients of friction; notes those whose directions turn with a body."""
+    """Return [[pair]] tables with two coefficients of friction; note pairs whose directions turn with a body."""
     model, tables = reading.model, []
     geoms = Counter(owners.values())
     for pair, friction in enumerate(model.pair_friction):
@@ -162,7 +184,7 @@ def directed_pairs(reading: ModelReading, owners: dict[int, str], meet: Meetings
 
 
 def tangent_of(reading: ModelReading, one: int, other: int) -> Array | None:
-    """(3,): the first tangent of the contacts of two geoms; None where it turns with one of them."""
+    """Return the first tangent (3,) of the contacts of two geoms; None if it turns with one of them."""
     kinds, types = reading.model.geom_type, reading.library.mjtGeom
     plane, body = (one, other) if kinds[one] == types.mjGEOM_PLANE else (other, one)
     if kinds[plane] != types.mjGEOM_PLANE or kinds[body] == types.mjGEOM_CAPSULE:
@@ -171,7 +193,7 @@ def tangent_of(reading: ModelReading, one: int, other: int) -> Array | None:
 
 
 def law_of(friction: float, torsion: float, rolling: float, directions: int) -> Law:
-    """With what MuJoCo lets act in so many directions."""
+    """Keep the coefficients that act in a contact of MuJoCo with so many ``directions``."""
     return (
         float(friction) if directions >= 3 else 0.0,
         float(torsion) if directions >= 4 else 0.0,
@@ -179,8 +201,165 @@ def law_of(friction: float, torsion: float, rolling: float, directions: int) -> 
     )
 
 
+def without_overlap(reading: ModelReading, owners: dict[int, str], meet: Meetings) -> Meetings:
+    """Drop pairs that overlap at the start, which a rigid world would push apart."""
+    if not meet:
+        return meet
+    deepest: dict[tuple[str, ...], float] = {}
+    for contact in at_start(reading).contact:
+        names = tuple(sorted({owners.get(contact.geom1, ""), owners.get(contact.geom2, "")}))
+        if names in meet and contact.dist < -OVERLAP:
+            deepest[names] = max(deepest.get(names, 0.0), -float(contact.dist))
+    if deepest:
+        listed = ", ".join(f"{' and '.join(names)} ({1e3 * depth:.3g} mm)" for names, depth in deepest.items())
+        text = f"they overlap at the start, where a rigid world would push them apart: {listed}"
+        amount = f"up to {1e3 * max(deepest.values()):.3g} mm"
+        reading.note("left out", f"contact of {len(deepest)} pairs that overlap", text, amount)
+    return {names: law for names, law in meet.items() if names not in deepest}
+
+
+def without_rule(reading: ModelReading, kinds: Mapping[str, Counter[str]], meet: Meetings) -> Meetings:
+    """Drop pairs of surfaces whose shapes cannot touch; ``kinds``: how many shapes of each kind a surface has."""
+    lost: Counter[str] = Counter()
+    kept: Meetings = {}
+    for names, law in meet.items():
+        bare = {tuple(sorted((a, b))) for a in kinds[names[0]] for b in kinds[names[1]] if not contact_points(a, b)}
+        lost.update(" and ".join(pair) for pair in bare)
+        if not bare:
+            kept[names] = law
+    if lost:
+        which = ", ".join(f"{pair} ({count})" for pair, count in lost.most_common())
+        text = f"there is no rule for contact between such shapes: {which}"
+        reading.note("left out", f"contact of {len(meet) - len(kept)} pairs of surfaces", text)
+    return kept
+
+
+def kinds_of(table: Mapping[str, Any]) -> Counter[str]:
+    """Return how many shapes of each kind a surface has."""
+    if "shape" not in table:
+        return Counter(["plane"])
+    parts = table["shape"].get("parts", [table["shape"]])
+    return Counter(next(key for key in part if key not in ("centre", "orientation")) for part in parts)
+
+
+def contact_points(one: str, other: str) -> int:
+    """Return the number of contact points of two kinds of surfaces; 0: no rule covers them."""
+    return POINTS.get(one, {}).get(other, 0) or POINTS.get(other, {}).get(one, 0)
+
+
+def few_enough(
+    reading: ModelReading, owners: dict[int, str], surfaces: Tables, kinds: Mapping[str, Counter[str]], meet: Meetings
+) -> Meetings:
+    """Limit the points of contact: drop contact within robots first, then between bodies at all."""
+    counts = {
+        names: sum(m * n * contact_points(a, b) for a, m in kinds[names[0]].items() for b, n in kinds[names[1]].items())
+        for names in meet
+    }
+    total, model = sum(counts.values()), reading.model
+    trees = {name: int(model.body_rootid[model.geom_bodyid[geom]]) for geom, name in owners.items()}
+    inside = {names for names in meet if set(names) <= surfaces.keys() and trees[names[0]] == trees[names[1]]}
+    bodies = {names for names in meet if set(names) <= surfaces.keys()}
+    for lost, what in ((inside, "of one robot"), (bodies, "")):
+        if total <= MOST_POINTS:
+            break
+        dropped = meet.keys() & lost
+        text = f"there would be {total} points of contact, and a world may have {MOST_POINTS}"
+        reading.note("left out", f"contact of {len(dropped)} pairs of bodies {what}".rstrip(), text)
+        meet = {names: law for names, law in meet.items() if names not in dropped}
+        total = sum(counts[names] for names in meet)
+    among = sum(counts[names] for names in meet if names in bodies)
+    if among:
+        text = f"{among} of them are between bodies; self_collision = false leaves these out, and compiles faster"
+        reading.note("taken", f"{total} points of contact", text)
+    return meet
+
+
+def write_contacts(
+    reading: ModelReading, classes: Mapping[str, Hashable], surfaces: Tables, still: Tables, meet: Meetings
+) -> list[dict[str, Any]]:
+    """Return the [[pair]] tables; surfaces get their friction and groups.
+
+    Args:
+        reading: gives groups their names, and knows which bodies joints hold together.
+        classes: of each surface what its contacts follow from.
+        surfaces: tables of bodies with shapes.
+        still: tables of what stands still.
+        meet: who may touch whom.
+    """
+    own = {name: own_law(name, still, meet) for name in surfaces}
+    for name, law in own.items():
+        surfaces[name].update(
+            {key: numbers(value) for key, value in zip(KEYS, law, strict=True) if value or key == KEYS[0]}
+        )
+    members: dict[Hashable, list[str]] = {}
+    for name in (*surfaces, *still):
+        members.setdefault((classes.get(name), own.get(name)), []).append(name)
+    jointed = {tuple(sorted(pair)) for pair in reading.jointed}
+    pairs: list[dict[str, Any]] = []
+    groups: dict[str, str] = {}
+    for one, other in combinations_with_replacement(list(members.values()), 2):
+        both = combinations(one, 2) if one is other else product(one, other)
+        names = [tuple(sorted(pair)) for pair in both if set(pair) & surfaces.keys()]
+        wanted = {(a, b): statement((a, b), own, meet) for a, b in names if (a, b) not in jointed or (a, b) in meet}
+        pairs += class_tables(reading, wanted, one, other, groups)
+    for name, group in groups.items():
+        (surfaces.get(name) or still[name])["group"] = group
+    return pairs
+
+
+def own_law(name: str, still: Tables, meet: Meetings) -> Law:
+    """Return the friction of a body: with static surfaces, or with other bodies if it meets no static one."""
+    found = {other: law for pair, law in meet.items() if name in pair for other in pair if other != name}
+    laws = Counter(law for other, law in found.items() if other in still) or Counter(found.values())
+    return laws.most_common(1)[0][0] if laws else (1.0, 0.0, 0.0)
+
+
+def statement(names: tuple[str, str], own: Mapping[str, Law], meet: Meetings) -> Statement:
+    """Return the keys of a [[pair]] table that two surfaces need besides their own friction."""
+    law = meet.get(names)
+    if law is None:
+        return APART
+    stated = list(zip(KEYS, zip(*(own[name] for name in names if name in own), strict=True), strict=True))
+    follows = [each[0] if len(each) == 1 else COMBINE[key](list(each)) for key, each in stated]
+    off = [key for key, x, y in zip(KEYS, law, follows, strict=True) if abs(x - y) > 1e-12]
+    return tuple((key, numbers(value)) for key, value in zip(KEYS, law, strict=True) if key in off)
+
+
+def class_tables(
+    reading: ModelReading,
+    wanted: Mapping[tuple[str, str], Statement],
+    one: Sequence[str],
+    other: Sequence[str],
+    groups: dict[str, str],
+) -> list[dict[str, Any]]:
+    """Return one table for two classes if most of their pairs need the same, and one for each pair that differs."""
+    if not wanted:
+        return []
+    most, count = Counter(wanted.values()).most_common(1)[0]
+    together = bool(most) and count > 1
+    usual = most if together else ()
+    tables = []
+    if together:
+        ends = [class_name(reading, members, groups) for members in (one, other)]
+        tables.append({"between": ends, **dict(most)})
+    for names, needed in wanted.items():
+        if needed != usual:
+            tables.append({"between": list(names), **dict(needed)})
+    return tables
+
+
+def class_name(reading: ModelReading, members: Sequence[str], groups: dict[str, str]) -> str:
+    """Return the name of a class: of its only member, or of a group that is named after its first."""
+    if len(members) == 1:
+        return members[0]
+    if members[0] not in groups:
+        name = reading.names.give("group", f"{members[0]}_group")
+        groups.update(dict.fromkeys(members, name))
+    return groups[members[0]]
+
+
 def soft(reading: ModelReading, owners: dict[int, str]) -> None:
-    """MuJoCo's contacts and limits are springs and dampers."""
+    """Note that MuJoCo's contacts and limits are springs and dampers."""
     model = reading.model
     if owners:
         text = "contacts are rigid here, without solref, solimp, margin and gap"

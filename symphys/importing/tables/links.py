@@ -7,22 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from symphys.importing.source import Inertial
+from symphys.importing.records import Inertial
 from symphys.importing.tables.reading import FREE, ModelReading, WeldedLink, is_upright, numbers, quaternion
 from symphys.types import Array
 
 LIGHT, THICK = 1e-6, 0.1
-"""Of a floating body without mass: its share of the model's mass, and its radius of gyration [m]."""
-LEAST = 1e-6
-"""Least share of the largest moment of inertia that another may have."""
-SLACK = 1e-9
-"""Of the inequality of moments of inertia, as a share of the largest."""
+"""For a floating body without mass: its share of the model's mass, and its radius of gyration [m]."""
+MIN_MOMENT = 1e-6
+"""Least moment of inertia, as a share of the largest."""
+INERTIA_TOLERANCE = 1e-9
+"""Tolerance of the inequality of moments of inertia, as a share of the largest."""
 SMALL = 1e-12
-"""Share of the largest moment below which a product of inertia is rounding."""
+"""Product of inertia that counts as rounding, as a share of the largest moment."""
 
 
 def read_links(reading: ModelReading, inertials: Mapping[str, Inertial]) -> None:
-    """Every body that moves, with what is welded to it."""
+    """Read every body that moves, with the bodies that are welded to it."""
     model = reading.model
     members: dict[int, list[int]] = {}
     for body in range(1, model.nbody):
@@ -43,7 +43,7 @@ def read_links(reading: ModelReading, inertials: Mapping[str, Inertial]) -> None
 
 
 def weld_empty_ends(reading: ModelReading, members: dict[int, list[int]], inertials: Mapping[str, Inertial]) -> None:
-    """Bodies without mass at the end of a branch have nothing to move: they are welded to what is before them."""
+    """Weld massless bodies at the ends of branches, which have nothing to move, to their parents."""
     model, welded = reading.model, []
     parents = {top: int(model.body_weldid[model.body_parentid[top]]) for top in members if top}
     for top in sorted(parents, reverse=True):
@@ -59,7 +59,7 @@ def weld_empty_ends(reading: ModelReading, members: dict[int, list[int]], inerti
 
 
 def merged(reading: ModelReading, top: int, bodies: list[int], inertials: Mapping[str, Inertial]) -> WeldedLink:
-    """One body of several."""
+    """Merge welded bodies into one."""
     parts = [part(reading, body, inertials) for body in bodies]
     mass = sum(each[0] for each in parts)
     axes = np.array(reading.data.xmat[top]).reshape(3, 3)
@@ -83,16 +83,16 @@ def merged(reading: ModelReading, top: int, bodies: list[int], inertials: Mappin
 
 
 def possible(reading: ModelReading, name: str, mass: float, tensor: Array) -> Array:
-    """An inertia (3, 3), mended where no rigid body has it, which is noted.
+    """Return an inertia (3, 3) that a rigid body can have; a repair is noted.
 
     Moments that are too small grow to a share of the largest, and one above the sum of the others falls to that.
     """
     tensor = (tensor + tensor.T) / 2
     moments, axes = np.linalg.eigh(tensor)
-    mended = np.maximum(moments, LEAST * max(float(moments[2]), LEAST * mass))
+    mended = np.maximum(moments, MIN_MOMENT * max(float(moments[2]), MIN_MOMENT * mass))
     mended[2] = min(mended[2], mended[0] + mended[1])
     off = float(np.abs(mended - moments).max())
-    if off <= SLACK * float(moments[2]):
+    if off <= INERTIA_TOLERANCE * float(moments[2]):
         return np.asarray(tensor)
     text = "no rigid body has the moments of the model; these are the nearest that are possible"
     reading.note("approximated", f"inertia of {name}", text, f"{off:.3g} kg m^2")
@@ -100,7 +100,7 @@ def possible(reading: ModelReading, name: str, mass: float, tensor: Array) -> Ar
 
 
 def part(reading: ModelReading, body: int, inertials: Mapping[str, Inertial]) -> tuple[float, Array, Array]:
-    """Mass, centre of mass and inertia about it of one body of the model, world frame."""
+    """Return mass, centre of mass and inertia about it of one body of the model, world frame."""
     own = inertials.get(reading.name("body", body))
     if own is not None:
         axes = np.array(reading.data.xmat[body]).reshape(3, 3)
@@ -112,7 +112,7 @@ def part(reading: ModelReading, body: int, inertials: Mapping[str, Inertial]) ->
 
 
 def body_table(link: WeldedLink, shapes: list[dict[str, Any]]) -> dict[str, Any]:
-    """The [[body]] table of a link."""
+    """Return the [[body]] table of a link."""
     table: dict[str, Any] = {"name": link.name, "mass": numbers(link.mass)}
     if link.mass:
         table["inertia"] = inertia_of(link.inertia)
@@ -127,7 +127,7 @@ def body_table(link: WeldedLink, shapes: list[dict[str, Any]]) -> dict[str, Any]
 
 
 def inertia_of(tensor: Array) -> Any:
-    """Three principal moments where these are along the axes, else the matrix."""
+    """Return three principal moments if they are along the axes, else the matrix."""
     tensor = (tensor + tensor.T) / 2
     moments = np.diag(tensor)
     if np.abs(tensor - np.diag(moments)).max() <= SMALL * moments.max():
@@ -136,5 +136,5 @@ def inertia_of(tensor: Array) -> Any:
 
 
 def frame_table(name: str, place: Array) -> dict[str, Any]:
-    """The [[body]] table of a frame between two joints."""
+    """Return the [[body]] table of a frame between two joints."""
     return {"name": name, "mass": 0, "position": numbers(place)}

@@ -6,20 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from symphys.importing.problem import ImportProblem
+from symphys.importing.records import ImportProblem
 from symphys.importing.tables.reading import BALL, FREE, HINGE, SLIDE, ModelReading, numbers
 from symphys.suggest import hint
 
 PLANE = 0
 """MuJoCo's type of a geom that is a plane."""
 LIFTS = 3
-"""How often a robot is lifted out of the ground; the first is enough unless contacts were too many to list."""
+"""Times that a robot is lifted out of the ground; once is enough unless MuJoCo could not list all contacts."""
 SUNK = 1e-4
-"""[m]: overlap with the ground that stays."""
+"""[m] Overlap with the ground that stays."""
 
 
 def keyframe(library: Any, model: Any, name: str | None, file: str) -> int | None:
-    """The index of a keyframe by its name, or by its number; ImportProblem if there is none."""
+    """Return the index of a keyframe by its name or number; ImportProblem if there is none."""
     if name is None:
         return None
     names = [library.mj_id2name(model, library.mjtObj.mjOBJ_KEY, k) or str(k) for k in range(model.nkey)]
@@ -29,7 +29,7 @@ def keyframe(library: Any, model: Any, name: str | None, file: str) -> int | Non
 
 
 def reference_pose(library: Any, model: Any, key: int | None) -> Any:
-    """MjData where coordinates of hinges and sliders are 0 here; what floats, and balls, as the keyframe has it."""
+    """Return MjData with hinges and sliders at 0, and floating bodies and balls as in the keyframe."""
     data = library.MjData(model)
     data.qpos[:] = model.qpos0
     if key is not None:
@@ -42,13 +42,13 @@ def reference_pose(library: Any, model: Any, key: int | None) -> Any:
 
 
 def place(library: Any, model: Any, data: Any) -> None:
-    """Puts bodies where the coordinates say."""
+    """Move bodies to where the coordinates say."""
     library.mj_kinematics(model, data)
     library.mj_comPos(model, data)
 
 
 def range_of(reading: ModelReading, joint: int) -> tuple[float, float]:
-    """The limits of a hinge or slider, measured from the reference pose; infinite where there are none."""
+    """Return the limits of a hinge or slider, relative to the reference pose; infinite where there are none."""
     model = reading.model
     if not model.jnt_limited[joint] or reading.off("LIMIT"):
         return -np.inf, np.inf
@@ -57,7 +57,7 @@ def range_of(reading: ModelReading, joint: int) -> tuple[float, float]:
 
 
 def starts(reading: ModelReading) -> dict[int, float]:
-    """Where hinges and sliders begin, from the reference pose: at the keyframe's coordinates, within their ranges."""
+    """Return the start of hinges and sliders relative to the reference pose: the keyframe's, within their limits."""
     model, found = reading.model, dict[int, float]()
     for joint in range(model.njnt):
         if model.jnt_type[joint] not in (HINGE, SLIDE):
@@ -68,7 +68,7 @@ def starts(reading: ModelReading) -> dict[int, float]:
 
 
 def at_start(reading: ModelReading) -> Any:
-    """MjData at the start, with the contacts that there are."""
+    """Return MjData at the start, with its contacts."""
     library, model = reading.library, reading.model
     data = library.MjData(model)
     data.qpos[:] = reading.data.qpos
@@ -80,7 +80,7 @@ def at_start(reading: ModelReading) -> Any:
 
 
 def lift(reading: ModelReading) -> None:
-    """Robots that float and begin below the ground are lifted onto it."""
+    """Lift floating robots that begin below the ground onto it."""
     model, lifted = reading.model, dict[int, float]()
     for _ in range(LIFTS):
         data, depths = at_start(reading), dict[int, float]()
@@ -101,7 +101,7 @@ def lift(reading: ModelReading) -> None:
 
 
 def sunk(reading: ModelReading, data: Any, contact: Any) -> int | None:
-    """The free joint that holds what has sunk into a level plane; None for other contacts."""
+    """Return the free joint of a robot that has sunk into a level plane; None for other contacts."""
     model = reading.model
     for one, other in ((contact.geom1, contact.geom2), (contact.geom2, contact.geom1)):
         level = min(one, other) >= 0 and model.geom_type[one] == PLANE and data.geom_xmat[one][8] > 1 - 1e-9
@@ -113,7 +113,7 @@ def sunk(reading: ModelReading, data: Any, contact: Any) -> int | None:
 
 
 def begin(reading: ModelReading, joints: list[dict[str, Any]]) -> None:
-    """Puts the start into the tables of joints, and says what of keyframes is not there."""
+    """Put the start into the tables of joints, and note keyframes and velocities that are lost."""
     model, by_name = reading.model, {table["name"]: table for table in joints}
     moved, furthest = [], 0.0
     for joint, value in starts(reading).items():
@@ -140,7 +140,7 @@ def begin(reading: ModelReading, joints: list[dict[str, Any]]) -> None:
 
 
 def wanted(reading: ModelReading, joint: int) -> float:
-    """The coordinate at which the model itself begins, measured from the reference pose."""
+    """Return the coordinate at which the model itself begins, relative to the reference pose."""
     if reading.key is None:
         return 0.0
     at = int(reading.model.jnt_qposadr[joint])

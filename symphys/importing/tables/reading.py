@@ -1,28 +1,66 @@
-"""A compiled model at its reference pose: what other modules read off MuJoCo's arrays.
+"""A compiled model at its reference pose: what other modules read off MuJoCo's arrays, and names for its parts.
 
 World frame and SI units; quaternions are w x y z. Coordinates of joints are 0 at the reference pose (MuJoCo's qpos0).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import keyword
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from symphys.importing.findings import Finding, Kind
-from symphys.importing.options import ImportOptions
-from symphys.importing.source import JointMotor
-from symphys.importing.tables.names import Names
+from symphys.importing.records import Finding, ImportOptions, JointMotor, Kind
 from symphys.types import Array
 
+LONGEST = 64
+WORDS = (
+    "sin cos tan asin acos atan atan2 sinh cosh tanh sqrt exp log abs sign min max clip hypot norm sumsqr sum mean dot "
+    "cross rotate world ground gravity time pi alive"
+)
+TAKEN = (*keyword.kwlist, *WORDS.split())
+"""Words that mean something in formulas or tables."""
 FREE, BALL, SLIDE, HINGE = range(4)
 """MuJoCo's types of joints."""
 DIGITS = 15
 """Significant digits of numbers in tables."""
 ROUNDING = 1e-14
-"""[m], [rad]: what is smaller is 0."""
+"""[m], [rad] Smaller numbers count as 0."""
+
+
+class Names:
+    """Names for all parts, each used once.
+
+    Bodies, joints, surfaces, sites and sensors share one set of names in a problem file, but not in a model. A name
+    that is taken gets the kind of the part behind it: ``knee_joint``.
+    """
+
+    def __init__(self) -> None:
+        """Start with the words that have a meaning taken."""
+        self._taken = {word.casefold() for word in TAKEN}
+        self.renamed: list[tuple[str, str]] = []
+
+    def give(self, kind: str, wanted: str, fallback: str = "") -> str:
+        """Return a new name like the wanted one; ``fallback`` for a part without a name."""
+        base = re.sub(r"\W+", "_", wanted, flags=re.ASCII).strip("_")[: LONGEST - 8] or fallback or kind
+        base = base if base[0].isascii() and base[0].isalpha() else f"{kind}_{base}"[: LONGEST - 8]
+        found = next(name for name in self._offers(kind, base) if name.casefold() not in self._taken)
+        self._taken.add(found.casefold())
+        if wanted and found != wanted and kind != "group":
+            self.renamed.append((f"{kind} {wanted}", found))
+        return found
+
+    def _offers(self, kind: str, base: str) -> Iterable[str]:
+        yield base
+        last = base.rpartition("_")[2]
+        yield from (f"{base}_{kind}",) if last != kind else ()
+        number = 2
+        while True:
+            yield f"{base}_{number}"
+            number += 1
 
 
 @dataclass(frozen=True)
@@ -48,11 +86,11 @@ class WeldedLink:
     inertia: Array
 
     def to_body(self, point: Array) -> Array:
-        """A point of the world in the body's frame, from the centre of mass."""
+        """Return a point of the world in the body's frame, from the centre of mass."""
         return np.asarray(self.axes.T @ (point - self.centre))
 
     def turned(self, axes: Array) -> list[float]:
-        """Axes (3, 3) of the world as a quaternion in the body's frame."""
+        """Return axes (3, 3) of the world as a quaternion in the body's frame."""
         return quaternion(self.axes.T @ axes)
 
 
@@ -70,13 +108,11 @@ class ModelReading:
         joint_names: of joints, by index; of a free joint that of its body.
         rigid: number of equality constraints that were taken over.
         static_names: of what stands still, by the index of its geom.
-        site_names: of sites, by index.
         key: the index of the keyframe that the robot begins at; None: the reference pose.
         motors: the efforts and velocities that a URDF gives its joints, by their names there.
         seen: the names of bodies that have shapes only for the eye.
         driven: the names of joints with motors.
         jointed: two bodies that a joint holds together, in alphabetical order.
-        apart: two bodies that several joints hold together, which do not touch each other.
     """
 
     library: Any
@@ -91,35 +127,21 @@ class ModelReading:
     joint_names: dict[int, str] = field(default_factory=dict)
     rigid: int = 0
     static_names: dict[int, str] = field(default_factory=dict)
-    site_names: dict[int, str] = field(default_factory=dict)
     seen: set[str] = field(default_factory=set)
     driven: set[str] = field(default_factory=set)
     jointed: set[tuple[str, ...]] = field(default_factory=set)
-    apart: list[tuple[str, str]] = field(default_factory=list)
 
     def note(self, kind: Kind, what: str, how: str, amount: str = "") -> None:
-        """Keep what became of a part."""
+        """Keep a finding on a part."""
         self.findings.append(Finding(kind, what, how, amount))
 
     def name(self, kind: str, index: int) -> str:
-        """What the model calls a part, ``body`` 3 for instance; empty if it has no name."""
-        types = self.library.mjtObj
-        kinds: Mapping[str, Any] = {
-            "body": types.mjOBJ_BODY,
-            "joint": types.mjOBJ_JOINT,
-            "geom": types.mjOBJ_GEOM,
-            "site": types.mjOBJ_SITE,
-            "actuator": types.mjOBJ_ACTUATOR,
-            "sensor": types.mjOBJ_SENSOR,
-            "equality": types.mjOBJ_EQUALITY,
-            "tendon": types.mjOBJ_TENDON,
-            "key": types.mjOBJ_KEY,
-            "mesh": types.mjOBJ_MESH,
-        }
-        return self.library.mj_id2name(self.model, kinds[kind], index) or ""
+        """Return the model's name of a part, such as ``body`` 3; empty if it has none."""
+        kind_of_object = getattr(self.library.mjtObj, f"mjOBJ_{kind.upper()}")
+        return self.library.mj_id2name(self.model, kind_of_object, index) or ""
 
     def called(self, kind: str, index: int) -> str:
-        """``joint knee``, or ``joint 3`` where it has no name."""
+        """Return ``joint knee``, or ``joint 3`` if the part has no name."""
         return f"{kind} {self.name(kind, index) or index}"
 
     def off(self, flag: str) -> bool:
@@ -134,17 +156,17 @@ class ModelReading:
         return bool(self.model.eq_active0[equality]) and not self.off("EQUALITY")
 
     def joints_of(self, body: int) -> range:
-        """The indices of the joints of a body."""
+        """Return the indices of the joints of a body."""
         first = int(self.model.body_jntadr[body])
         return range(first, first + int(self.model.body_jntnum[body])) if first >= 0 else range(0)
 
     def reference(self, joint: int) -> float:
-        """MuJoCo's coordinate of a hinge or slide at the reference pose."""
+        """Return MuJoCo's coordinate of a hinge or slide at the reference pose."""
         return float(self.model.qpos0[self.model.jnt_qposadr[joint]])
 
 
 def numbers(values: Any, scale: float = 1.0) -> Any:
-    """Arrays as lists, and numbers with ``DIGITS`` digits; what is rounding against ``scale`` is 0."""
+    """Convert arrays to lists, and numbers to ``DIGITS`` digits; rounding errors against ``scale`` become 0."""
     if isinstance(values, np.ndarray | list | tuple):
         return [numbers(value, scale) for value in values]
     value = float(f"{float(values):.{DIGITS}g}")
@@ -152,24 +174,24 @@ def numbers(values: Any, scale: float = 1.0) -> Any:
 
 
 def quaternion(axes: Array) -> list[float]:
-    """A rotation matrix as a unit quaternion w x y z, w >= 0."""
-    trace = np.trace(axes)
-    four = np.array([1 + trace, *(1 + 2 * axes[k, k] - trace for k in range(3))])
-    largest = int(np.argmax(four))
-    skew = np.array([axes[2, 1] - axes[1, 2], axes[0, 2] - axes[2, 0], axes[1, 0] - axes[0, 1]])
+    """Return a rotation matrix as a unit quaternion w x y z, w >= 0."""
+    import mujoco
+
     q = np.empty(4)
-    if largest == 0:
-        q[0], q[1:] = four[0], skew
-    else:
-        k = largest - 1
-        q[0], q[1:] = skew[k], axes[k] + axes[:, k]
-        q[largest] = four[largest]
-    q /= np.linalg.norm(q)
-    q = q if q[0] >= 0 else -q
-    found: list[float] = numbers(q)
+    mujoco.mju_mat2Quat(q, np.ascontiguousarray(axes, float).ravel())
+    found: list[float] = numbers(q if q[0] >= 0 else -q)
     return found
 
 
+def matrix(quaternion: Any) -> Array:
+    """Return the rotation matrix (3, 3) of a unit quaternion w x y z."""
+    import mujoco
+
+    found = np.empty(9)
+    mujoco.mju_quat2Mat(found, np.asarray(quaternion, float))
+    return found.reshape(3, 3)
+
+
 def is_upright(orientation: list[float]) -> bool:
-    """Whether a quaternion turns by rounding only."""
+    """Whether a quaternion turns by no more than rounding."""
     return bool(np.abs(np.array(orientation[1:])).max() < 1e-14)

@@ -1,27 +1,63 @@
-"""Sensors of a model whose reading a formula can say, as [[sensor]] tables."""
+"""Sites of a model as [[site]] tables, and sensors whose reading a formula can express as [[sensor]] tables."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from symphys.importing.tables.reading import FREE, HINGE, SLIDE, ModelReading, WeldedLink, is_upright, numbers
+from symphys.importing.tables.reading import (
+    FREE,
+    HINGE,
+    SLIDE,
+    ModelReading,
+    WeldedLink,
+    is_upright,
+    numbers,
+    quaternion,
+)
 from symphys.types import Array
 
-MEET = 1e-6
-"""[m]: an accelerometer that is farther from the centre of mass is approximated."""
+MIN_ARM = 1e-6
+"""[m] An accelerometer that is farther from the centre of mass is approximated."""
 MOST_BODIES = 100
-"""Of a centre of mass that a formula says."""
+"""Bodies in the formula of a centre of mass, at most."""
 JOINTS = ("JOINTPOS", "JOINTVEL", "JOINTACTFRC")
 AXES = {"FRAMEXAXIS": "[1, 0, 0]", "FRAMEYAXIS": "[0, 1, 0]", "FRAMEZAXIS": "[0, 0, 1]"}
 
 
+def read_sites(reading: ModelReading) -> list[dict[str, Any]]:
+    """Return a table for every site, and one for every named body that is part of another, at its frame.
+
+    A site on a body that the world holds belongs to the world.
+    """
+    model, data, tables = reading.model, reading.data, list[dict[str, Any]]()
+    for site in range(model.nsite):
+        name = reading.names.give("site", reading.name("site", site), "site")
+        tables.append(
+            site_table(reading, name, int(model.site_bodyid[site]), data.site_xpos[site], data.site_xmat[site])
+        )
+    for body in range(1, model.nbody):
+        link, given = reading.links.get(body), reading.name("body", body)
+        if given and (link is None or link.top != body):
+            name = reading.names.give("site", given, "site")
+            tables.append(site_table(reading, name, body, data.xpos[body], data.xmat[body]))
+    return tables
+
+
+def site_table(reading: ModelReading, name: str, body: int, place: Any, matrix: Any) -> dict[str, Any]:
+    """Return the [[site]] table of a frame, world axes, that is fixed to a body of the model."""
+    link, place, axes = reading.links.get(body), np.array(place), np.array(matrix).reshape(3, 3)
+    orientation = quaternion(axes) if link is None else link.turned(axes)
+    table = {"name": name, "body": "world" if link is None else link.name}
+    table["position"] = numbers(place if link is None else link.to_body(place))
+    return table if is_upright(orientation) else {**table, "orientation": orientation}
+
+
 def read_sensors(reading: ModelReading) -> list[dict[str, Any]]:
-    """Sensors whose reading a formula can say; the others are noted, and delays and noise are not there."""
+    """Return the tables of sensors whose reading a formula can express; others are noted."""
     tables, lost = list[dict[str, Any]](), Counter[str]()
     for sensor in range(reading.model.nsensor):
         kind = reading.library.mjtSensor(int(reading.model.sensor_type[sensor])).name.removeprefix("mjSENS_")
@@ -38,7 +74,7 @@ def read_sensors(reading: ModelReading) -> list[dict[str, Any]]:
 
 
 def formula(reading: ModelReading, sensor: int, kind: str) -> str | None:
-    """What a sensor reads; None where there is no word for it."""
+    """Return the formula of a sensor; None if there is none."""
     model, index = reading.model, int(reading.model.sensor_objid[sensor])
     if kind == "CLOCK":
         return "time"
@@ -50,8 +86,9 @@ def formula(reading: ModelReading, sensor: int, kind: str) -> str | None:
         return of_subtree(reading, index, "position" if kind == "SUBTREECOM" else "velocity")
     if kind == "TOUCH":
         return of_touch(reading, index)
-    if kind in INERTIAL:
-        return INERTIAL[kind](reading, frame_of(reading, int(reading.library.mjtObj.mjOBJ_SITE), index), index)
+    if kind in ("GYRO", "ACCELEROMETER", "VELOCIMETER", "FORCE", "TORQUE"):
+        frame = frame_of(reading, int(reading.library.mjtObj.mjOBJ_SITE), index)
+        return None if frame is None else of_inertial_unit(reading, frame, index, kind)
     if kind.startswith("FRAME") and int(model.sensor_refid[sensor]) < 0:
         frame = frame_of(reading, int(model.sensor_objtype[sensor]), index)
         return None if frame is None else frame.reads(kind)
@@ -59,7 +96,7 @@ def formula(reading: ModelReading, sensor: int, kind: str) -> str | None:
 
 
 def of_joint(reading: ModelReading, joint: int, kind: str) -> str | None:
-    """Coordinate, rate or force of a hinge or slider."""
+    """Return coordinate, rate or force of a hinge or slider."""
     model, name = reading.model, reading.joint_names.get(joint)
     if name is None or model.jnt_type[joint] not in (HINGE, SLIDE):
         return None
@@ -73,7 +110,7 @@ def of_joint(reading: ModelReading, joint: int, kind: str) -> str | None:
 
 
 def of_actuator(reading: ModelReading, actuator: int, kind: str) -> str | None:
-    """Length, velocity or force of an actuator, on its side of the gear."""
+    """Return length, velocity or force of an actuator, on its side of the gear."""
     model, types = reading.model, reading.library.mjtTrn
     joint, gear = int(model.actuator_trnid[actuator][0]), numbers(float(model.actuator_gear[actuator][0]))
     if int(model.actuator_trntype[actuator]) not in (int(types.mjTRN_JOINT), int(types.mjTRN_JOINTINPARENT)):
@@ -86,7 +123,7 @@ def of_actuator(reading: ModelReading, actuator: int, kind: str) -> str | None:
 
 
 def of_subtree(reading: ModelReading, body: int, field: str) -> str | None:
-    """Centre of mass of a body and all that hangs on it, or its velocity."""
+    """Return the centre of mass of a body and all its descendants, or its velocity."""
     model = reading.model
     inside = {body}
     for other in range(body + 1, model.nbody):
@@ -102,7 +139,7 @@ def of_subtree(reading: ModelReading, body: int, field: str) -> str | None:
 
 
 def of_touch(reading: ModelReading, site: int) -> str | None:
-    """The force on the body of a site."""
+    """Return the force on the body of a site."""
     link = reading.links.get(int(reading.model.site_bodyid[site]))
     if link is None or not link.mass:
         return None
@@ -127,12 +164,12 @@ class SensorFrame:
 
     @property
     def arm(self) -> str:
-        """From the centre of mass to the frame, world axes; empty where both are one."""
+        """The vector from the centre of mass to the frame, world axes; empty if it is 0."""
         offset = numbers(self.offset)
         return f"rotate({self.link.name}.orientation, {offset})" if any(offset) else ""
 
     def reads(self, kind: str) -> str | None:
-        """What a frame sensor reads, world axes."""
+        """Return the formula of a frame sensor, world axes; None if there is none."""
         name = self.link.name
         if kind == "FRAMEPOS":
             return f"{name}.position + {self.arm}" if self.arm else f"{name}.position"
@@ -147,13 +184,13 @@ class SensorFrame:
         return None
 
     def own_axes(self, vector: str) -> str:
-        """A vector in the body's axes, in those of the frame."""
+        """Return a vector in the body's axes, in those of the frame."""
         w, x, y, z = self.orientation
         return vector if is_upright(self.orientation) else f"rotate({[w, -x, -y, -z]}, {vector})"
 
 
 def frame_of(reading: ModelReading, kind: int, index: int) -> SensorFrame | None:
-    """The frame of a site, geom or body (of a body its inertia's); None for one that stands still."""
+    """Return the frame of a site, geom or body (of a body its inertia's); None if it stands still."""
     model, data, objects = reading.model, reading.data, reading.library.mjtObj
     body, place, axes = index, data.xpos, data.xmat
     if kind == int(objects.mjOBJ_SITE):
@@ -171,59 +208,36 @@ def frame_of(reading: ModelReading, kind: int, index: int) -> SensorFrame | None
     return SensorFrame(link, link.to_body(np.array(place[index])), turned)
 
 
-def gyro(reading: ModelReading, frame: SensorFrame | None, site: int) -> str | None:
-    """The angular velocity in the axes of a site."""
-    return None if frame is None else frame.own_axes(f"{frame.link.name}.gyro")
-
-
-def accelerometer(reading: ModelReading, frame: SensorFrame | None, site: int) -> str | None:
-    """The acceleration of the centre of mass, in the axes of a site."""
-    if frame is None:
-        return None
+def of_inertial_unit(reading: ModelReading, frame: SensorFrame, site: int, kind: str) -> str | None:
+    """Return the reading of a gyro, accelerometer, velocimeter, force or torque sensor, in the axes of a site."""
+    name = frame.link.name
+    if kind == "GYRO":
+        return frame.own_axes(f"{name}.gyro")
+    if kind == "VELOCIMETER":
+        q = f"{name}.orientation"
+        return frame.own_axes(f"rotate([{q}[0], -{q}[1], -{q}[2], -{q}[3]], {frame.reads('FRAMELINVEL')})")
+    if kind in ("FORCE", "TORQUE"):
+        return of_joint_before(reading, frame, site, kind)
     arm = float(np.linalg.norm(frame.offset))
-    if arm > MEET:
+    if arm > MIN_ARM:
         text = "it is at the centre of mass of its body here"
         reading.note("approximated", f"accelerometer at {reading.called('site', site)}", text, f"{1000 * arm:.3g} mm")
-    return frame.own_axes(f"{frame.link.name}.accelerometer")
+    return frame.own_axes(f"{name}.accelerometer")
 
 
-def velocimeter(reading: ModelReading, frame: SensorFrame | None, site: int) -> str | None:
-    """The velocity of a site in its own axes."""
-    if frame is None:
-        return None
-    name, world = frame.link.name, frame.reads("FRAMELINVEL")
-    q = f"{name}.orientation"
-    return frame.own_axes(f"rotate([{q}[0], -{q}[1], -{q}[2], -{q}[3]], {world})")
+def of_joint_before(reading: ModelReading, frame: SensorFrame, site: int, kind: str) -> str | None:
+    """Return the force of the parent on a site's body, or its torque about the site, in the axes of the site.
 
-
-def force(reading: ModelReading, frame: SensorFrame | None, site: int) -> str | None:
-    """What the parent of a site's body exerts on it, in the axes of the site."""
-    joint = joint_before(reading, site)
-    return None if frame is None or joint is None else frame.own_axes(f"{reading.joint_names[joint]}.reaction_force")
-
-
-def torque(reading: ModelReading, frame: SensorFrame | None, site: int) -> str | None:
-    """The torque about a site that goes with that force, in the axes of the site."""
-    joint = joint_before(reading, site)
-    if frame is None or joint is None:
-        return None
-    name, arm = reading.joint_names[joint], frame.offset - frame.link.to_body(np.array(reading.data.xanchor[joint]))
-    moment = f" - cross({numbers(arm)}, {name}.reaction_force)" if any(numbers(arm)) else ""
-    return frame.own_axes(f"{name}.reaction_torque{moment}")
-
-
-def joint_before(reading: ModelReading, site: int) -> int | None:
-    """The joint that carries the body of a site; None where it is welded to its parent, or floats."""
+    None where the body is welded to its parent, or floats.
+    """
     body = int(reading.model.site_bodyid[site])
     joints = reading.joints_of(body)
     held = body in reading.links and reading.links[body].top == body and len(joints)
-    return joints[-1] if held and reading.model.jnt_type[joints[-1]] != FREE else None
-
-
-INERTIAL: dict[str, Callable[[ModelReading, SensorFrame | None, int], str | None]] = {
-    "GYRO": gyro,
-    "ACCELEROMETER": accelerometer,
-    "VELOCIMETER": velocimeter,
-    "FORCE": force,
-    "TORQUE": torque,
-}
+    if not held or reading.model.jnt_type[joints[-1]] == FREE:
+        return None
+    name = reading.joint_names[joints[-1]]
+    if kind == "FORCE":
+        return frame.own_axes(f"{name}.reaction_force")
+    arm = numbers(frame.offset - frame.link.to_body(np.array(reading.data.xanchor[joints[-1]])))
+    moment = f" - cross({arm}, {name}.reaction_force)" if any(arm) else ""
+    return frame.own_axes(f"{name}.reaction_torque{moment}")

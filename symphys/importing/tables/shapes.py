@@ -1,22 +1,36 @@
-"""Geoms of a model that may collide, as shapes of bodies and as what stands still."""
+"""Geoms of a model that may collide: shapes of bodies, hulls or fits of meshes, planes, blocks and terrain."""
 
 from __future__ import annotations
 
+import copy
+from math import sqrt
 from typing import Any
 
 import numpy as np
 
-from symphys.importing.tables.meshes import Meshes
-from symphys.importing.tables.reading import ModelReading, WeldedLink, is_upright, numbers, quaternion
-from symphys.importing.tables.terrain import terrain
+from symphys.errors import SymphysError
+from symphys.importing.tables.reading import ModelReading, WeldedLink, is_upright, matrix, numbers, quaternion
+from symphys.model.heightfield import Heightfield
 from symphys.types import Array
 
+MIN_THICKNESS = 1e-9
+"""Share of a mesh's length below which it has no volume."""
+MOST_POINTS = 64
+"""Vertices of the hull of a mesh, at most."""
+FITTED = ("sphere", "box", "capsule", "spheres", "capsules")
+"""Kinds of shapes that may stand in for a mesh, all of which touch each other."""
+Solid = dict[str, Any]
+"""A shape by its sizes; ``centre`` and ``orientation`` in the frame of the mesh."""
+MOST_HEIGHTS = 1024
+"""Heights of a terrain, at most, since each takes part in every contact with it."""
+MIN_RELIEF = 1e-9
+"""[m] Heights that differ by less make a plane."""
 PLANE, TERRAIN, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)
 """MuJoCo's types of geoms."""
-FLATTEST = 1e-6
-"""Share of its radius that the straight part of a capsule must have."""
+MIN_STRAIGHT = 1e-6
+"""Least straight part of a capsule, as a share of its radius; below it is a sphere."""
 Shapes = dict[int, list[tuple[int, dict[str, Any]]]]
-"""By the top body of each link: (index of the geom, its table)."""
+"""(index of a geom, its table) by the top body of each link."""
 
 
 def collides(reading: ModelReading, geom: int) -> bool:
@@ -27,7 +41,7 @@ def collides(reading: ModelReading, geom: int) -> bool:
 
 
 def read_shapes(reading: ModelReading) -> Shapes:
-    """The shapes of every link: what may touch; of a link without that, what it looks like."""
+    """Return the shapes of every link: those that may touch, or, if there are none, those that are drawn."""
     touching, drawn = Shapes(), Shapes()
     bare = dict[str, list[int]]()
     meshes = Meshes(reading)
@@ -58,11 +72,11 @@ def read_shapes(reading: ModelReading) -> Shapes:
 
 
 def solid(reading: ModelReading, geom: int, meshes: Meshes) -> dict[str, Any] | None:
-    """The sizes of a geom; None for one that has no counterpart."""
+    """Return the shape of a geom by its sizes; None if it has no counterpart."""
     size, kind = numbers(np.array(reading.model.geom_size[geom])), int(reading.model.geom_type[geom])
     if kind == SPHERE:
         return {"sphere": {"radius": size[0]}}
-    if kind == CAPSULE and size[1] <= FLATTEST * size[0]:
+    if kind == CAPSULE and size[1] <= MIN_STRAIGHT * size[0]:
         return {"sphere": {"radius": size[0]}}
     if kind in (CAPSULE, CYLINDER):
         return {"capsule" if kind == CAPSULE else "cylinder": {"radius": size[0], "length": 2 * size[1]}}
@@ -78,12 +92,10 @@ def solid(reading: ModelReading, geom: int, meshes: Meshes) -> dict[str, Any] | 
 
 
 def placed(reading: ModelReading, geom: int, link: WeldedLink, shape: dict[str, Any]) -> dict[str, Any]:
-    """A shape in the frame of its body; ``centre`` and ``orientation``, where it has them, are in that of the geom."""
+    """Return a shape in the frame of its body; its own ``centre`` and ``orientation`` are in the frame of the geom."""
     axes = np.array(reading.data.geom_xmat[geom]).reshape(3, 3)
     centre = link.to_body(np.array(reading.data.geom_xpos[geom]) + axes @ shape.get("centre", np.zeros(3)))
-    own = np.eye(3).ravel()
-    reading.library.mju_quat2Mat(own, np.array(shape.get("orientation", [1.0, 0.0, 0.0, 0.0])))
-    orientation = link.turned(axes @ own.reshape(3, 3))
+    orientation = link.turned(axes @ matrix(shape.get("orientation", [1.0, 0.0, 0.0, 0.0])))
     found = {key: value for key, value in shape.items() if key not in ("centre", "orientation")}
     if np.abs(centre).max() > 1e-15:
         found["centre"] = numbers(centre)
@@ -92,8 +104,118 @@ def placed(reading: ModelReading, geom: int, link: WeldedLink, shape: dict[str, 
     return found
 
 
+class Meshes:
+    """The shapes of meshes, each made once, with findings on their deviations."""
+
+    def __init__(self, reading: ModelReading) -> None:
+        """Start without shapes."""
+        self.reading = reading
+        self.hulls: dict[int, Solid | None] = {}
+        self.fits: dict[int, list[Solid]] = {}
+        self.off: dict[int, float] = {}
+        self.refused: dict[str, list[str]] = {}
+
+    def hull(self, geom: int) -> Solid | None:
+        """Return the hull of a mesh geom, with which MuJoCo collides it too; None if it has no volume."""
+        mesh = int(self.reading.model.geom_dataid[geom])
+        if mesh not in self.hulls:
+            try:
+                points, self.off[mesh] = hull_points(self.vertices(mesh), MOST_POINTS)
+                self.hulls[mesh] = {"convex": {"points": numbers(points)}}
+            except ValueError as error:
+                self.refuse(mesh, str(error))
+                self.hulls[mesh] = None
+        return copy.deepcopy(self.hulls[mesh])
+
+    def fitted(self, geom: int) -> list[Solid]:
+        """Return the shapes that stand in for a mesh geom, and note their deviations; none if it has no surface."""
+        from symphys.importing.fitting import fit  # takes long to import, as few need it
+
+        model = self.reading.model
+        mesh = int(model.geom_dataid[geom])
+        if mesh not in self.fits:
+            first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+            try:
+                found = fit(self.vertices(mesh), np.array(model.mesh_face[first : first + count]), FITTED)
+            except SymphysError as error:
+                self.refuse(mesh, str(error))
+                self.fits[mesh] = []
+            else:
+                amount = f"{found.outside_mm:.2g} mm too small, {found.inside_mm:.2g} mm too large"
+                what = f"mesh {self.called(mesh)}"
+                self.reading.note("approximated", what, f"{len(found.shapes)} {found.kind}", amount)
+                self.fits[mesh] = [
+                    {
+                        shape.kind: {key: numbers(value) for key, value in shape.sizes.items()},
+                        "centre": numbers(shape.centre),
+                        "orientation": numbers(shape.orientation),
+                    }
+                    for shape in found.shapes
+                ]
+        return copy.deepcopy(self.fits[mesh])
+
+    def vertices(self, mesh: int) -> Array:
+        """Return the vertices (n, 3) [m] in the frame of its geoms."""
+        model = self.reading.model
+        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        return np.array(model.mesh_vert[first : first + count], float)
+
+    def called(self, mesh: int) -> str:
+        """Return the name of a mesh, or its number."""
+        return self.reading.name("mesh", mesh) or str(mesh)
+
+    def refuse(self, mesh: int, why: str) -> None:
+        """Keep the reason for which a mesh is left out."""
+        self.refused.setdefault(why, []).append(self.called(mesh))
+
+    def tell(self) -> None:
+        """Note the deviations of all hulls together, and the meshes that are left out."""
+        if self.off:
+            exact = sum(not deviation for deviation in self.off.values())
+            text = f"their convex hulls, with at most {MOST_POINTS} of their vertices each; {exact} have all of them"
+            worst = max(self.off, key=lambda mesh: self.off[mesh])
+            amount = f"up to {self.off[worst]:.2g} mm ({self.called(worst)})"
+            self.reading.note("approximated", f"{len(self.off)} meshes", text, amount if self.off[worst] else "")
+        for why, names in self.refused.items():
+            self.reading.note("left out", f"{len(names)} meshes: {', '.join(names)}", why)
+
+
+def hull_points(vertices: Array, most: int) -> tuple[Array, float]:
+    """Return at most ``most`` vertices of the convex hull, and how far the others lie outside of these [mm].
+
+    The point farthest from all kept ones is added next, so that the others are near to kept ones.
+
+    Args:
+        vertices: (n, 3) [m].
+        most: how many to keep at most.
+
+    Raises:
+        ValueError: for a mesh that is flat, or has no four points.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    spread = np.linalg.svd(vertices - vertices.mean(axis=0), compute_uv=False)
+    if len(vertices) < 4 or spread[2] <= MIN_THICKNESS * spread[0]:
+        raise ValueError("it is flat, so that it has no volume")
+    try:
+        corners = vertices[ConvexHull(vertices).vertices]
+    except QhullError:
+        raise ValueError("it has no convex hull with a volume") from None
+    if len(corners) <= most:
+        return corners, 0.0
+    kept = [int(np.argmax(np.linalg.norm(corners - corners.mean(axis=0), axis=1)))]
+    distances = np.linalg.norm(corners - corners[kept[0]], axis=1)
+    while len(kept) < most:
+        kept.append(int(np.argmax(distances)))
+        distances = np.minimum(distances, np.linalg.norm(corners - corners[kept[-1]], axis=1))
+    thinned = corners[sorted(kept)]
+    outside = ConvexHull(thinned).equations
+    lost = np.max(corners @ outside[:, :3].T + outside[:, 3], axis=1)
+    return thinned, float(1000 * max(lost.max(), 0.0))
+
+
 def read_statics(reading: ModelReading) -> dict[str, Any]:
-    """What stands still and may be touched: [ground], [[plane]], [[block]] and [[terrain]]."""
+    """Return the static surfaces that may be touched: [ground], [[plane]], [[block]] and [[terrain]]."""
     model = reading.model
     found: dict[str, Any] = {"plane": [], "block": [], "terrain": []}
     meshes = Meshes(reading)
@@ -113,7 +235,7 @@ def read_statics(reading: ModelReading) -> dict[str, Any]:
 
 
 def plane(reading: ModelReading, geom: int, place: Array, normal: Array, found: dict[str, Any]) -> None:
-    """A plane; the first that is level is the ground. MuJoCo's have no edges either."""
+    """Read a plane; the first level one is the ground. MuJoCo's planes have no edges either."""
     if "ground" not in found and np.abs(normal - [0, 0, 1]).max() < 1e-12:
         found["ground"] = {"height": numbers(place[2])}
         reading.static_names[geom] = "ground"
@@ -124,7 +246,7 @@ def plane(reading: ModelReading, geom: int, place: Array, normal: Array, found: 
 
 
 def block(reading: ModelReading, geom: int, place: Array, axes: Array, found: dict[str, Any], meshes: Meshes) -> None:
-    """A solid that stands still."""
+    """Read a static solid."""
     shape = solid(reading, geom, meshes)
     if shape is None:
         return
@@ -133,3 +255,53 @@ def block(reading: ModelReading, geom: int, place: Array, axes: Array, found: di
     table = {"name": name, "shape": shape, "position": numbers(place)}
     orientation = quaternion(axes)
     found["block"].append(table if is_upright(orientation) else {**table, "orientation": orientation})
+
+
+def terrain(reading: ModelReading, geom: int, place: Array, axes: Array, found: dict[str, Any]) -> None:
+    """Read a height field that is not turned: heights in rows along y and columns along x, about the geom."""
+    model, field = reading.model, int(reading.model.geom_dataid[geom])
+    what = reading.called("geom", geom)
+    if np.abs(axes - np.eye(3)).max() > 1e-12:
+        reading.note("left out", what, "a height field that is turned has no counterpart")
+        return
+    rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
+    start = int(model.hfield_adr[field])
+    shares = np.array(model.hfield_data[start : start + rows * columns], float).reshape(rows, columns)
+    x, y, top, _ = (float(value) for value in model.hfield_size[field])
+    heights = place[2] + top * shares
+    if float(np.ptp(heights)) <= MIN_RELIEF:
+        name = reading.names.give("plane", reading.name("geom", geom), "plane")
+        reading.static_names[geom] = name
+        reading.note("approximated", what, "all its heights are the same, so it is a plane, which has no edges")
+        found["plane"].append({"name": name, "normal": [0.0, 0.0, 1.0], "point": numbers([*place[:2], heights[0, 0]])})
+        return
+    name = reading.names.give("terrain", reading.name("geom", geom), "terrain")
+    reading.static_names[geom] = name
+    kept = thinned(heights)
+    text = "a smooth surface through its heights, which goes straight on; MuJoCo's is made of triangles, and ends"
+    if kept.shape != heights.shape:
+        text = f"{rows} x {columns} heights are thinned to {kept.shape[0]} x {kept.shape[1]}; {text}"
+    spacing = [2 * x / (kept.shape[1] - 1), 2 * y / (kept.shape[0] - 1)]
+    origin = [place[0] - x, place[1] - y]
+    surface = Heightfield(tuple(map(tuple, kept.tolist())), (spacing[0], spacing[1]), (origin[0], origin[1]))
+    off = f"the surfaces differ by at most {1e3 * surface.off_triangles(heights):.3g} mm"
+    reading.note("approximated", what, text, off)
+    table = {"name": name, "heights": numbers(kept), "spacing": numbers(spacing), "origin": numbers(origin)}
+    found["terrain"].append(table)
+
+
+def thinned(heights: Array) -> Array:
+    """Return at most ``MOST_HEIGHTS`` heights over the same area."""
+    rows, columns = heights.shape
+    if rows * columns <= MOST_HEIGHTS:
+        return heights
+    shrink = sqrt(MOST_HEIGHTS / (rows * columns))
+    few = min(max(2, int(rows * shrink)), MOST_HEIGHTS // 2)
+    return resampled(heights, few, min(columns, MOST_HEIGHTS // few))
+
+
+def resampled(heights: Array, rows: int, columns: int) -> Array:
+    """Return heights (rows, columns), linear between neighbours."""
+    y, x = (np.linspace(0, size - 1, count) for size, count in zip(heights.shape, (rows, columns), strict=True))
+    along = np.array([np.interp(x, np.arange(heights.shape[1]), row) for row in heights])
+    return np.array([np.interp(y, np.arange(heights.shape[0]), column) for column in along.T]).T

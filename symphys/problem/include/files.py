@@ -156,7 +156,7 @@ def find(path: Path, index: int, table: IncludeTable, kept: Mapping[str, str], f
 def in_package(index: int, table: IncludeTable, faults: Faults) -> Path:
     """A file of an installed package."""
     from symphys.importing.packages import model_file
-    from symphys.importing.problem import ImportProblem
+    from symphys.importing.records import ImportProblem
 
     try:
         return model_file(table.file)
@@ -166,8 +166,7 @@ def in_package(index: int, table: IncludeTable, faults: Faults) -> Path:
 
 def text_of_model(file: Path, index: int, table: IncludeTable, faults: Faults) -> str:
     """The tables of another program's model of a robot, as text."""
-    from symphys.importing.options import ImportOptions
-    from symphys.importing.problem import ImportProblem
+    from symphys.importing.records import ImportOptions, ImportProblem
     from symphys.importing.robot import read_robot
     from symphys.importing.writing import robot_text
 

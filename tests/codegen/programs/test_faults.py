@@ -14,7 +14,7 @@ from tools.waiting import FOREVER, assert_gone, wait_for
 from worlds import programs
 
 from symphys.codegen import Cache, KernelUnavailable, compile_program
-from symphys.codegen.toolchain import processor
+from symphys.codegen.toolchain import compiler
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.codegen.toolchain.processes import run_all
 
@@ -152,8 +152,8 @@ def test_ctrl_c_is_not_lost_in_a_finalizer() -> None:
     ],
 )
 def test_lanes_follow_the_processor(monkeypatch: Patch, features: str, architecture: str, lanes: int) -> None:
-    monkeypatch.setattr(processor.platform, "machine", lambda: "x86_64")
-    monkeypatch.setattr(processor, "_features", lambda: set(features.split()))
-    target = processor.processor.__wrapped__()
+    monkeypatch.setattr(compiler.platform, "machine", lambda: "x86_64")
+    monkeypatch.setattr(compiler, "_features", lambda: set(features.split()))
+    target = compiler.processor.__wrapped__()
     assert target.flags() == () or "-mavx2" in target.flags()
     assert (target.architecture, target.lanes(False), target.lanes(True)) == (architecture, lanes, 2 * lanes)

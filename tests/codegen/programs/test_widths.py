@@ -18,7 +18,7 @@ from symphys.codegen import Cache, Kernel, KernelUnavailable, ProcessorKernel, P
 from symphys.codegen.runtime import widths
 from symphys.codegen.runtime.widths import suited
 from symphys.codegen.toolchain import build
-from symphys.codegen.toolchain.processor import processor
+from symphys.codegen.toolchain.compiler import processor
 from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
 from symphys.transcription import rollout_program
 from symphys.transcription.rollout import symbolic_rollout
@@ -35,12 +35,12 @@ def own(tmp_path: Path) -> Cache:
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody waits before a library that is missing is compiled."""
-    monkeypatch.setattr(build, "PATIENCE", (0.0, 0.0))
+    monkeypatch.setattr(build, "COMPILE_TIME", (0.0, 0.0))
 
 
 @pytest.fixture
 def never(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(build, "PATIENCE", (inf, 0.0))
+    monkeypatch.setattr(build, "COMPILE_TIME", (inf, 0.0))
 
 
 def falling(folder: Path) -> Program:
@@ -155,7 +155,7 @@ def test_a_plan_that_was_kept_has_all_widths(own: Cache, monkeypatch: pytest.Mon
         made.append(1)
         return programs.pendulum()
 
-    monkeypatch.setattr(build, "PATIENCE", (0.0, 0.0))
+    monkeypatch.setattr(build, "COMPILE_TIME", (0.0, 0.0))
     source = ProgramSource(make, "a pendulum")
     cold = compile_source(source, ("merit",), 1, cache=own)
     z = draw(cold.program, 1)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from symphys.cli.finding.shown import text
+from symphys.cli.run_tables import text
 
 
 @click.command()
@@ -33,6 +33,6 @@ def diff(first: Path, second: Path) -> None:
 
 
 def coloured(line: str) -> str:
-    """A line of a unified diff."""
+    """Colour a line of a unified diff."""
     colour = {"+": "green", "-": "red"}.get(line[:1]) if sys.stdout.isatty() else None
     return click.style(line, fg=colour) if colour else line

@@ -8,12 +8,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symphys import threads as linear_algebra
-from symphys.cli.arguments import complete_problem, out_option, read_problems, read_settings, settings_option
+from symphys.cli.arguments import (
+    INTERRUPTED,
+    complete_problem,
+    out_option,
+    read_problems,
+    read_settings,
+    settings_option,
+)
 
 if TYPE_CHECKING:
     from symphys.identification import FitStep
-
-INTERRUPTED = 130
 
 
 @click.command()
@@ -45,7 +50,7 @@ def identify(source: str, assignments: tuple[str, ...], threads: int | None, out
     folder = out / case_name(problem.name, settings) / "identify"
     asked_for = {name: value for name, value in options.items() if value is not None}
     with Interrupts().listening() as asked:
-        found = identified(problem, folder, threads=threads, monitor=told, stop=asked, **asked_for)
+        found = identified(problem, folder, threads=threads, monitor=print_step, stop=asked, **asked_for)
     click.echo(f"\n{summary(found)}")
     click.echo(write_identification_page(folder))
     if found.status == "interrupted":
@@ -53,7 +58,7 @@ def identify(source: str, assignments: tuple[str, ...], threads: int | None, out
     return 0 if found.status == "converged" and not found.doubts else 1
 
 
-def told(step: FitStep) -> None:
-    """A line for each iteration, on the stream of messages."""
+def print_step(step: FitStep) -> None:
+    """Print a line for an iteration on stderr."""
     left = f"{step.left:.2g} standard errors left"
     click.echo(f"iteration {step.iteration:3d}  merit {step.merit:.6g}  {left}  {step.seconds:.1f} s", err=True)

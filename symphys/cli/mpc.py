@@ -8,13 +8,19 @@ from typing import TYPE_CHECKING
 import click
 
 from symphys import threads as linear_algebra
-from symphys.cli.arguments import complete_problem, out_option, read_problems, read_settings, settings_option
+from symphys.cli.arguments import (
+    INTERRUPTED,
+    complete_problem,
+    out_option,
+    read_problems,
+    read_settings,
+    settings_option,
+)
 
 if TYPE_CHECKING:
     from symphys.results.closed_loop import ClosedLoopRecord
 
 COMPILING, TENTHS, PART = "compiling the model and the plant", 10, "controlling, {} tenths of the time"
-INTERRUPTED = 130
 
 
 @click.command()
@@ -52,10 +58,10 @@ def mpc(source: str, assignments: tuple[str, ...], threads: int, out: Path) -> i
         controller = Controller(problem, threads)
         duration = controller.horizon.duration
 
-        def told(time: float) -> None:
+        def show_time(time: float) -> None:
             tell(PART.format(int(TENTHS * time / duration * (1 - 1e-9))))
 
-        loop = close_loop(controller, Plant(problem), told, asked)
+        loop = close_loop(controller, Plant(problem), show_time, asked)
         record, _ = write_closed_loop(loop, folder)
     click.echo("\n".join(lines(record)))
     click.echo(write_closed_loop_page(folder))
@@ -65,7 +71,7 @@ def mpc(source: str, assignments: tuple[str, ...], threads: int, out: Path) -> i
 
 
 def lines(record: ClosedLoopRecord) -> list[str]:
-    """What happened, for the terminal."""
+    """Return the summary of a closed loop, in lines."""
     found = [
         f"{record.problem}: {record.title}",
         f"  simulated    {record.duration:g} s at {record.rate:g} Hz, {record.ticks} ticks",

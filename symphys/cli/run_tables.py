@@ -1,4 +1,4 @@
-"""What the commands on tables of runs share: their options, and rows as text, CSV or JSON."""
+"""Tables of runs: options of the commands that print them, and rows as text, CSV or JSON."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 SHOWN = ("run", "verdict", "objective", "worst", "OUTPUTS", "equivalents", "solve_seconds", "why")
-"""Columns of a table on the terminal; outputs where there are few."""
+"""Columns of a table on the terminal; OUTPUTS stands for outputs, if there are few."""
 MOST_OUTPUTS = 3
 GAP = "  "
 LONGEST_TEXT = 100
@@ -28,25 +28,23 @@ LONGEST_TEXT = 100
 SHORTEST_TEXT = 20
 MOST_FAULTS = 10
 STYLES = {"solved": "green", "best_found": "yellow", "doubted": "red", "not_solved": "red", "unreadable": "red"}
-"""Of verdicts on a terminal."""
+"""Colours of verdicts on a terminal."""
 QUIET, EVERY = 1.0, 10.0
-"""[s] Before reading shows its progress, and between its lines where the output is no terminal."""
+"""[s] before progress is shown, and between lines where the output is no terminal."""
 
 
-def where_option(command: F) -> F:
-    """``--where CONDITION``, as often as you like."""
-    return click.option(
-        "--where",
-        "conditions",
-        multiple=True,
-        metavar="CONDITION",
-        help="Only runs of which this holds: objective<0.5, solver=cma, run=ball*, ground.friction>=0.3. Repeatable: "
-        "all must hold.",
-    )(command)
+where_option = click.option(
+    "--where",
+    "conditions",
+    multiple=True,
+    metavar="CONDITION",
+    help="Only runs of which this holds: objective<0.5, solver=cma, run=ball*, ground.friction>=0.3. Repeatable: "
+    "all must hold.",
+)
 
 
 def format_options(command: F) -> F:
-    """``--columns A,B``, ``--csv`` and ``--json``."""
+    """Add ``--columns A,B``, ``--csv`` and ``--json``."""
     for option in (
         click.option("--json", "as_json", is_flag=True, help="Print a JSON list with an object for each run."),
         click.option("--csv", "as_csv", is_flag=True, help="Print CSV."),
@@ -62,7 +60,7 @@ def format_options(command: F) -> F:
 
 
 def print_rows(rows: Sequence[Row], found: Rows, names: Sequence[str], as_csv: bool, as_json: bool) -> None:
-    """Print columns of rows as they are asked for, and on stderr what could not be read.
+    """Print columns of rows in the format that is asked for, and errors of reading on stderr.
 
     ``names``: the columns; none for the usual ones, which are all in CSV and JSON.
     """
@@ -81,7 +79,7 @@ def print_rows(rows: Sequence[Row], found: Rows, names: Sequence[str], as_csv: b
 
 
 def read_columns(names: str | None, found: Rows) -> list[str]:
-    """The columns that are asked for; none if nothing is."""
+    """Return the columns that are asked for; none for the usual ones."""
     from symphys.results.table.columns import columns, find_column
 
     if names is None:
@@ -91,7 +89,7 @@ def read_columns(names: str | None, found: Rows) -> list[str]:
 
 
 def usual_columns(rows: Sequence[Row]) -> list[str]:
-    """Those in SHOWN that some run has."""
+    """Return the columns of SHOWN that some run has."""
     from symphys.results.table.columns import OUTPUT, columns
 
     outputs = [name for name in columns(rows) if name.startswith(OUTPUT)]
@@ -101,7 +99,7 @@ def usual_columns(rows: Sequence[Row]) -> list[str]:
 
 
 def lines(rows: Sequence[Row], names: Sequence[str]) -> Iterator[str]:
-    """A header and a line for each row; numbers are rounded, and only the last column may be cut."""
+    """Yield a header and a line for each row; numbers are rounded, and only the last column may be cut."""
     texts = [[text(row.get(name)) for row in rows] for name in names]
     rights = [any(isinstance(row.get(name), float | int) for row in rows) and name != "solved" for name in names]
     widths = [max(map(len, (name, *column))) for name, column in zip(names, texts, strict=True)]
@@ -114,14 +112,14 @@ def lines(rows: Sequence[Row], names: Sequence[str]) -> Iterator[str]:
 
 
 def room(taken: int) -> int:
-    """Characters that the last column may have."""
+    """Return the width of the last column."""
     if not sys.stdout.isatty():
         return LONGEST_TEXT
     return max(shutil.get_terminal_size().columns - taken, SHORTEST_TEXT)
 
 
 def text(value: object) -> str:
-    """A value in a cell: printable, on one line."""
+    """Return the text of a cell: printable, on one line."""
     if value is None:
         return "-"
     if isinstance(value, bool):
@@ -133,26 +131,26 @@ def text(value: object) -> str:
 
 
 def padded(cell: str, width: int, right: bool) -> str:
-    """A cell of that width."""
+    """Pad or cut a cell to a width."""
     if len(cell) > width:
         return cell[: width - 3] + "..."
     return cell.rjust(width) if right else cell.ljust(width)
 
 
 def styled(name: str, cell: str, shown: str) -> str:
-    """A verdict in its colour."""
+    """Colour a verdict."""
     return click.style(shown, fg=STYLES[cell]) if name == "verdict" and cell in STYLES else shown
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """How many runs there are, by verdict."""
+    """Return how many runs there are, by verdict."""
     counts = Counter(row["verdict"].replace("_", " ") for row in rows)
     listed = ", ".join(f"{count:,} {word}" for word, count in counts.most_common())
     return f"{len(rows):,} run{'s' * (len(rows) != 1)}: {listed}" if rows else "no run"
 
 
 def print_faults(found: Rows) -> None:
-    """Say on stderr which files and folders could not be read."""
+    """Print on stderr which files and folders could not be read."""
     faults = [*found.faults, *(f"{row['run']}: {row['fault']}" for row in found.rows if row.get("fault"))]
     for fault in faults[:MOST_FAULTS]:
         click.echo(f"symphys: {files.printable(text(fault))}", err=True)
@@ -161,15 +159,15 @@ def print_faults(found: Rows) -> None:
 
 
 class ReadingProgress:
-    """Says on stderr how many folders are read, once that takes its time; on a terminal in one line."""
+    """Progress of reading folders on stderr, after QUIET seconds; on a terminal in one line."""
 
     def __init__(self) -> None:
-        """Nothing is said yet."""
+        """Start with nothing shown."""
         self.began = self.said = time.monotonic()
         self.shown = False
 
     def __call__(self, done: int, total: int) -> None:
-        """So many are done."""
+        """Show that ``done`` folders are read, if a line is due."""
         if done % 50 and done < total:
             return
         now, terminal = time.monotonic(), sys.stderr.isatty()
@@ -179,7 +177,7 @@ class ReadingProgress:
         click.echo(f"{chr(13) * terminal}reading run folders: {done:,} of {total:,}", nl=not terminal, err=True)
 
     def __enter__(self) -> ReadingProgress:
-        """Itself."""
+        """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,17 +1,18 @@
-"""The stored variables of a run, rolled out again by the exact rollout from problem.toml and the settings beside it.
+"""The stored variables of a run, rolled out again by the exact rollout, and compared with what is recorded.
 
-Nothing of the folder is run: it has a problem, settings and numbers. What is compared was judged and recorded by the
-same rollout, so it is the same to the bit where versions and processor are.
+Nothing of the folder is executed: it holds a problem, settings and numbers. The recorded motion was computed by the
+same rollout, so the two agree bit for bit where versions and processor do.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symphys import json_values as values
 from symphys.errors import SymphysError
@@ -23,15 +24,17 @@ from symphys.results.file_names import CONFIG, PROBLEM, RESULT, TRAJECTORY
 from symphys.results.result import Result
 from symphys.results.text_files import ReportError, read_table
 from symphys.results.trajectories import make_trajectory
+from symphys.runs.execute import no_callback
 from symphys.runs.provenance import machine, versions
-from symphys.runs.replay.comparison import QuantityDifference, compare_motions, compare_numbers
 from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription import Assessment, Transcription, transcribe
 from symphys.types import Array
 
 BUILDING, ROLLING = "building the problem", "rolling it out"
 PARTS = {BUILDING: 8.0, ROLLING: 2.0}
-"""What ``replay`` announces, and about how the time is shared."""
+"""The parts that ``replay`` announces, and about what share of the time each takes."""
+COUNTED = {"residual": "N s", "crowded": "", "ambiguous": "", "paradox": ""}
+"""Quantities of a whole step, not of a body, joint or contact, and their units."""
 
 
 class ReplayError(SymphysError):
@@ -40,7 +43,7 @@ class ReplayError(SymphysError):
 
 @dataclass(frozen=True)
 class Replay:
-    """How a run does when it is rolled out again.
+    """The comparison of a run with its new rollout.
 
     Attributes:
         folder: of the run.
@@ -67,7 +70,7 @@ class Replay:
         return not self.differences and not self.fault
 
     def __str__(self) -> str:
-        """The differences, a line each, or that there are none; then what is not as it was."""
+        """Return the differences, one a line, or that there are none; then what versions and machine differ."""
         if self.same:
             lines = [f"{self.folder}: the same, to the bit ({self.quantities} quantities, {self.instants} instants)"]
         else:
@@ -81,12 +84,8 @@ class Replay:
         return "\n".join(lines)
 
 
-def silent(what: str) -> None:
-    """Tell nobody."""
-
-
-def replay(folder: Path, tell: Callable[[str], None] = silent) -> Replay:
-    """Roll out the variables of a run again, and compare with what is recorded; ``tell`` is called with each of PARTS.
+def replay(folder: Path, tell: Callable[[str], None] = no_callback) -> Replay:
+    """Roll out the variables of a run again and compare; ``tell`` is called with each of PARTS.
 
     Raises:
         ReplayError: no such folder, a file that is missing or damaged, or variables that do not fit the problem.
@@ -97,10 +96,13 @@ def replay(folder: Path, tell: Callable[[str], None] = silent) -> Replay:
     tell(BUILDING)
     transcription = transcribe(problem, backend="casadi")
     tell(ROLLING)
-    z = stored_variables(folder, result, transcription)
-    known = judged_numbers(result)
     try:
-        again, judged = transcription.simulate(z), assessed_numbers(transcription.judge(z))
+        z = stored_variables(result, transcription)
+    except ReplayError as error:
+        raise ReplayError(f"{folder}: {error}") from None
+    known = compared_table(result)
+    try:
+        again, judged = transcription.simulate(z), compared_table(transcription.judge(z))
     except NotFinite as error:
         return Replay(folder, len(recorded.time), 0, (), elsewhere(result), fault=str(error))
     check_fits(folder, recorded, again)
@@ -127,7 +129,7 @@ def read_parts(folder: Path) -> tuple[Result, dict[str, Array], Problem]:
 
 
 def motion_of(folder: Path, arrays: Mapping[str, Any]) -> Trajectory:
-    """The motion in the arrays of trajectory.npz; ReplayError if their shapes do not fit."""
+    """Return the motion in the arrays of trajectory.npz; ReplayError if their shapes do not fit."""
     try:
         return make_trajectory(arrays)
     except (ValueError, KeyError, TypeError) as error:
@@ -135,32 +137,20 @@ def motion_of(folder: Path, arrays: Mapping[str, Any]) -> Trajectory:
         raise ReplayError(f"{folder}: cannot be rolled out again: {why}") from error
 
 
-def stored_variables(folder: Path, result: Result, transcription: Transcription) -> Array:
-    """(n,): the decision vector of a result."""
+def stored_variables(result: Result, transcription: Transcription) -> Array:
+    """Return the decision vector (n,) of a result; ReplayError if the problem has another size of a variable."""
     parts = []
     for block in transcription.shooting.blocks:
         found = result.z[block.name].value.T.ravel() if block.name in result.z else np.zeros(0)
-        if found.size != block.stop - block.start:
-            raise ReplayError(
-                f"{folder}: {RESULT} has {found.size} numbers for variable {block.name!r}, {PROBLEM} has "
-                f"{block.stop - block.start}"
-            )
+        if found.size != (size := block.stop - block.start):
+            text = f"{RESULT} has {found.size} numbers for variable {block.name!r}, the problem has {size}"
+            raise ReplayError(text)
         parts.append(found)
     return np.concatenate(parts)
 
 
-def judged_numbers(result: Result) -> dict[str, float]:
-    """What the judge said of the run."""
-    return {
-        "objective": result.objective,
-        **{f"output: {name}": value for name, value in result.outputs.items()},
-        **{f"cost: {name}": value for name, value in result.costs.items()},
-        **{f"{check.kind}: {check.name}": check.error for check in result.checks},
-    }
-
-
-def assessed_numbers(judged: Assessment) -> dict[str, float]:
-    """The same of what is judged now."""
+def compared_table(judged: Result | Assessment) -> dict[str, float]:
+    """Return the numbers of a judgement that are compared, by name."""
     return {
         "objective": judged.objective,
         **{f"output: {name}": value for name, value in judged.outputs.items()},
@@ -180,7 +170,78 @@ def check_fits(folder: Path, recorded: Trajectory, again: Trajectory) -> None:
 
 
 def elsewhere(result: Result) -> dict[str, tuple[str, str]]:
-    """What the run was made with and what is here, by name, where both are known and differ; hosts may."""
+    """Return what differs between the origin of the run and this machine, by name; hosts are not compared."""
     then, now = {**result.versions, **result.provenance}, {**versions(), **machine()}
     del now["host"]
     return {name: (str(then[name]), now[name]) for name in then if name in now and str(then[name]) != now[name]}
+
+
+@dataclass(frozen=True)
+class QuantityDifference:
+    """A quantity that is not the same to the bit.
+
+    Attributes:
+        name: ``ball.position``, ``output: speed [m/s]``, ``objective``.
+        unit: of the difference; empty where it has none, or where the name has it.
+        size: the largest difference of a component; inf where only one is a number, 0 where only signs of zero differ.
+        time: [s] at which it is; None for what is no motion.
+        recorded, again: the two numbers there.
+    """
+
+    name: str
+    unit: str
+    size: float
+    time: float | None
+    recorded: float
+    again: float
+
+    def __str__(self) -> str:
+        """Return one line for people."""
+        unit = f" {self.unit}" if self.unit else ""
+        when = "" if self.time is None else f" at {self.time:g} s"
+        return f"{self.name}: {self.size:.3g}{unit}{when} ({self.recorded!r} was recorded, {self.again!r} again)"
+
+
+def compare_motions(recorded: Trajectory, again: Trajectory) -> Iterator[QuantityDifference]:
+    """Yield the quantities that differ between two motions of the same bodies at the same times."""
+    for name, unit in [*again.units.items(), *COUNTED.items()]:
+        pair = [getattr(each, name) if name in COUNTED else each[name] for each in (recorded, again)]
+        yield from compare_arrays(name, unit, again.time, *pair)
+
+
+def compare_arrays(
+    name: str, unit: str, time: Array, recorded: NDArray[np.generic], again: NDArray[np.generic]
+) -> Iterator[QuantityDifference]:
+    """Yield the largest difference of two arrays, whose rows are at ``time``; nothing if they agree bit for bit.
+
+    Arrays of different shapes count as one infinite difference.
+    """
+    first, second = (np.ascontiguousarray(each, float) for each in (recorded, again))
+    if first.shape != second.shape:
+        yield QuantityDifference(name, unit, np.inf, None, np.nan, np.nan)
+        return
+    differs = first.view(np.int64) != second.view(np.int64)
+    if not differs.any():
+        return
+    gaps = np.where(differs, distances(first, second), -1.0)
+    place = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
+    yield QuantityDifference(
+        name, unit, float(gaps[place]), float(time[place[0]]), float(first[place]), float(second[place])
+    )
+
+
+def compare_numbers(recorded: Mapping[str, float], again: Mapping[str, float]) -> Iterator[QuantityDifference]:
+    """Yield the numbers of two tables that differ, by name; NaN stands for a missing one."""
+    for name in dict.fromkeys([*recorded, *again]):
+        pair = [np.array([table.get(name, np.nan)], float) for table in (recorded, again)]
+        if pair[0].tobytes() != pair[1].tobytes() and not all(np.isnan(each).all() for each in pair):
+            size = float(distances(*pair)[0])
+            yield QuantityDifference(name, "", size, None, float(pair[0][0]), float(pair[1][0]))
+
+
+def distances(first: Array, second: Array) -> Array:
+    """Return the absolute differences: 0 where both are NaN, inf where one is."""
+    with np.errstate(invalid="ignore"):
+        gaps = np.where(first == second, 0.0, np.abs(first - second))
+    gaps = np.where(np.isnan(first) & np.isnan(second), 0.0, gaps)
+    return np.where(np.isnan(gaps), np.inf, gaps)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from symphys.api.robot import Robot
 
 STYLES = {"taken": "green", "approximated": "yellow", "left out": "red", "recovered": "cyan"}
-"""Of findings on a terminal."""
+"""Colours of findings on a terminal."""
 
 
 @click.command("import")
@@ -73,7 +73,7 @@ def import_robot(
 
 
 def tell(robot: Robot) -> None:
-    """Print what became of the parts of a robot: as a table on a terminal, else line by line."""
+    """Print the findings of an import: a table on a terminal, else a line each."""
     import sys
 
     if not sys.stdout.isatty():

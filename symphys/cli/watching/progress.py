@@ -1,4 +1,4 @@
-"""How far work is, and how long the rest of it takes: a batch of runs, and work whose parts are known beforehand."""
+"""The share of work that is done, and the time left: of a batch of runs, and of work in known parts."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from symphys.verification.examination import PARTS
 
 
 class StepProgress:
-    """Work whose parts are known beforehand: what is done now, the share that is done, and the time that is left."""
+    """The progress of work whose parts are known beforehand, with the time that is left."""
 
     def __init__(self, parts: Mapping[str, float]) -> None:
-        """Nothing is done; ``parts``: by the words that announce them, in their order, about how long each takes."""
+        """Start with nothing done; ``parts``: by the words that announce them, in order, the relative time of each."""
         self.parts, self.what = dict(parts), ""
         self.began = self.since = monotonic()
         self.done = 0.0
 
     def tell(self, what: str) -> None:
-        """Say what begins; all parts before it are done. Words that announce no part are only shown."""
+        """Announce a part; all parts before it are done. Other words are only shown."""
         self.what = what
         if what in self.parts:
             before = list(self.parts)[: list(self.parts).index(what)]
@@ -31,12 +31,12 @@ class StepProgress:
 
     @property
     def share(self) -> float:
-        """Done, 0 to 1."""
+        """The share that is done, 0 to 1."""
         return self.done / sum(self.parts.values())
 
     @property
     def seconds_left(self) -> float:
-        """[s] at the pace of the parts that are done; inf before the first is."""
+        """The time left [s] at the pace of the finished parts; inf before the first is done."""
         if not self.done:
             return math.inf
         pace = (self.since - self.began) / self.done
@@ -45,10 +45,10 @@ class StepProgress:
 
 
 class BatchShare:
-    """The runs of a batch that are in work, the share of the batch that is done, and the time that is left."""
+    """The progress of a batch: its runs in work, the share that is done, and the time that is left."""
 
     def __init__(self, runs: int) -> None:
-        """None has begun."""
+        """Start with no run begun."""
         self.runs, self.over, self.timed, self.failed = runs, 0, 0, 0
         self.problems: set[str] = set()
         self.best: tuple[float, str] | None = None
@@ -59,51 +59,51 @@ class BatchShare:
         self.news: dict[str, float] = {}
 
     def started(self, job: Job) -> BudgetUse:
-        """A run begins; its use of its budget."""
+        """Record that a run starts; return its use of its budget."""
         self.news[job.name] = monotonic()
         self.examined |= {job.name} if job.examine else set()
         return self.running.setdefault(job.name, BudgetUse(job.options, job.problem.simulation.smoothing))
 
     def advanced(self, job: Job, row: TraceRow) -> BudgetUse:
-        """A run has come to an iteration; its use of its budget."""
+        """Record an iteration of a run; return its use of its budget."""
         use = self.started(job)
         use.add(row)
         return use
 
     def judging(self, job: Job, what: str) -> StepProgress:
-        """A part of judging what a run has found begins."""
+        """Record that a part of judging begins; return the progress of judging."""
         self.started(job)
         steps = self.judged.setdefault(job.name, StepProgress(PARTS))
         steps.tell(what)
         return steps
 
     def found(self, job: Job, result: Result) -> None:
-        """What a run has come to."""
+        """Record the result of a run."""
         self.failed += result.status == "failed"
         self.problems.add(result.problem)
         if result.accepted and (self.best is None or result.objective < self.best[0]):
             self.best = (result.objective, job.name)
 
     def ended(self, job: Job, skipped: bool) -> None:
-        """A run is over; what was done before takes no time."""
+        """Record that a run is over; runs that were done before take no time."""
         for known in (self.running, self.judged, self.news):
             known.pop(job.name, None)
         self.over += 1
         self.timed += not skipped
 
     def quiet(self, seconds: float) -> dict[str, float]:
-        """How long [s] runs have brought no news, by their names; of those that have not for so long."""
+        """Return the time [s] since the last news of each run, by name, where it is at least ``seconds``."""
         waited = {name: monotonic() - since for name, since in self.news.items()}
         return {name: time for name, time in waited.items() if time >= seconds}
 
     @property
     def share(self) -> float:
-        """Done, 0 to 1: the runs that are over, and of those in work the share of their budget."""
+        """The share that is done, 0 to 1: finished runs, and of those in work the share of their budget."""
         return (self.over + self._begun) / self.runs if self.runs else 1.0
 
     @property
     def seconds_left(self) -> float:
-        """[s] at the pace so far; inf before the first run is over."""
+        """The time left [s] at the pace so far; inf before the first run is over."""
         if not self.timed:
             return math.inf
         rest = self.runs - self.over - self._begun
@@ -111,10 +111,41 @@ class BatchShare:
 
     @property
     def _begun(self) -> float:
-        """The shares of the runs in work; of an examined one, solving and judging count as halves."""
+        """The sum of the shares of runs in work; solving and judging of an examined run count as halves."""
         total = 0.0
         for name, use in self.running.items():
             solved = 1.0 if name in self.judged else 0.0 if math.isnan(use.share) else use.share
             steps = self.judged.get(name)
             total += solved if name not in self.examined else (solved + (steps.share if steps else 0.0)) / 2
         return total
+
+
+class Notes:
+    """Notes of backends, each once, and the seconds of the runs of this batch.
+
+    Attributes:
+        seconds: total of "build", "compile" and "solve"; runs that share a problem share its first two.
+    """
+
+    def __init__(self) -> None:
+        """Start with no note shown."""
+        self.shown: set[str] = set()
+        self.seconds: dict[str, float] = {"build": 0.0, "compile": 0.0, "solve": 0.0}
+        self.made: set[tuple[str, float]] = set()
+
+    def new(self, result: Result, skipped: bool) -> list[str]:
+        """Return the lines to print; none for a run that was done before."""
+        if not skipped:
+            self.add(result)
+        note = "" if skipped else result.backend.note
+        if not note or note in self.shown:
+            return []
+        self.shown.add(note)
+        return [f"symphys: {note}"]
+
+    def add(self, result: Result) -> None:
+        """Add the seconds of a run."""
+        built = (result.problem, result.seconds.get("build", 0.0))
+        for key in ("solve",) if built in self.made else self.seconds:
+            self.seconds[key] += result.seconds.get(key, 0.0)
+        self.made.add(built)

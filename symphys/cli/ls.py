@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from symphys.cli.arguments import REPORTS
-from symphys.cli.finding.shown import ReadingProgress, format_options, print_rows, read_columns, summary, where_option
+from symphys.cli.run_tables import ReadingProgress, format_options, print_rows, read_columns, summary, where_option
 
 
 @click.command()

@@ -1,1 +1,0 @@
-"""Commands on robots of other programs."""
