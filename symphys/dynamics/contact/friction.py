@@ -276,14 +276,14 @@ class Ellipse:
         falls = at.slope(root / (self._mean + TINY_LOAD), width)
 
         # slopes of T: those of the root, times that of the bound
-        share = 1 / ca.vertcat(*self._sums(at.load, ca.fmax(root, 0)))
+        share: Expr = ca.vertcat(*(1 / each for each in self._sums(at.load, ca.fmax(root, 0))))
         s = mu * share * y
         s = s / length(s)
         by_wanted = falls * mu * share * s / (ca.dot(s, s * share) + TINY_LOAD)
         by_load = -ca.dot(mu * s, by_wanted)
 
         # slopes of x
-        share = 1 / ca.vertcat(*self._sums(at.load, t))
+        share = ca.vertcat(*(1 / each for each in self._sums(at.load, t)))
         by_t = squares * at.load * share * share * y
         slope = ca.diag(squares * at.load * share) - ca.mtimes(by_t, by_wanted.T)
         widens = squares * share * share * t * y - by_t * by_load
