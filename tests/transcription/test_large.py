@@ -15,7 +15,7 @@ from tools.repeats import thorough
 from worlds.monopod import MONOPOD
 
 from symphys.errors import ProblemError
-from symphys.export.writing import export
+from symphys.export.writing import export_problem
 from symphys.problem import load_problem
 from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.texts import read_axes
@@ -455,7 +455,7 @@ def test_quantities_and_exported_functions(tmp_path: Path, monkeypatch: pytest.M
     slopes = recorded.pull(Z, np.ones(2), {"bob.position": np.zeros_like(quantities["bob.position"])})
     assert np.allclose(value, known.merit, rtol=1e-12)
     assert np.allclose(slopes, known.gradient, rtol=1e-7, atol=1e-8 * np.abs(known.gradient).max())
-    export(problem, casadi=tmp_path / "exported")
+    export_problem(problem, casadi=tmp_path / "exported")
     gradient = ca.Function.load(str(tmp_path / "exported" / "gradient.casadi"))
     found = gradient(z=Z[0], smoothing=0.0)
     assert np.allclose(np.array(found["gradient"]).ravel(), known.gradient[0], rtol=1e-7, atol=1e-7)
