@@ -43,9 +43,9 @@ class Progress:
     mark: float
     quiet: int = 0
 
-    def after(self, merit: float) -> Progress:
-        """With one iteration more, at ``merit``."""
-        if merit < self.mark - WORTH * abs(self.mark):
+    def after(self, merit: float, worth: float = WORTH) -> Progress:
+        """With one iteration more, at ``merit``; a fall by the share ``worth`` is progress."""
+        if merit < self.mark - worth * abs(self.mark):
             return Progress(merit)
         return Progress(self.mark, self.quiet + 1)
 

@@ -1,9 +1,7 @@
-"""Levenberg-Marquardt within bounds, on residuals r with merit = r . r, in x = z / scale.
+"""The solver ``least_squares``: Levenberg-Marquardt on residuals r with merit = r . r, in x = z / scale.
 
-Each step solves (J'J + lambda I) d = -J'r over the variables that are free: those at a bound that the gradient
-pushes against are held (active set), and the step is projected into the bounds. lambda follows the gain ratio, the
-decrease of the merit over that of the linear model (Nielsen 1999; Madsen, Nielsen, Tingleff 2004, algorithm 3.16).
-A step onto a plateau is refused like one that raises the merit, see ``vanishing_gradient``.
+The loop is that of ``core.levenberg_marquardt``, on the dense Jacobian of all residuals. A step onto a plateau is
+refused like one that raises the merit, see ``vanishing_gradient``.
 
 Why not scipy.optimize.least_squares: it can be stopped between iterations but not at the first point that meets the
 targets, and its trust region cannot be set when a solve goes on, so an interrupted solve would end elsewhere.
@@ -17,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import revive
@@ -25,6 +22,16 @@ from symphys.solvers.core.convergence import Progress, not_finite, stationary
 from symphys.solvers.core.driver import iterating, make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
+from symphys.solvers.core.levenberg_marquardt import (
+    WORTH,
+    Damped,
+    LocalModel,
+    Refusal,
+    Trial,
+    descend,
+    first_damping,
+    movable,
+)
 from symphys.solvers.core.line_search import ROUNDING
 from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Status, StopReason
@@ -32,12 +39,6 @@ from symphys.solvers.core.point import Point
 from symphys.solvers.core.vanishing_gradient import REFUSALS, vanished
 from symphys.types import Array
 
-LOOSEST = 1 / 3
-"""lambda falls at most to this share after a step that went as foreseen."""
-WORTH = 1e-4
-"""A step is taken if the merit falls by more than this share of what the linear model expects."""
-STIFFEST = 1e20
-"""lambda over the largest squared column of the first Jacobian: beyond it a step is no step."""
 NO_SQUARES = (
     "this problem has no residuals: a cost is no sum of squares (write it as one: `squares`, a formula whose squares "
     "add up to the cost), or a net is too large or bodies are too many for a Jacobian (use another solver)"
@@ -75,17 +76,14 @@ class LeastSquaresOptions(SolverOptions):
         require(0 < self.damping < math.inf, "damping", "above 0")
 
 
-@dataclass(frozen=True)
-class LeastSquaresState:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LeastSquaresState(Damped):
     """Between two iterations.
 
     Attributes:
         iteration: of this stage.
         z: (n,).
         residuals, jacobian: (m,) and (m, n) at z.
-        damping: lambda.
-        growth: the factor on lambda after a step that is refused.
-        stiffest: a lambda beyond which the search for a step is given up.
         progress: of the merit.
     """
 
@@ -93,9 +91,6 @@ class LeastSquaresState:
     z: Array
     residuals: Array
     jacobian: Array
-    damping: float
-    growth: float
-    stiffest: float
     progress: Progress
 
     @property
@@ -122,28 +117,36 @@ class LevenbergMarquardt(Method[LeastSquaresState]):
         point = self.evaluator.jacobian(self.start)
         if not point.finite:
             return not_finite(point)
-        size = float(np.max(np.sum((point.jacobian * self.evaluator.scale) ** 2, axis=0), initial=0.0)) or 1.0
-        evaluated, progress = (point.z, point.residuals, point.jacobian), Progress(point.merit)
-        state = LeastSquaresState(0, *evaluated, self.options.damping * size, 2.0, STIFFEST * size, progress)
+        largest = float(np.max(np.sum((point.jacobian * self.evaluator.scale) ** 2, axis=0), initial=0.0))
+        state = LeastSquaresState(
+            iteration=0,
+            z=point.z,
+            residuals=point.residuals,
+            jacobian=point.jacobian,
+            progress=Progress(point.merit),
+            **first_damping(self.options.damping, largest),
+        )
         return self._iteration(point, state, math.nan)
 
     def step(self, state: LeastSquaresState) -> Iteration[LeastSquaresState] | StopReason:
         """One step that lowers the merit, and the Jacobian there; lambda grows until there is one."""
-        evaluator, first_try, refused = self.evaluator, True, 0
-        while state.damping <= state.stiffest:
-            z, promised = self._candidate(state)
-            if first_try and promised <= ROUNDING * state.merit:
-                return stationary(evaluator, state.z, state.merit)
-            trial, first_try = evaluator.residuals(z), False
-            gain = (state.merit - trial.merit) / promised if promised > 0 else -math.inf
-            if trial.finite and gain > WORTH:
-                point = evaluator.jacobian(z)
-                enough = refused == REFUSALS or not point.finite
-                if enough or not vanished(evaluator, point, point.jacobian, state.jacobian):
-                    return self._accept(state, point, gain)
-                refused += 1
-            state = replace(state, damping=state.damping * state.growth, growth=2 * state.growth)
-        return StopReason(Status.STALLED, STALLED) if trial.finite else not_finite(trial, NOT_FINITE)
+        model = DenseModel(self.evaluator, state)
+        point, damped = descend(model, state)
+        if point is None:
+            if model.last is not None and not model.last.finite:
+                return not_finite(model.last, NOT_FINITE)
+            return StopReason(Status.STALLED, STALLED)
+        if isinstance(point, StopReason):
+            return point
+        taken = replace(
+            damped,
+            iteration=state.iteration + 1,
+            z=point.z,
+            residuals=point.residuals,
+            jacobian=point.jacobian,
+            progress=state.progress.after(point.merit),
+        )
+        return self._iteration(point, taken, float(np.linalg.norm(point.z - state.z)))
 
     def terminate(self, state: LeastSquaresState) -> StopReason | None:
         """Whether the state is stationary, the budget used up, or the descent gets nowhere."""
@@ -162,24 +165,48 @@ class LevenbergMarquardt(Method[LeastSquaresState]):
     def _iteration(self, point: Point, state: LeastSquaresState, step: float) -> Iteration[LeastSquaresState]:
         return Iteration(state, point, self.evaluator.stationarity(point.z, point.gradient), step)
 
-    def _candidate(self, state: LeastSquaresState) -> tuple[Array, float]:
-        """The next z (n,), and by how much the linear model expects it to lower the merit."""
-        scale, r, free = self.evaluator.scale, state.residuals, movable(self.evaluator, state)
-        jacobian = state.jacobian * scale
-        d = np.zeros(free.size)
-        d[free] = damped_step(jacobian[:, free], r, state.damping)
-        z = self.evaluator.clip(state.z + scale * d)
-        expected = r + jacobian @ ((z - state.z) / scale)
-        return z, float(r @ r - expected @ expected)
 
-    def _accept(self, state: LeastSquaresState, point: Point, gain: float) -> Iteration[LeastSquaresState] | StopReason:
-        """Take the step; lambda falls with the gain ratio."""
+class DenseModel(LocalModel[Array, Point | StopReason]):
+    """The merit about a state, by the dense Jacobian; see ``LocalModel``. Its steps are new z (n,).
+
+    Attributes:
+        merit: at the state.
+        last: the point that was evaluated last; None before the first trial.
+    """
+
+    last: Point | None = None
+
+    def __init__(self, evaluator: CountingEvaluator, state: LeastSquaresState) -> None:
+        """Before the first trial."""
+        self.evaluator, self.state, self.merit = evaluator, state, state.merit
+        self._first, self._plateaus = True, 0
+        self._free = movable(state.z, evaluator.lower, evaluator.upper, state.gradient)
+        self._jacobian = state.jacobian * evaluator.scale
+
+    def trial(self, damping: float) -> Trial[Array] | Point | StopReason:
+        """Evaluate the residuals after a step; end where the first one promises no more than rounding."""
+        evaluator, state, r = self.evaluator, self.state, self.state.residuals
+        d = np.zeros(self._free.size)
+        d[self._free] = damped_step(self._jacobian[:, self._free], r, damping)
+        z = evaluator.clip(state.z + evaluator.scale * d)
+        after = r + self._jacobian @ ((z - state.z) / evaluator.scale)
+        expected = float(r @ r - after @ after)
+        if self._first and expected <= ROUNDING * self.merit:
+            return stationary(evaluator, state.z, self.merit)
+        self.last, self._first = evaluator.residuals(z), False
+        return Trial(z, self.last.merit if self.last.finite else math.inf, expected)
+
+    def judge(self, z: Array, gain: float) -> Point | StopReason | Refusal:
+        """Take a step that lowers the merit enough and does not end on a plateau, with the Jacobian there."""
+        if not gain > WORTH:
+            return Refusal.STIFFER
+        point = self.evaluator.jacobian(z)
         if not point.finite:
             return not_finite(point, NOT_FINITE)
-        damping = state.damping * max(LOOSEST, 1 - (2 * gain - 1) ** 3)
-        evaluated, progress = (point.z, point.residuals, point.jacobian), state.progress.after(point.merit)
-        taken = LeastSquaresState(state.iteration + 1, *evaluated, damping, 2.0, state.stiffest, progress)
-        return self._iteration(point, taken, float(np.linalg.norm(point.z - state.z)))
+        if self._plateaus < REFUSALS and vanished(self.evaluator, point, point.jacobian, self.state.jacobian):
+            self._plateaus += 1
+            return Refusal.STIFFER
+        return point
 
 
 def damped_step(jacobian: Array, r: Array, damping: float) -> Array:
@@ -193,16 +220,10 @@ def damped_step(jacobian: Array, r: Array, damping: float) -> Array:
     return np.asarray(-jacobian.T @ scipy.linalg.cho_solve(factor, r))
 
 
-def movable(evaluator: CountingEvaluator, state: LeastSquaresState) -> NDArray[np.bool_]:
-    """(n,): False for a variable at a bound that the gradient pushes against."""
-    at_lower = (state.z <= evaluator.lower) & (state.gradient > 0)
-    at_upper = (state.z >= evaluator.upper) & (state.gradient < 0)
-    return ~(at_lower | at_upper)
-
-
 def cosine(evaluator: CountingEvaluator, state: LeastSquaresState) -> float:
     """The largest |cosine| between the residuals and a column of the Jacobian that is free to act on them."""
-    jacobian = state.jacobian[:, movable(evaluator, state)]
+    free = movable(state.z, evaluator.lower, evaluator.upper, state.gradient)
+    jacobian = state.jacobian[:, free]
     lengths = np.linalg.norm(jacobian, axis=0) * np.linalg.norm(state.residuals)
     acting = lengths > 0
     return float(np.max(np.abs(jacobian.T @ state.residuals)[acting] / lengths[acting], initial=0.0))

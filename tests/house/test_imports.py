@@ -65,7 +65,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "casadi numpy pandas pyarrow scipy",
         "what a run folder holds",
     ),
-    "identification": ("errors results suggest", "cma numpy scipy", "estimates from recordings, no physics"),
+    "identification": ("errors results solvers suggest", "cma numpy scipy", "estimates from recordings, no physics"),
     "prediction": (
         "errors expression files identification model problem results suggest threads trajectory transcription",
         "numpy",

@@ -1,9 +1,8 @@
-"""Levenberg-Marquardt over all recordings at once, within bounds, on the arrow of shared and own numbers.
+"""The fit of all recordings at once, by Levenberg-Marquardt on the arrow of shared and own numbers.
 
-The merit is sum rho(r) over all residuals and priors. Each step solves (H + lambda I) d = -g in scaled numbers over
-those that are free: a number at a bound that the gradient pushes against is held (active set), and the step is
-projected into the bounds. lambda follows the gain ratio (Nielsen 1999; Madsen, Nielsen, Tingleff 2004, algorithm 3.16).
-A trial of which a recording's simulation is not finite is refused, like one that raises the merit.
+The merit is sum rho(r) over all residuals and priors, in scaled numbers. The loop, the damping and the active set are
+those of ``solvers.core.levenberg_marquardt``; the linear system is solved by a Schur complement over recordings
+(``arrow``). A trial of which a recording's simulation is not finite is refused, like one that raises the merit.
 
 The fit has converged where the step that is left, undamped, is below ``tolerance`` standard errors: its expected fall
 of the merit is below tolerance^2 times the merit per residual. That needs no unit and no scale. Where steps bring
@@ -17,6 +16,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,14 +25,18 @@ from symphys.identification.fitting.kinks import KinkedModel
 from symphys.identification.fitting.remaining import DeterminedArrow, number_units
 from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
 from symphys.identification.interface import FitParameters, IdentificationError, RecordedResiduals
+from symphys.solvers.core.convergence import Progress
+from symphys.solvers.core.levenberg_marquardt import (
+    WORTH,
+    LocalModel,
+    Refusal,
+    Trial,
+    descend,
+    first_damping,
+    movable,
+)
 from symphys.types import Array, Bools, Ints
 
-LOOSEST = 1 / 3
-"""lambda falls at most to this share after a step that went as foreseen."""
-WORTH = 1e-4
-"""A step is taken if the merit falls by more than this share of what the model expects."""
-STIFFEST = 1e20
-"""lambda over the largest diagonal of the first blocks: beyond it a step is no step."""
 EXACT = 1e-16
 """Merit per residual below which recordings are met exactly: residuals of 1e-8 of the noise."""
 ROUNDING = 1e-14
@@ -42,7 +46,7 @@ PROGRESS = 1e-2
 HOPELESS = 1e-2
 """Of the fall that the model promises: where so many steps as patience lasts bring less, it is another merit."""
 WORTH_AT_KINK = 0.1
-"""The same where the sides of a kink are collected: a step that gains less shows one more side."""
+"""``WORTH`` where the sides of a kink are collected: a step that gains less shows one more side."""
 AT_KINK = 1e-2
 """Standard errors: sides are collected where more are left, and a kink is a minimum where they promise no more. At most
 as many are left as noise makes, the root of how many numbers there are: more is another minimum, or chaos."""
@@ -80,6 +84,21 @@ Step = tuple[Array, Array]
 """Of the shared (s,) and the own (k, o) numbers, in scales."""
 
 
+class Moved(NamedTuple):
+    """Numbers after a step within the bounds.
+
+    Attributes:
+        shared, own: (s,) and (K, o).
+        taken: the step.
+        length: of the whole step, in scales.
+    """
+
+    shared: Array
+    own: Array
+    taken: Step
+    length: float
+
+
 class RecordingFit:
     """Levenberg-Marquardt on some recordings of a problem."""
 
@@ -111,7 +130,7 @@ class RecordingFit:
         state = start or begin(self.problem.shared.guess, self.problem.own.guess)
         system = self.system(state.shared, state.own)
         if not system.finite:
-            return FitOutcome(FitStatus.NOT_FINITE, START.format(names=self._names(system.costs)), state, system)
+            return FitOutcome(FitStatus.NOT_FINITE, START.format(names=self.names(system.costs)), state, system)
         if state.history:  # the work of the start is in its history
             last = state.history[-1]
             self.simulations, self.jacobians, began = last.simulations, last.jacobians, began - last.seconds
@@ -139,12 +158,11 @@ class RecordingFit:
     def _first(self, begun: FitState, system: ArrowSystem, began: float) -> FitState:
         """The first iteration sets lambda."""
         diagonals = np.diagonal(system.blocks, axis1=1, axis2=2)
-        size = float(np.max(diagonals, initial=0.0)) or 1.0
-        state = replace(begun, damping=self.options.damping * size, stiffest=STIFFEST * size, mark=system.cost)
-        state = replace(state, first=len(state.history))
-        return self._recorded(state, system, 0.0, began)
+        size = float(np.max(diagonals, initial=0.0))
+        state = replace(begun, mark=system.cost, first=len(begun.history), **first_damping(self.options.damping, size))
+        return self.recorded(state, system, 0.0, began)
 
-    def _recorded(self, state: FitState, system: ArrowSystem, step: float, began: float) -> FitState:
+    def recorded(self, state: FitState, system: ArrowSystem, step: float, began: float) -> FitState:
         """The state with a row of its history."""
         row = FitStep(
             iteration=len(state.history),
@@ -160,13 +178,13 @@ class RecordingFit:
 
     def free(self, state: FitState, system: ArrowSystem) -> tuple[Bools, Bools]:
         """(s,) and (k, o) of the recordings that are fitted: False where a bound holds a number."""
-        shared = movable(self.problem.shared, state.shared, system.shared_gradient)
-        own = movable(self.problem.own, state.own, system.own_gradient, self.which)
+        shared = movable_numbers(self.problem.shared, state.shared, system.shared_gradient)
+        own = movable_numbers(self.problem.own, state.own, system.own_gradient, self.which)
         return shared & (not self.hold_shared), own
 
     def left(self, state: FitState, system: ArrowSystem) -> float:
         """Standard errors between the state and where its quadratic model has the minimum."""
-        return self._errors(system.expected_fall(*system.step(0.0, *self.free(state, system))), system)
+        return self.errors(system.expected_fall(*system.step(0.0, *self.free(state, system))), system)
 
     def _ended(self, state: FitState, system: ArrowSystem) -> tuple[FitStatus, str] | None:
         last = state.history[-1]
@@ -174,8 +192,8 @@ class RecordingFit:
             return FitStatus.CONVERGED, EXACTLY
         if last.left <= self.options.tolerance:
             return FitStatus.CONVERGED, LEFT.format(left=last.left)
-        if state.quiet and not (arrow := self._arrow(state, system)).whole:
-            left = self._errors(system.expected_fall(*arrow.step()), system)
+        if state.quiet and not (arrow := self.determined(state, system)).whole:
+            left = self.errors(system.expected_fall(*arrow.step()), system)
             if left <= self.options.tolerance:
                 return FitStatus.CONVERGED, VAGUELY.format(left=left, names=self._vague(arrow), far=last.left)
         if last.iteration - state.first >= self.options.iterations:
@@ -183,7 +201,7 @@ class RecordingFit:
         if state.quiet >= (self.options.patience or math.inf):
             return self._stalled(SLOW, last.left)
         if self._hopeless(state, last.left):
-            left = self._errors(system.expected_fall(*self._arrow(state, system).step()), system)
+            left = self.errors(system.expected_fall(*self.determined(state, system).step()), system)
             if self._hopeless(state, left):
                 return self._stalled(SLOW, left)
         return None
@@ -195,12 +213,12 @@ class RecordingFit:
             return False
         return state.history[-1 - patience].merit - last.merit < HOPELESS * left**2 * last.merit / self.size
 
-    def _arrow(self, state: FitState, system: ArrowSystem, damping: float = 0.0) -> DeterminedArrow:
+    def determined(self, state: FitState, system: ArrowSystem, damping: float = 0.0) -> DeterminedArrow:
         """Without what is vague at the state."""
         numbers = (self.problem.shared, self.problem.own), (state.shared, state.own)
         return DeterminedArrow(system, number_units(*numbers, self.free(state, system), self.which), damping)
 
-    def _errors(self, fall: float, system: ArrowSystem) -> float:
+    def errors(self, fall: float, system: ArrowSystem) -> float:
         """A fall of the merit in standard errors."""
         return math.sqrt(max(0.0, fall) * self.size / system.cost) if system.cost > 0 else 0.0
 
@@ -211,82 +229,21 @@ class RecordingFit:
 
         Else how the fit ended, and at a kink how far from the shared numbers (s,) one side has its minimum.
         """
-        refused, merit, left, kinked = "", system.cost, state.history[-1].left, False
-        near = left <= math.sqrt(sum(int(each.sum()) for each in self.free(state, system)))
-        kink = near and left > AT_KINK
-        model = KinkedModel(system, merit / self.size)
-        while state.damping <= state.stiffest:
-            shared, own, taken, length = self._moved(state, *self._direction(state, model, kinked))
-            recordings, priors = costs(self.problem, shared, own, self.which, self.loss, self.weights)
-            self.simulations += len(self.which)
-            if not near:
-                own, taken, recordings = self._retried(state, system, shared, own, taken, recordings)
-            trial, expected = float(recordings.sum()) + priors, model.expected_fall(*taken)
-            gain = (merit - trial) / expected if expected > 0 and math.isfinite(trial) else -math.inf
-            refused = "" if math.isfinite(trial) else self._names(recordings)
-            better = gain > (WORTH_AT_KINK if kinked else WORTH)
-            if better or (kinked and not refused):
-                there = self.system(shared, own)
-                if not there.finite:
-                    refused = self._names(there.costs)
-                elif better:
-                    return self._accept(state, there, shared, own, length, gain, began), there
-                else:
-                    model.add(there, *taken)
-                    arrow = self._arrow(state, system)
-                    open_ = self._errors(model.step(arrow)[2], system)
-                    if open_ <= max(AT_KINK, self.options.tolerance):
-                        away = arrow.step()[0] * self.problem.shared.scale
-                        return FitStatus.CONVERGED, KINK.format(left=open_, far=left), away
-                    if model.sides <= MOST_SIDES:
-                        continue
-                    kink, model = False, KinkedModel(system, merit / self.size)
-            kinked = kink
-            state = replace(state, damping=state.damping * state.growth, growth=2 * state.growth)
-        if refused:
-            return FitStatus.NOT_FINITE, TRIALS.format(names=refused)
-        if left <= math.sqrt(ROUNDING * self.size):
-            return FitStatus.CONVERGED, LEFT.format(left=left) + ", which the merit's last digits do not show"
-        return self._stalled(STALLED, left)
-
-    def _retried(
-        self, state: FitState, system: ArrowSystem, shared: Array, own: Array, taken: Step, reached: Array
-    ) -> tuple[Array, Step, Array]:
-        """Own numbers, step and costs (k,), with shorter steps of recordings that the whole step made worse.
-
-        Own numbers of a recording have no effect on others, so that one that leaves its model need not hold up all.
-        """
-        free, d_shared = self.free(state, system)[1], taken[0]
-        stiff = np.einsum("kii->ki", system.blocks[:, system.s :, system.s :]).max(axis=1, initial=0.0)
-        own, best = own.copy(), reached.copy()
-        for share in SHORTER:
-            excess = best - system.costs + system.expected_falls(d_shared, self._step_of(state, own))
-            off = ~(excess <= MODELLED * np.maximum(system.costs, best)) | ((best > system.costs) & (excess > 0))
-            some = np.flatnonzero(off)
-            if not some.size or not system.blocks.shape[1] > system.s:
-                break
-            steps = system.own_step(d_shared, state.damping + share * stiff, free)
-            tried = self._moved(state, d_shared, steps)[1]
-            trial = own.copy()
-            trial[self.which[some]] = tried[self.which[some]]
-            found, _ = costs(self.problem, shared, trial, self.which[some], self.loss, self.weights[some])
-            self.simulations += len(some)
-            lower = some[found < best[some]]
-            own[self.which[lower]] = trial[self.which[lower]]
-            best[lower] = found[np.isin(some, lower)]
-        return own, (d_shared, self._step_of(state, own)), best
-
-    def _step_of(self, state: FitState, own: Array) -> Array:
-        """(k, o): the step to own numbers (K, o), in scales."""
-        return np.asarray(((own - state.own) / self.problem.own.scale)[self.which])
-
-    def _direction(self, state: FitState, model: KinkedModel, kinked: bool) -> tuple[Array, Array]:
-        """The next step (s,) and (k, o) in scales: by the sides of a kink, without what is vague, or damped."""
-        if kinked:
-            return model.step(self._arrow(state, model.system, state.damping))[:2]
-        if state.quiet and not (arrow := self._arrow(state, model.system)).whole:
-            return arrow.step()
-        return model.system.step(state.damping, *self.free(state, model.system))
+        model = RecordedModel(self, state, system)
+        found, damped = descend(model, state)
+        if found is None:
+            if model.refused:
+                return FitStatus.NOT_FINITE, TRIALS.format(names=model.refused)
+            if model.left <= math.sqrt(ROUNDING * self.size):
+                return FitStatus.CONVERGED, LEFT.format(left=model.left) + ", which the merit's last digits do not show"
+            return self._stalled(STALLED, model.left)
+        if isinstance(found[0], FitStatus):
+            return found
+        moved, there = found
+        progress = Progress(state.mark, state.quiet).after(there.cost, PROGRESS / self.size)
+        mark, quiet = progress.mark, progress.quiet
+        taken = replace(damped, shared=moved.shared, own=moved.own, mark=mark, quiet=quiet)
+        return self.recorded(taken, there, moved.length, began), there
 
     @staticmethod
     def _stalled(reason: str, left: float) -> tuple[FitStatus, str]:
@@ -295,26 +252,26 @@ class RecordingFit:
             return FitStatus.CONVERGED, NEARLY.format(left=left)
         return FitStatus.STALLED, reason.format(left=left)
 
-    def _moved(self, state: FitState, d_shared: Array, d_own: Array) -> tuple[Array, Array, Step, float]:
-        """The next shared and own numbers after a step in scales within the bounds, the step taken, and its length."""
+    def moved(self, state: FitState, d_shared: Array, d_own: Array) -> Moved:
+        """After a step (s,), (k, o) in scales, within the bounds."""
         shared_of, own_of, which = self.problem.shared, self.problem.own, self.which
         shared = np.clip(state.shared + shared_of.scale * d_shared, shared_of.lower, shared_of.upper)
         own = state.own.copy()
         own[which] += own_of.scale[which] * d_own
         own = np.clip(own, own_of.lower, own_of.upper)
-        taken = (shared - state.shared) / shared_of.scale, self._step_of(state, own)
+        taken = (shared - state.shared) / shared_of.scale, self.step_of(state, own)
         length = math.sqrt(float(np.sum(taken[0] ** 2) + np.sum(taken[1] ** 2)))
-        return shared, own, taken, length
+        return Moved(shared, own, taken, length)
 
-    def _accept(
-        self, state: FitState, system: ArrowSystem, shared: Array, own: Array, step: float, gain: float, began: float
-    ) -> FitState:
-        """The state after a step; lambda falls with the gain ratio."""
-        damping = state.damping * max(LOOSEST, 1 - (2 * gain - 1) ** 3)
-        fell = system.cost < state.mark * (1 - PROGRESS / self.size)
-        mark, quiet = (system.cost, 0) if fell else (state.mark, state.quiet + 1)
-        taken = replace(state, shared=shared, own=own, damping=damping, growth=2.0, mark=mark, quiet=quiet)
-        return self._recorded(taken, system, step, began)
+    def step_of(self, state: FitState, own: Array) -> Array:
+        """(k, o): the step to own numbers (K, o), in scales."""
+        return np.asarray(((own - state.own) / self.problem.own.scale)[self.which])
+
+    def costs(self, shared: Array, own: Array, some: Ints | None = None) -> tuple[Array, float]:
+        """(k,) costs of the recordings ``which[some]``, by default all, and that of the shared priors."""
+        which, weights = (self.which, self.weights) if some is None else (self.which[some], self.weights[some])
+        self.simulations += len(which)
+        return costs(self.problem, shared, own, which, self.loss, weights)
 
     def _vague(self, arrow: DeterminedArrow) -> str:
         """Numbers that take part in a direction that is not determined."""
@@ -322,7 +279,7 @@ class RecordingFit:
         counts = zip(self.problem.own.names, arrow.vague_own.sum(axis=0), strict=True)
         return ", ".join([*shared, *(f"{name} of {count} recordings" for name, count in counts if count)])
 
-    def _names(self, recordings: Array) -> str:
+    def names(self, recordings: Array) -> str:
         """Of those whose costs are not finite."""
         bad = [
             self.problem.recordings[k] for k, cost in zip(self.which, recordings, strict=True) if not np.isfinite(cost)
@@ -330,9 +287,105 @@ class RecordingFit:
         return ", ".join(bad[:3]) + (f" and {len(bad) - 3} more" if len(bad) > 3 else "")
 
 
-def movable(parameters: FitParameters, values: Array, gradient: Array, which: Ints | None = None) -> Bools:
-    """False for a number at a bound that the gradient pushes against, and for one whose bounds are equal."""
+Taken = tuple[Moved, ArrowSystem] | tuple[FitStatus, str] | tuple[FitStatus, str, Array]
+"""Where a step leads and the system there, or how the fit ended."""
+
+
+class RecordedModel(LocalModel[Moved, Taken]):
+    """The merit of a fit about a state, for one iteration; see ``LocalModel``.
+
+    Far from the minimum own steps of recordings that leave their model are shortened. Near to it, where steps are
+    refused, the sides of a kink are collected, and steps are by all of them.
+
+    Attributes:
+        merit: at the state.
+        left: standard errors to the minimum of the quadratic model.
+        refused: names of recordings that were not finite after the last trial.
+    """
+
+    def __init__(self, fit: RecordingFit, state: FitState, system: ArrowSystem) -> None:
+        """Before the first trial."""
+        self.fit, self.state, self.system = fit, state, system
+        self.merit, self.left, self.refused = system.cost, state.history[-1].left, ""
+        self._free = fit.free(state, system)
+        self._near = self.left <= math.sqrt(sum(int(each.sum()) for each in self._free))
+        self._kink, self._kinked = self._near and self.left > AT_KINK, False
+        self._sides = KinkedModel(system, self.merit / fit.size)
+
+    def trial(self, damping: float) -> Trial[Moved]:
+        """Simulate all recordings after a step."""
+        fit = self.fit
+        moved = fit.moved(self.state, *self._direction(damping))
+        recordings, priors = fit.costs(moved.shared, moved.own)
+        if not self._near:
+            moved, recordings = self._retried(moved, recordings, damping)
+        merit = float(recordings.sum()) + priors
+        self.refused = "" if math.isfinite(merit) else fit.names(recordings)
+        return Trial(moved, merit, self._sides.expected_fall(*moved.taken))
+
+    def judge(self, moved: Moved, gain: float) -> Taken | Refusal:
+        """Take a step that lowers the merit enough; at a kink one that does not shows one more side."""
+        better = gain > (WORTH_AT_KINK if self._kinked else WORTH)
+        if better or (self._kinked and not self.refused):
+            there = self.fit.system(moved.shared, moved.own)
+            if not there.finite:
+                self.refused = self.fit.names(there.costs)
+            elif better:
+                return moved, there
+            elif (found := self._with_side(there, moved.taken)) is not None:
+                return found
+        self._kinked = self._kink
+        return Refusal.STIFFER
+
+    def _with_side(self, there: ArrowSystem, taken: Step) -> Taken | Refusal | None:
+        """Add the side of a refused step: whether a minimum is shown, or a step by one more side; None: too many."""
+        fit, model = self.fit, self._sides
+        model.add(there, *taken)
+        arrow = fit.determined(self.state, self.system)
+        left = fit.errors(model.step(arrow)[2], self.system)
+        if left <= max(AT_KINK, fit.options.tolerance):
+            away = arrow.step()[0] * fit.problem.shared.scale
+            return FitStatus.CONVERGED, KINK.format(left=left, far=self.left), away
+        if model.sides <= MOST_SIDES:
+            return Refusal.AGAIN
+        self._kink, self._sides = False, KinkedModel(self.system, self.merit / fit.size)
+        return None
+
+    def _direction(self, damping: float) -> Step:
+        """The next step: by the sides of a kink, without what is vague, or damped."""
+        fit, state, system = self.fit, self.state, self.system
+        if self._kinked:
+            return self._sides.step(fit.determined(state, system, damping))[:2]
+        if state.quiet and not (arrow := fit.determined(state, system)).whole:
+            return arrow.step()
+        return system.step(damping, *self._free)
+
+    def _retried(self, moved: Moved, reached: Array, damping: float) -> tuple[Moved, Array]:
+        """The same and its costs (k,), with shorter steps of recordings that the whole step made worse.
+
+        Own numbers of a recording have no effect on others, so that one that leaves its model need not hold up all.
+        """
+        fit, state, system = self.fit, self.state, self.system
+        (d_shared, _), own, best = moved.taken, moved.own.copy(), reached.copy()
+        stiff = np.einsum("kii->ki", system.blocks[:, system.s :, system.s :]).max(axis=1, initial=0.0)
+        for share in SHORTER:
+            excess = best - system.costs + system.expected_falls(d_shared, fit.step_of(state, own))
+            off = ~(excess <= MODELLED * np.maximum(system.costs, best)) | ((best > system.costs) & (excess > 0))
+            some = np.flatnonzero(off)
+            if not some.size or not system.blocks.shape[1] > system.s:
+                break
+            steps = system.own_step(d_shared, damping + share * stiff, self._free[1])
+            tried = fit.moved(state, d_shared, steps).own
+            trial = own.copy()
+            trial[fit.which[some]] = tried[fit.which[some]]
+            found, _ = fit.costs(moved.shared, trial, some)
+            lower = some[found < best[some]]
+            own[fit.which[lower]] = trial[fit.which[lower]]
+            best[lower] = found[np.isin(some, lower)]
+        return moved._replace(own=own, taken=(d_shared, fit.step_of(state, own))), best
+
+
+def movable_numbers(parameters: FitParameters, values: Array, gradient: Array, which: Ints | None = None) -> Bools:
+    """``movable`` of shared numbers (s,), or of the own numbers (K, o) of the recordings in ``which`` (k, o)."""
     some = slice(None) if which is None else which
-    at, lower, upper = values[some], parameters.lower[some], parameters.upper[some]
-    against = ((at <= lower) & (gradient > 0)) | ((at >= upper) & (gradient < 0))
-    return np.asarray(~against & (lower < upper))
+    return movable(values[some], parameters.lower[some], parameters.upper[some], gradient)

@@ -14,6 +14,7 @@ import numpy as np
 from symphys.identification.fitting.arrow import ArrowSystem
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.interface import IdentificationError, RecordedResiduals
+from symphys.solvers.core.levenberg_marquardt import Damped
 from symphys.types import Array
 
 NUMBERS: dict[str, Callable[[Any], Any]] = {
@@ -99,14 +100,12 @@ class FitStep:
     seconds: float
 
 
-@dataclass(frozen=True, eq=False)
-class FitState:
-    """Between two iterations: all that the fit needs to go on.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FitState(Damped):
+    """Between two iterations: all that the fit needs to go on. A damping of nan: the next iteration sets it.
 
     Attributes:
         shared, own: (s,) and (K, o).
-        damping, growth: lambda, and the factor on it after a step that is refused; nan: the next iteration sets lambda.
-        stiffest: a lambda beyond which the search for a step is given up.
         mark, quiet: the merit at the last progress, and iterations since.
         history: the iterations so far.
         noise: (q,) factors on the noise of each quantity under which the merit is computed; empty: none.
@@ -117,12 +116,9 @@ class FitState:
 
     shared: Array
     own: Array
-    damping: float
-    growth: float
-    stiffest: float
-    mark: float
-    quiet: int
-    history: tuple[FitStep, ...]
+    mark: float = math.inf
+    quiet: int = 0
+    history: tuple[FitStep, ...] = ()
     noise: tuple[float, ...] = ()
     horizon: float = 0.0
     first: int = 0
@@ -167,7 +163,7 @@ class FitOutcome:
 
 def begin(shared: Array, own: Array) -> FitState:
     """The state before the first iteration, at shared (s,) and own (K, o) within the bounds."""
-    return FitState(shared, own, math.nan, 2.0, math.nan, math.inf, 0, ())
+    return FitState(shared=shared, own=own, damping=math.nan, growth=2.0, stiffest=math.nan)
 
 
 def revive_state(saved: Mapping[str, Any], problem: RecordedResiduals) -> FitState:

@@ -23,7 +23,7 @@ import numpy as np
 import scipy.stats
 
 from symphys.identification.fitting.arrow import ArrowSystem, assemble
-from symphys.identification.fitting.levenberg_marquardt import movable
+from symphys.identification.fitting.levenberg_marquardt import movable_numbers
 from symphys.identification.fitting.remaining import DeterminedArrow, number_units
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.square_root import (
@@ -182,8 +182,8 @@ def uncertainty(
     """
     given = (problem, evaluated, shared, own, which, loss, np.ones(len(which)))
     slopes = assemble(*given)
-    free_shared = movable(problem.shared, shared, slopes.shared_gradient)
-    free_own = movable(problem.own, own, slopes.own_gradient, which)
+    free_shared = movable_numbers(problem.shared, shared, slopes.shared_gradient)
+    free_own = movable_numbers(problem.own, own, slopes.own_gradient, which)
     system = squares = slopes
     if loss.robust:
         share = float(np.mean(np.concatenate([loss.inside(r) for r, _, _ in evaluated])))
