@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.shooting import Expansion, Linearized
 from symphys.solvers.ddp.box_qp import solve_box_qp
-from symphys.solvers.ddp.knots import KnotStep
+from symphys.solvers.ddp.knots import AlignedKnots, KnotSteps
 from symphys.solvers.ddp.riccati import CostToGo, Feedback, LinearStep, riccati_recursion
-from symphys.types import Array, Ints
+from symphys.types import Array, Bools, Ints
 
 Selection = slice | Ints
 
@@ -27,38 +28,38 @@ class Bounds:
 
 
 @dataclass(frozen=True)
-class KnotGain:
-    """How the new knots of a step answer: ``ahead`` (w,), and ``back`` (w, n + o + s) of state, old knots, statics."""
-
-    ahead: Array
-    back: Array
-
-
-@dataclass(frozen=True)
 class Policy:
     """What a backward pass finds.
 
     Attributes:
-        gains: one for each step; None for steps that decide nothing.
+        gains: how the new knots of each step answer: ``ahead`` (w,), and ``back`` (w, n + o + s) of state, old knots
+            and static entries; None for steps that decide nothing.
         statics: (s,) the change of the static entries of z.
         first, second: the fall of the objective that is expected of a step of length a: a first + a^2 second.
-        gradient: (len(z),) of the augmented objective.
+        gradient: (len(z),) of the augmented objective; 0 where it was not asked for.
     """
 
-    gains: Sequence[KnotGain | None]
+    gains: Sequence[Feedback | None]
     statics: Array
     first: float
     second: float
     gradient: Array
 
+    @cached_property
+    def aligned(self) -> tuple[Array, Array]:
+        """(N, w) and (N, w, n): ``ahead`` and ``back`` of all steps, where their knots are aligned."""
+        gains = [gain for gain in self.gains if gain is not None]
+        return np.array([gain.ahead for gain in gains]), np.array([gain.back for gain in gains])
+
 
 def backward_pass(
     slopes: Iterable[Linearized],
     costs: Expansion,
-    knots: Sequence[KnotStep],
+    knots: KnotSteps,
     statics: Ints,
     bounds: Bounds,
     damping: float,
+    gradient: bool = True,
 ) -> Policy | None:
     """The policy about a motion; None where a Hessian is not positive definite.
 
@@ -69,12 +70,14 @@ def backward_pass(
         statics: (s,) entries of z.
         bounds: of z.
         damping: of Levenberg and Marquardt: added to the Hessian by knots, in units of their scales.
+        gradient: whether it is computed. It takes a costate; without, slopes are those of the whole cost to go.
 
     Source: Tassa, Erez, Todorov, Synthesis and stabilization of complex behaviors through online trajectory
     optimization, IROS 2012. Theirs has one slope of the cost to go; here it is a costate and what decisions add to
     that. Numbers of the state on which nothing later depends are left out of the recursion.
     """
-    made = _Steps(costs, knots, statics, bounds, damping)
+    costate = gradient or knots.aligned is None or bool(len(statics))
+    made = _Steps(costs, knots, statics, bounds, damping, costate)
     found = riccati_recursion(made.from_end(slopes), made.last())
     if found is None:
         return None
@@ -83,51 +86,68 @@ def backward_pass(
     if chosen is None:
         return None
     first, second = found.first + float(slope @ chosen), found.second + float(chosen @ curve @ chosen) / 2
-    gains = [made.gain(k, each) for k, each in enumerate(reversed(found.feedback))]
+    gains = made.gains(found.feedback[::-1])
     return Policy(gains, chosen, first, second, made.gradient)
 
 
 class _Steps:
     """The steps of a motion for the Riccati recursion; its states are (live tangent, old knots, static entries).
 
-    The numbers of a tangent are live where the step, or a cost, depends on them.
+    The numbers of a tangent are live where the step, or a cost, depends on them. Without a costate all are.
 
     Attributes:
         gradient: (len(z),) of the objective, once all steps were made.
     """
 
     def __init__(
-        self, costs: Expansion, knots: Sequence[KnotStep], statics: Ints, bounds: Bounds, damping: float
+        self, costs: Expansion, knots: KnotSteps, statics: Ints, bounds: Bounds, damping: float, costate: bool
     ) -> None:
         self.costs, self.knots, self.statics, self.bounds = costs, knots, statics, bounds
+        self._aligned = None if len(statics) else knots.aligned
+        self._with_costate = costate
         self.gradient = np.zeros(len(bounds.scale))
         self._damping = damping / bounds.scale**2
         self._costate = costs.x[-1]
-        self._asked = np.diagonal(costs.xx, axis1=1, axis2=2) != 0  # others are 0 with it: xx is positive semidefinite
-        self._asked |= costs.sx.any(axis=1)
-        self._asked[:-1] |= costs.ux.any(axis=1)
-        self._asked[1:] |= costs.uy.any(axis=1)
         self._mixed = bool(costs.ux.any()), bool(costs.uy.any())
-        last = _selection(self._asked[-1])
+        if self._aligned is not None:
+            self._own_slopes, self._own_curves = self._aligned_costs(self._aligned)
+            self._room = [each[self._aligned.new] for each in (bounds.down, bounds.up, self._damping)]
+        self._asked: Bools | None = self._in_costs() if costate else None
+        last = slice(0, costs.x.shape[1]) if self._asked is None else _selection(self._asked[-1])
         self._lives = [last] * (len(knots) + 1)
         self._start = np.zeros((costs.x.shape[1], len(statics)))
+
+    def _in_costs(self) -> Bools:
+        """(N + 1, n): numbers of the tangents on which some cost's curvature depends; the costate has the slopes."""
+        costs = self.costs
+        asked: Bools = np.diagonal(costs.xx, axis1=1, axis2=2) != 0  # others are 0 with it: xx is positive semidefinite
+        asked |= costs.sx.any(axis=1)
+        asked[:-1] |= costs.ux.any(axis=1)
+        asked[1:] |= costs.uy.any(axis=1)
+        return asked
 
     def last(self) -> CostToGo:
         """Of the state after the last step, less its costate."""
         live, s = self._lives[-1], len(self.statics)
         curve, by_statics = self.costs.xx[-1][live][:, live], self.costs.sx[-1][:, live]
-        whole = np.block([[curve, by_statics.T], [by_statics, np.zeros((s, s))]])
-        return CostToGo(np.zeros(len(whole)), whole)
+        if s:
+            curve = np.block([[curve, by_statics.T], [by_statics, np.zeros((s, s))]])
+        return CostToGo(np.zeros(len(curve)) if self._with_costate else self.costs.x[-1][live], curve)
 
     def from_end(self, slopes: Iterable[Linearized]) -> Iterator[LinearStep]:
         """The steps, the last one first."""
         end = len(self.knots)
         for run in slopes:
             first = end - len(run.a)
-            live = _selection((run.a != 0).any(axis=(0, 1)) | self._asked[first:end].any(axis=0))
-            self._lives[first:end] = [live] * len(run.a)
-            for k in reversed(range(first, end)):
-                yield self._step(k, run.a[k - first], run.b[k - first], run.c[k - first])
+            if self._asked is not None:
+                in_steps = run.a.reshape(-1, run.a.shape[2]).any(axis=0)
+                live = _selection(np.asarray(in_steps | self._asked[first:end].any(axis=0)))
+                self._lives[first:end] = [live] * len(run.a)
+            if self._aligned is not None:
+                yield from self._run(first, end, run, self._aligned)
+            else:
+                for k in reversed(range(first, end)):
+                    yield self._step(k, run.a[k - first], run.b[k - first], run.c[k - first])
             end, self._start = first, run.start
         self.gradient[self.statics] += self.costs.s + self._start.T @ self._costate
 
@@ -137,7 +157,15 @@ class _Steps:
         slope = cost.slope @ start + self._start.T @ self._costate + self.costs.s
         return slope, start.T @ cost.curve @ start + self.costs.ss
 
-    def gain(self, k: int, feedback: Feedback | None) -> KnotGain | None:
+    def gains(self, feedback: Sequence[Feedback | None]) -> Sequence[Feedback | None]:
+        """The feedback of all steps by the whole tangent."""
+        n = self.costs.x.shape[1]
+        lives = {id(each): each for each in self._lives[:-1]}.values()
+        if self._aligned is not None and all(_is_whole(each, n) for each in lives):
+            return feedback
+        return [self._gain(k, each) for k, each in enumerate(feedback)]
+
+    def _gain(self, k: int, feedback: Feedback | None) -> Feedback | None:
         """The feedback of step k by the whole tangent."""
         if feedback is None:
             return None
@@ -145,7 +173,54 @@ class _Steps:
         back = np.zeros((len(feedback.ahead), n + beside))
         live = feedback.back.shape[1] - beside
         back[:, :n][:, self._lives[k]], back[:, n:] = feedback.back[:, :live], feedback.back[:, live:]
-        return KnotGain(feedback.ahead, back)
+        return Feedback(feedback.ahead, back)
+
+    def _run(self, first: int, end: int, run: Linearized, knots: AlignedKnots) -> Iterator[LinearStep]:
+        """A run of steps whose knots are their own, without static entries, all in arrays; the last step first."""
+        steps, n = slice(first, end), run.a.shape[1]
+        after = np.concatenate([run.a, run.b if knots.plain else run.b @ knots.weights[steps]], axis=2)
+        slopes, curves = self._own_slopes[steps], self._own_curves[steps]
+        if self._with_costate:
+            slopes = self._by_costate(first, run, knots.weights[steps])
+            self.gradient[knots.new[steps]] = slopes[:, n:]
+        if self._mixed[1]:
+            crossed = (knots.weights[steps].transpose(0, 2, 1) @ self.costs.uy[steps]) @ after
+            curves = curves.copy()
+            curves[:, n:] += crossed
+            curves[:, :, n:] += crossed.transpose(0, 2, 1)
+        live, later = self._lives[first], self._lives[end]
+        through: Array | list[Array] = after
+        if not _is_whole(live, n):
+            columns = np.concatenate([np.arange(n)[live], np.arange(n, after.shape[2])])
+            after, slopes, curves = after[:, :, columns], slopes[:, columns], curves[:, columns][:, :, columns]
+            through = [*after[:-1, live], after[-1, later]]
+        elif not _is_whole(later, n):
+            through = [*after[:-1], after[-1, later]]
+        parts = (through, slopes, curves, *(each[steps] for each in self._room))
+        yield from map(LinearStep, *(each[::-1] for each in parts))
+
+    def _aligned_costs(self, knots: AlignedKnots) -> tuple[Array, Array]:
+        """Slopes (N, n + w) and curvatures (N, n + w, n + w) of all steps' costs, by the state and the knots."""
+        costs, n, across = self.costs, self.costs.x.shape[1], knots.weights.transpose(0, 2, 1)
+        by_knots = costs.u if knots.plain else (costs.u[:, None] @ knots.weights)[:, 0]
+        slopes = np.concatenate([costs.x[:-1], by_knots], axis=1)
+        curves = np.zeros((*slopes.shape, slopes.shape[1]))
+        curves[:, :n, :n] = costs.xx[:-1]
+        curves[:, n:, n:] = costs.uu if knots.plain else across @ costs.uu @ knots.weights
+        if self._mixed[0]:
+            curves[:, n:, :n] = costs.ux if knots.plain else across @ costs.ux
+            curves[:, :n, n:] = curves[:, n:, :n].transpose(0, 2, 1)
+        return slopes, curves
+
+    def _by_costate(self, first: int, run: Linearized, weights: Array) -> Array:
+        """(K, n + w) slopes of a run of steps by its knots, less those by the state, which the costate has."""
+        costs, by_inputs = self.costs, np.empty((len(run.a), run.b.shape[2]))
+        for k in reversed(range(len(run.a))):
+            by_inputs[k] = costs.u[first + k] + self._costate @ run.b[k]
+            self._costate = costs.x[first + k] + self._costate @ run.a[k]
+        slopes = np.zeros((len(run.a), run.a.shape[1] + weights.shape[2]))
+        slopes[:, run.a.shape[1] :] = (by_inputs[:, None] @ weights)[:, 0]
+        return slopes
 
     def _step(self, k: int, a: Array, b: Array, c: Array) -> LinearStep:
         """The step, and the costs of the state and the inputs before it; columns are (state, old, statics, new)."""
@@ -201,6 +276,11 @@ def _selection(chosen: NDArray[np.bool_]) -> Selection:
         return slice(0, 0)
     first, last = int(numbers[0]), int(numbers[-1])
     return slice(first, last + 1) if last - first + 1 == len(numbers) else numbers
+
+
+def _is_whole(selection: Selection, n: int) -> bool:
+    """Whether all of n numbers are selected."""
+    return isinstance(selection, slice) and selection == slice(0, n)
 
 
 def _places(n: int, o: int, s: int, new: int) -> Selection:

@@ -7,22 +7,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symphys.shooting import AffinePolicy, StagedMotion, StagedProblem
-from symphys.solvers.ddp.backward_pass import KnotGain, Policy
+from symphys.shooting import AffinePolicy, Followed, StagedMotion, StagedProblem
+from symphys.solvers.ddp.backward_pass import Policy
 from symphys.solvers.ddp.knots import KnotStep, PaddedKnots
+from symphys.solvers.ddp.riccati import Feedback
 from symphys.types import Array
 
 
 class MotionBatch(NamedTuple):
-    """A batch: ``z`` (B, len(z)), ``x`` (B, N + 1, nx), ``u`` (B, N, m)."""
+    """A batch: ``z`` (B, len(z)), ``x`` (B, N + 1, nx), ``u`` (B, N, m), and ``merit`` (B,) where it is known."""
 
     z: Array
     x: Array
     u: Array
+    merit: Array | None = None
 
     def motion(self, row: int, smoothing: float) -> StagedMotion:
         """One of them."""
-        return StagedMotion(self.z[row], self.x[row], self.u[row], smoothing)
+        return StagedMotion(self.z[row], self.x[row], self.u[row], smoothing, gapless=True)
 
 
 def forward_pass(
@@ -35,18 +37,23 @@ def forward_pass(
     lower, upper = knots.lower, knots.upper
     z = np.repeat(motion.z[None], len(lengths), axis=0)
     statics = problem.statics
-    z[:, statics] = np.clip(motion.z[statics] + lengths[:, None] * policy.statics, lower[statics], upper[statics])
-    found = problem.follow(affine(motion, policy, knots), motion.z, z, lengths, motion.smoothing)
-    if found is None:
-        return _step_by_step(problem, motion, policy, knots, lengths, z)
-    x, u, new = found
-    chosen = knots.new < len(motion.z)
-    z[:, knots.new[chosen]] = new[:, chosen]
-    return MotionBatch(z, x, u)
+    if len(statics):
+        z[:, statics] = np.clip(motion.z[statics] + lengths[:, None] * policy.statics, lower[statics], upper[statics])
+    x, u, new, merit = follow_policy(problem, affine(motion, policy, knots), motion.z, z, lengths, motion.smoothing)
+    if knots.steps.aligned is not None:
+        z[:, knots.new] = new
+    else:
+        chosen = knots.new < len(motion.z)
+        z[:, knots.new[chosen]] = new[:, chosen]
+    return MotionBatch(z, x, u, merit)
 
 
 def affine(motion: StagedMotion, policy: Policy, knots: PaddedKnots) -> AffinePolicy:
     """The policy in arrays."""
+    lower, upper = knots.bounds
+    if knots.steps.aligned is not None and not len(policy.statics):
+        about = motion.x[:-1], np.zeros(knots.old.shape), motion.z[knots.new]
+        return AffinePolicy(*about, *policy.aligned, knots.weights, knots.keep, lower, upper)
     z, (count, o), s = np.append(motion.z, 0.0), knots.old.shape, len(policy.statics)
     n = next((gain.back.shape[1] - len(step.old) - s for gain, step in _pairs(policy, knots) if gain is not None), 0)
     ahead, back = np.zeros(knots.new.shape), np.zeros((*knots.new.shape, n + o + s))
@@ -55,30 +62,38 @@ def affine(motion: StagedMotion, policy: Policy, knots: PaddedKnots) -> AffinePo
             rows, end = len(gain.ahead), n + len(step.old)
             ahead[k, :rows], back[k, :rows, :end] = gain.ahead, gain.back[:, :end]
             back[k, :rows, n + o :] = gain.back[:, end:]
-    lower, upper = knots.lower[knots.new], knots.upper[knots.new]
     parts = motion.x[:count], z[knots.old], z[knots.new], ahead, back, knots.weights, knots.keep
     return AffinePolicy(*parts, lower, upper)
 
 
-def _pairs(policy: Policy, knots: PaddedKnots) -> Iterator[tuple[KnotGain | None, KnotStep]]:
+def _pairs(policy: Policy, knots: PaddedKnots) -> Iterator[tuple[Feedback | None, KnotStep]]:
     return zip(policy.gains, knots.steps, strict=True)
 
 
-def _step_by_step(
-    problem: StagedProblem, motion: StagedMotion, policy: Policy, knots: PaddedKnots, lengths: Array, z: Array
-) -> MotionBatch:
-    """The motions from z (B, len(z)), whose static entries hold."""
-    lower, upper, statics = knots.lower, knots.upper, problem.statics
-    x = np.empty((len(lengths), problem.steps + 1, problem.state_size))
-    u = np.empty((len(lengths), problem.steps, problem.input_size))
+def follow_policy(
+    problem: StagedProblem,
+    policy: AffinePolicy,
+    about: Array,
+    z: Array,
+    lengths: Array,
+    smoothing: float,
+    shares: Array | float = 1.0,
+) -> Followed:
+    """The same as ``StagedProblem.follow``, step by step where that is not compiled."""
+    found = problem.follow(policy, about, z, lengths, smoothing, shares)
+    if found is not None:
+        return found
+    count, (steps, inputs, _), nx = len(lengths), policy.weights.shape, problem.state_size
+    x, u, new = (np.empty((count, *sizes)) for sizes in ((steps + 1, nx), (steps, inputs), policy.new.shape))
+    off_statics = z[:, problem.statics] - about[problem.statics]
+    held, share = np.repeat(policy.old[:1], count, axis=0), np.reshape(shares, (-1, 1))
     x[:, 0] = problem.start(z)
-    for k, (gain, knot) in enumerate(_pairs(policy, knots)):
-        if gain is not None:
-            off = problem.difference(np.repeat(motion.x[None, k], len(lengths), axis=0), x[:, k])
-            parts = (off, z[:, knot.old] - motion.z[knot.old], z[:, statics] - motion.z[statics])
-            answer = np.concatenate(parts, axis=1) @ gain.back.T
-            wanted = motion.z[knot.new] + lengths[:, None] * gain.ahead + answer
-            z[:, knot.new] = np.clip(wanted, lower[knot.new], upper[knot.new])
-        u[:, k] = z[:, knot.acting] @ knot.weights.T
-        x[:, k + 1] = problem.step(k, x[:, k], u[:, k], z, motion.smoothing)
-    return MotionBatch(z, x, u)
+    for k in range(steps):
+        off = problem.difference(np.repeat(policy.x[None, k], count, axis=0), x[:, k])
+        answer = np.concatenate([off, held - policy.old[k], off_statics], axis=1) @ policy.back[k].T
+        wanted = policy.new[k] + lengths[:, None] * policy.ahead[k] + share * answer
+        new[:, k] = np.clip(wanted, policy.lower[k], policy.upper[k])
+        acting = np.concatenate([held, new[:, k]], axis=1)
+        u[:, k], held = acting @ policy.weights[k].T, acting @ policy.keep[k].T
+        x[:, k + 1] = problem.step(k, x[:, k], u[:, k], z, smoothing)
+    return x, u, new, None

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,6 +33,35 @@ class KnotStep:
         return np.concatenate([self.old, self.new])
 
 
+class KnotSteps(list[KnotStep]):
+    """The knots of all steps."""
+
+    @cached_property
+    def aligned(self) -> AlignedKnots | None:
+        """All knots in arrays, where each acts in one step and all steps have equally many; else None."""
+        widths = {len(each.new) for each in self}
+        if any(len(each.old) for each in self) or len(widths) != 1 or widths == {0}:
+            return None
+        weights = np.array([each.weights for each in self])
+        plain = weights.shape[1] == weights.shape[2] and bool((weights == np.eye(weights.shape[1])).all())
+        return AlignedKnots(np.array([each.new for each in self]), weights, plain)
+
+
+@dataclass(frozen=True)
+class AlignedKnots:
+    """Knots of which each acts in one step, w in each.
+
+    Attributes:
+        new: (N, w) entries of z.
+        weights: (N, m, w): u = weights @ z[new].
+        plain: whether the inputs are the knots.
+    """
+
+    new: Ints
+    weights: Array
+    plain: bool
+
+
 @dataclass(frozen=True)
 class PaddedKnots:
     """The knots of all steps in arrays: o old ones at most and w new ones, with zeros where a step has fewer.
@@ -45,7 +74,7 @@ class PaddedKnots:
         lower, upper: (len(z) + 1,) bounds; the last is of what is none.
     """
 
-    steps: Sequence[KnotStep]
+    steps: KnotSteps
     old: Ints
     new: Ints
     weights: Array
@@ -54,7 +83,7 @@ class PaddedKnots:
     upper: Array
 
     @staticmethod
-    def of(steps: Sequence[KnotStep], lower: Array, upper: Array) -> PaddedKnots:
+    def of(steps: KnotSteps, lower: Array, upper: Array) -> PaddedKnots:
         """Of steps, with bounds of z (len(z),)."""
         count, none = len(steps), len(lower)
         o, w = (max(len(getattr(each, name)) for each in steps) for name in ("old", "new"))
@@ -67,8 +96,13 @@ class PaddedKnots:
             keep[k, np.arange(len(step.kept)), places[step.kept]] = 1.0
         return PaddedKnots(steps, old, new, weights, keep, np.append(lower, 0.0), np.append(upper, 0.0))
 
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """(N, w) each, of the new knots."""
+        return self.lower[self.new], self.upper[self.new]
 
-def knot_steps(problem: StagedProblem) -> list[KnotStep]:
+
+def knot_steps(problem: StagedProblem) -> KnotSteps:
     """One for each step; knots that never act are in none."""
     steps, m = problem.steps, problem.input_size
     weights = problem.weights.tocsr()
@@ -79,7 +113,7 @@ def knot_steps(problem: StagedProblem) -> list[KnotStep]:
         first[column] = min(k, first.get(column, k))
         last[column] = max(k, last.get(column, k))
     new = [np.array(sorted(c for c, k in first.items() if k == step), np.int64) for step in range(steps)]
-    found: list[KnotStep] = []
+    found = KnotSteps()
     old = np.zeros(0, np.int64)
     for k in range(steps):
         acting = np.concatenate([old, new[k]])

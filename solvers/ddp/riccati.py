@@ -86,36 +86,44 @@ def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSol
             found.append(None)
             continue
         rest = len(total) - len(damping)
+        if len(damping) == 1:  # the same with numbers in place of matrices of one row
+            push, stiff, by_state = float(total[rest]), float(whole[rest, rest]), whole[rest, :rest]
+            curvature = stiff + float(damping[0])
+            if not curvature > 0:
+                return None
+            wanted, low, high = -push / curvature, float(lower[0]), float(upper[0])
+            free = low <= wanted <= high
+            step = wanted if free else min(max(wanted, low), high)
+            back = by_state / -curvature if free else np.zeros_like(by_state)
+            first, second = first + push * step, second + step * (stiff * step) / 2
+            slope = total[:rest] + (stiff * step + push) * back + step * by_state
+            curve = whole[:rest, :rest] + (by_state - damping * back)[:, None] * back
+            curve = 0.5 * (curve + curve.T)
+            found.append(Feedback(np.array([step]), back[None]))
+            continue
         by_decisions, hessian, cross = total[rest:], whole[rest:, rest:], whole[rest:, :rest]
         made = _decided(hessian, damping, by_decisions, cross, lower, upper)
         if made is None:
             return None
         ahead, back = made
+        found.append(made)
         along = hessian @ ahead
         first, second = first + float(by_decisions @ ahead), second + float(ahead @ along) / 2
         slope = total[:rest] + (along + by_decisions) @ back + ahead @ cross
         # back' hessian back = -back' cross - back' damping back, since back solves the damped system
         curve = whole[:rest, :rest] + (cross - damping[:, None] * back).T @ back
         curve = 0.5 * (curve + curve.T)
-        found.append(made)
     return RiccatiSolution(found, first, second, CostToGo(slope, curve))
 
 
 def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: Array, upper: Array) -> Feedback | None:
     """The best decisions within bounds, and how those that no bound holds answer the state."""
-    if len(slope) == 1:
-        curvature = hessian[0, 0] + damping[0]
-        if not curvature > 0:
-            return None
-        wanted = -slope[0] / curvature
-        if lower[0] <= wanted <= upper[0]:
-            return Feedback(np.array([wanted]), cross / -curvature)
-        return Feedback(np.array([min(max(wanted, lower[0]), upper[0])]), np.zeros_like(cross))
-    damped = hessian + np.diag(damping)
+    damped = hessian.copy()
+    damped.ravel()[:: len(slope) + 1] += damping
     factor, fault = lapack.dpotrf(damped, lower=1, clean=0)
     if fault:
         return None
-    both = lapack.dpotrs(factor, np.column_stack([slope, cross]), lower=1)[0]
+    both = lapack.dpotrs(factor, np.concatenate([slope[:, None], cross], axis=1), lower=1)[0]
     ahead = -both[:, 0]
     if (ahead >= lower).all() and (ahead <= upper).all():
         return Feedback(ahead, -both[:, 1:])

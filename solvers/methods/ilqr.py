@@ -20,14 +20,13 @@ from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Counts, Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.ddp.backward_pass import Bounds, Policy, backward_pass
-from symphys.solvers.ddp.forward_pass import MotionBatch, forward_pass
+from symphys.solvers.ddp.backward_pass import Policy
+from symphys.solvers.ddp.forward_pass import MotionBatch
 from symphys.solvers.ddp.gains import gains_about
-from symphys.solvers.ddp.knots import KnotStep, PaddedKnots, knot_steps
+from symphys.solvers.ddp.iteration import LENGTHS, BestMotion, LocalExpansion
+from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
 from symphys.types import Array
 
-LENGTHS = 0.5 ** np.arange(8.0)
-"""Step lengths that are tried side by side."""
 WORTH = 1e-4
 """A step must reach this share of the expected fall."""
 STIFFEST, SOFTEST = 1e12, 1e-12
@@ -112,14 +111,9 @@ class Ilqr(Method[IlqrState]):
         return make()
 
     @cached_property
-    def knots(self) -> list[KnotStep]:
-        """Of the steps."""
-        return knot_steps(self.staged)
-
-    @cached_property
-    def padded(self) -> PaddedKnots:
-        """The same with the bounds of z."""
-        return PaddedKnots.of(self.knots, self.evaluator.lower, self.evaluator.upper)
+    def knots(self) -> PaddedKnots:
+        """Of the steps, with the bounds of z."""
+        return PaddedKnots.of(knot_steps(self.staged), self.evaluator.lower, self.evaluator.upper)
 
     def init(self) -> Iteration[IlqrState] | StopReason:
         """Roll the guess out."""
@@ -137,23 +131,20 @@ class Ilqr(Method[IlqrState]):
 
     def step(self, state: IlqrState) -> Iteration[IlqrState] | StopReason:
         """Linearise, then make the best of the steps that the policy suggests; lambda grows until there is one."""
-        motion = self._motion(state.z)
-        self._runs(motion)
-        costs = self.staged.expand(motion, state.multipliers, state.penalties)
+        motion, limits = self._motion(state.z), (state.multipliers, state.penalties)
+        about = LocalExpansion(self.staged, motion, limits, self.knots, self.evaluator.scale, self._runs(motion))
         self.evaluator.counter.add(Counts.of_slopes(self.staged.tangent_size))
         damping, growth = state.damping, state.growth
         while damping <= STIFFEST:
-            policy = backward_pass(
-                self._runs(motion), costs, self.knots, self.staged.statics, self._room(state.z), damping
-            )
+            policy = about.policy(damping)
             if policy is not None:
                 if -policy.first <= self.options.tolerance * (1 + abs(state.value)):
                     return self._settle(state, policy)
-                taken = self._search(state, motion, policy)
+                taken = self._search(state, about, policy)
                 if taken is not None:
-                    z, value, length = taken
-                    softer = damping / growth if length > 0.3 else damping
-                    after = replace(state, z=z, value=value, damping=max(SOFTEST, softer), growth=2.0)
+                    softer = damping / growth if taken.length > 0.3 else damping
+                    z, damping = taken.motion.z.copy(), max(SOFTEST, softer)
+                    after = replace(state, z=z, value=taken.value, damping=damping, growth=2.0)
                     return self._advance(state, after, policy)
             damping, growth = damping * growth, 2 * growth
         return StopReason(Status.STALLED, STALLED)
@@ -206,18 +197,14 @@ class Ilqr(Method[IlqrState]):
         after = replace(after, value=value, progress=Progress(value))
         return self._iteration(point, after, norm, 0.0)
 
-    def _search(self, state: IlqrState, motion: StagedMotion, policy: Policy) -> tuple[Array, float, float] | None:
-        """The lowest of the motions of all step lengths: z, value and length; None where none is low enough."""
-        motions = forward_pass(self.staged, motion, policy, self.padded, LENGTHS)
+    def _search(self, state: IlqrState, about: LocalExpansion, policy: Policy) -> BestMotion | None:
+        """The lowest of the motions of all step lengths; None where none is low enough."""
+        best = about.search(policy, lambda motions: self._values(state, motions))
         self.evaluator.counter.add(Counts(rollouts=len(LENGTHS)))
-        values = self._values(state, motions)
-        values[~np.isfinite(values)] = math.inf
-        best = int(values.argmin())
-        expected = -(LENGTHS * policy.first + LENGTHS**2 * policy.second)[best]
-        if state.value - values[best] < WORTH * max(expected, 0.0) or values[best] >= state.value:
+        if state.value - best.value < WORTH * max(best.expected, 0.0) or best.value >= state.value:
             return None
-        self._kept = motions.motion(best, motion.smoothing)
-        return motions.z[best].copy(), float(values[best]), float(LENGTHS[best])
+        self._kept = best.motion
+        return best
 
     def _motion(self, z: Array) -> StagedMotion:
         """The motion of z; that of the last step is known."""
@@ -243,11 +230,11 @@ class Ilqr(Method[IlqrState]):
 
     def _limits(self, motions: MotionBatch) -> Array:
         """(B, c)."""
-        return self.staged.measure(*motions)[1]
+        return self.staged.measure(*motions[:3])[1]
 
     def _values(self, state: IlqrState, motions: MotionBatch) -> Array:
         """(B,) the augmented objective."""
-        objective, limits = self.staged.measure(*motions)
+        objective, limits = self.staged.measure(*motions[:3])
         beyond = self._beyond(limits, state.multipliers, state.penalties)
         return np.asarray(objective + np.sum(state.penalties * beyond**2, axis=1) / 2)
 
@@ -255,10 +242,6 @@ class Ilqr(Method[IlqrState]):
         """How far limits, shifted by their multipliers, lie outside of their bounds."""
         moved = limits + multipliers / penalties
         return np.asarray(moved - np.clip(moved, self.staged.lower, self.staged.upper))
-
-    def _room(self, z: Array) -> Bounds:
-        evaluator = self.evaluator
-        return Bounds(evaluator.lower - z, evaluator.upper - z, evaluator.scale)
 
     def _iteration(self, point: Point, state: IlqrState, norm: float, step: float) -> Iteration[IlqrState]:
         return Iteration(state, point, norm, step)

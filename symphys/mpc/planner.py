@@ -3,30 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symphys.codegen import processors
 from symphys.errors import Issue, ProblemError, SymphysError
-from symphys.mpc.horizon_costs import HorizonCosts, QuadraticCosts
 from symphys.mpc.model import horizon_of, receding_model
 from symphys.problem import Problem
-from symphys.shooting import AffinePolicy
-from symphys.solvers.ddp.riccati import CostToGo, LinearStep, riccati_recursion
-from symphys.transcription.rollout import Rollout, symbolic_rollout
-from symphys.transcription.staged.linearized_step import LinearizedStep
-from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes
-from symphys.transcription.staged.stage_terms import StageSymbols, motion_sums, stage_terms
-from symphys.transcription.staged.tangent import Tangent
+from symphys.shooting import AffinePolicy, StagedMotion
+from symphys.solvers.ddp.forward_pass import MotionBatch, follow_policy
+from symphys.solvers.ddp.iteration import LocalExpansion
+from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
+from symphys.transcription.rollout import symbolic_rollout
+from symphys.transcription.staged.staged_problem import RolloutStages
 from symphys.types import Array
 
-LENGTHS = 0.5 ** np.arange(8.0)
-"""Step lengths that are tried side by side."""
 SHARES = np.array([1.0, 0.5, 0.0])
 """Of the feedback with which a shifted plan is followed: the cheapest counts. Gains may fail across an impact."""
 GROWTH, SHRINK, STIFFEST = 8.0, 0.5, 1e8
@@ -98,40 +91,36 @@ class Planner:
         self.problem, self.horizon = problem, horizon_of(problem)
         self.model = receding_model(problem)
         self.rollout = symbolic_rollout(self.model)
-        self.tangent = Tangent(self.rollout)
-        symbols = StageSymbols(self.rollout, self.tangent, motion_sums(self.rollout))
-        self._step = LinearizedStep(
-            self.rollout, self.tangent, threads=threads, exact=self.horizon.smoothing == 0, parameters=False
-        )
-        self._order = decision_order(self.model)
-        stacked = {
-            key: np.concatenate([getattr(each, key) for each in self.model.variables])[self._order]
-            for key in ("guess", "lower", "upper", "scale")
-        }
-        self._guess = stacked["guess"]
-        self.lower, self.upper, self.scale = (stacked[key][0] for key in ("lower", "upper", "scale"))
-        self.start, self.p, self.weights = begun(self.rollout, self._order)
+        exact = self.horizon.smoothing == 0
         try:
-            terms = stage_terms(symbols)
+            self.stages = RolloutStages(self.rollout, threads=threads, exact=exact, priced=True)
         except SymphysError as error:  # of a formula whose sizes do not fit
             text = f"{error}; in a plan the name of a variable is its value at one instant"
             raise ProblemError(problem.file, [Issue("mpc", text)]) from None
-        self._costs = HorizonCosts(symbols, self.tangent, terms, self.weights)
-        steps, (inputs, width) = self.rollout.steps, self.weights.shape
-        self._rolled = PolicyRollout(self._step, PolicySizes(0, width, inputs), self._costs)
-        self._bounds = np.tile(self.lower, (steps, 1)), np.tile(self.upper, (steps, 1))
-        self._same = np.tile(self.weights, (steps, 1, 1)), np.zeros((steps, 0, width))
-        self.description = self._step.description
-        self._whole_inputs = not np.array_equal(self.weights, np.eye(len(self.weights)))
+        self.tangent = self.stages.tangent
+        guess, lower, upper, self._scale = (
+            np.concatenate([getattr(each, key) for each in self.model.variables])
+            for key in ("guess", "lower", "upper", "scale")
+        )
+        self._knots, self._z = PaddedKnots.of(knot_steps(self.stages), lower, upper), guess
+        aligned = self._knots.steps.aligned
+        assert aligned is not None, "each control has a knot a step"
+        self._aligned, self.weights = aligned, aligned.weights[0]
+        self.lower, self.upper, self.scale = (each[aligned.new[0]] for each in (lower, upper, self._scale))
+        Z = guess[None]
+        self.start: Array = self.stages.start(Z)[0]
+        self.p: Array = self.stages.parameters(Z)[0]
+        self._limits = np.zeros(len(self.stages.lower)), 2 * self.stages.penalties
+        self.description = self.stages.description
         self.damping = self.horizon.damping
         self.threads = processors() if threads is None else threads
 
     def first(self, x: Array, time: float) -> RecedingPlan:
         """A plan from the guess, after the iterations that come before the first tick."""
         self.damping = self.horizon.damping
-        steps, zeros = self.rollout.steps, np.zeros_like(self._guess)
-        gains = np.zeros((*zeros.shape, self.tangent.size))
-        policy = PlanPolicy(np.tile(x, (steps, 1)), self._guess, zeros, gains)
+        guess = self._z[self._aligned.new]
+        gains = np.zeros((*guess.shape, self.tangent.size))
+        policy = PlanPolicy(np.tile(x, (len(guess), 1)), guess, np.zeros_like(guess), gains)
         return self._improved(policy, x, time, self.horizon.first_iterations)
 
     def next(self, plan: RecedingPlan, x: Array, time: float) -> RecedingPlan:
@@ -145,10 +134,15 @@ class Planner:
 
         ``lengths``, ``shares``: (B,) of the steps and of the feedback.
         """
-        none = np.zeros((len(policy.v), 0))
-        about = AffinePolicy(policy.x, none, *policy[1:], *self._same, *self._bounds)
-        found = self._rolled(x, self.p, about, lengths, self.horizon.smoothing, time, shares=shares)
-        return found.x, found.new, found.cost
+        self.stages.begin(x, time)
+        knots, z = self._knots, np.repeat(self._z[None], len(lengths), axis=0)
+        none, bounds = np.zeros(knots.old.shape), knots.bounds
+        about = AffinePolicy(policy.x, none, *policy[1:], knots.weights, knots.keep, *bounds)
+        states, inputs, new, merit = follow_policy(
+            self.stages, about, self._z, z, lengths, self.horizon.smoothing, shares
+        )
+        z[:, self._aligned.new] = new
+        return states, new, self._costs(MotionBatch(z, states, inputs, merit))
 
     def _improved(self, policy: PlanPolicy, x: Array, time: float, iterations: int) -> RecedingPlan:
         """Follow the policy from the state, then iterate."""
@@ -165,90 +159,35 @@ class Planner:
         return plan
 
     def _iterate(self, plan: RecedingPlan) -> RecedingPlan:
-        """One iteration of iLQR: slopes, costs, backward pass, and the best of the motions of all step lengths.
-
-        The backward pass begins while threads are at the slopes of earlier steps.
-        """
-        self._step.clock = plan.time
-        u = plan.v @ self.weights.T if self._whole_inputs else plan.v
-        runs = self._step.slopes_from_end(plan.x[:-1], u, self.p, self.horizon.smoothing, plan.x[1:])
-        costs = self._costs.expand(plan.x, plan.v, self.p, plan.time)
-        slopes = ((a, b @ self.weights if self._whole_inputs else b) for a, b, _ in runs)
-        room = self.lower - plan.v, self.upper - plan.v
-        found = plan_feedback(slopes, costs, room, self.damping / self.scale**2)
-        if found is None:
-            return self._kept(plan, plan.back)
-        ahead, back = found
-        about = PlanPolicy(plan.x[:-1], plan.v, ahead, back)
-        states, decisions, values = self.follow(plan.x[0], about, LENGTHS, plan.time)
-        values = np.where(np.isfinite(values), values, math.inf)
-        best = int(values.argmin())
-        if not values[best] < plan.cost:
-            return self._kept(plan, back)
-        self.damping = max(self.horizon.damping, self.damping * SHRINK)
-        return RecedingPlan(plan.time, plan.dt, states[best], decisions[best], back, float(values[best]), True)
-
-    def _kept(self, plan: RecedingPlan, back: Array) -> RecedingPlan:
-        """The plan as it was, with gains about it; the next iteration is more careful."""
+        """One iteration of iLQR; the plan as it was, with gains about it and more damping, where nothing is cheaper."""
+        about = LocalExpansion(self.stages, self._motion(plan), self._limits, self._knots, self._scale)
+        policy = about.policy(self.damping, gradient=False)
+        if policy is not None and all(np.isfinite(each).all() for each in policy.aligned):
+            best, back = about.search(policy, self._costs), policy.aligned[1]
+            if best.value < plan.cost:
+                self.damping = max(self.horizon.damping, self.damping * SHRINK)
+                decisions = best.motion.z[self._aligned.new]
+                return RecedingPlan(plan.time, plan.dt, best.motion.x, decisions, back, best.value, True)
+            plan = replace(plan, back=back)
         self.damping = min(self.damping * GROWTH, STIFFEST)
-        return replace(plan, back=back, gained=False)
+        return replace(plan, gained=False)
 
+    def _motion(self, plan: RecedingPlan) -> StagedMotion:
+        """The motion of a plan."""
+        self.stages.begin(plan.x[0], plan.time)
+        z = self._z.copy()
+        z[self._aligned.new] = plan.v
+        u = plan.v if self._aligned.plain else plan.v @ self.weights.T
+        return StagedMotion(z, plan.x, u, self.horizon.smoothing, gapless=True)
 
-def plan_feedback(
-    slopes: Iterable[tuple[Array, Array]], costs: QuadraticCosts, room: tuple[Array, Array], damping: Array
-) -> tuple[Array, Array] | None:
-    """Feedforward (N, w) and gains (N, w, n); None where a Hessian is not positive definite, or slopes not finite.
-
-    Args:
-        slopes: (K, n, n) and (K, n, w) the next states by the states and by the decisions, of runs of K steps; the last
-            run first.
-        costs: about the motion.
-        room: (N, w) each, how far decisions may go down and up.
-        damping: (w,) added to the diagonal of the Hessian by decisions.
-    """
-    n = costs.slope.shape[1] - len(damping)
-    last = CostToGo(costs.slope[-1, :n], costs.curve[-1, :n, :n])
-    found = riccati_recursion(_from_end(slopes, costs, room, damping), last)
-    if found is None:
-        return None
-    feedback = [each for each in reversed(found.feedback) if each is not None]
-    ahead, back = np.array([each.ahead for each in feedback]), np.array([each.back for each in feedback])
-    return (ahead, back) if np.isfinite(ahead).all() and np.isfinite(back).all() else None
-
-
-def _from_end(
-    slopes: Iterable[tuple[Array, Array]], costs: QuadraticCosts, room: tuple[Array, Array], damping: Array
-) -> Iterator[LinearStep]:
-    """The steps for the recursion, the last one first; see ``plan_feedback``."""
-    end = len(costs.slope) - 1
-    for a, b in slopes:
-        n, first = a.shape[1], end - len(a)
-        through, curves = np.concatenate([a, b], axis=2), costs.curve[first:end]
-        if costs.ahead is not None:
-            curves, later = curves.copy(), costs.ahead[first:end] @ through
-            curves[:, n:] += later
-            curves[:, :, n:] += later.transpose(0, 2, 1)
-        parts = through, costs.slope[first:end], curves, *(each[first:end] for each in room)
-        for t, q, c, low, high in zip(*(part[::-1] for part in parts), strict=True):
-            yield LinearStep(t, q, c, low, high, damping)
-        end = first
-
-
-def decision_order(model: Problem) -> NDArray[np.int64]:
-    """(N, w): where the decisions of each step lie in z; variable after variable, as in the file."""
-    steps, first, columns = model.simulation.steps, 0, list[NDArray[np.int64]]()
-    for variable in model.variables:
-        columns.append(first + np.arange(variable.guess.size).reshape(steps, -1))
-        first += variable.guess.size
-    return np.concatenate(columns, axis=1)
-
-
-def begun(rollout: Rollout, order: NDArray[np.int64]) -> tuple[Array, Array, Array]:
-    """First state (nx,), parameters (np,), and how the inputs of a step follow from its decisions (m, w)."""
-    slope = ca.jacobian(rollout.given[:, 0], rollout.z)
-    made = ca.Function("begun", [rollout.z], [ca.densify(each) for each in (rollout.x0, rollout.p, slope)])
-    x, p, weights = (np.array(part) for part in made.call([np.zeros(rollout.z.shape[0])]))
-    return x.ravel(), p.ravel(), weights[:, order[0]]
+    def _costs(self, motions: MotionBatch) -> Array:
+        """(B,) of the objective, with the penalty of constraints."""
+        if motions.merit is not None:
+            return motions.merit
+        stages = self.stages
+        objective, limits = stages.measure(*motions[:3])
+        beyond = limits - np.clip(limits, stages.lower, stages.upper)
+        return np.asarray(objective + np.sum(stages.penalties * beyond**2, axis=1))
 
 
 def shifted(plan: RecedingPlan, time: float) -> PlanPolicy:

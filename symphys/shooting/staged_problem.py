@@ -16,8 +16,11 @@ from symphys.types import Array, Ints
 
 Sparse = Any
 """scipy.sparse.csr_array"""
-Followed = tuple[Array, Array, Array]
-"""States (B, N + 1, nx), inputs (B, N, m) and new knots (B, N, w) of motions under a policy."""
+Followed = tuple[Array, Array, Array, Array | None]
+"""States (B, N + 1, nx), inputs (B, N, m), new knots (B, N, w) and merits (B,) of motions under a policy.
+
+A merit is the objective with the squared violations of the limits times their ``penalties``; None where it is unknown.
+"""
 
 
 @dataclass(frozen=True)
@@ -29,12 +32,14 @@ class StagedMotion:
         x: (N + 1, nx) states.
         u: (N, m) inputs of all steps, as the variables give them.
         smoothing: at which it was simulated.
+        gapless: whether each state is known to be what the step before it leads to.
     """
 
     z: Array
     x: Array
     u: Array
     smoothing: float
+    gapless: bool = False
 
 
 @dataclass(frozen=True)
@@ -149,10 +154,19 @@ class StagedProblem(Protocol):
         """The motion of (len(z),)."""
         ...
 
-    def follow(self, policy: AffinePolicy, about: Array, Z: Array, lengths: Array, smoothing: float) -> Followed | None:
+    def follow(
+        self,
+        policy: AffinePolicy,
+        about: Array,
+        Z: Array,
+        lengths: Array,
+        smoothing: float,
+        shares: Array | float = 1.0,
+    ) -> Followed | None:
         """The motions of step lengths (B,) under a policy, all steps at once; None where steps are to be taken singly.
 
-        ``about``: (len(z),) where the policy was made; ``Z``: (B, len(z)) whose static entries hold.
+        ``about``: (len(z),) where the policy was made; ``Z``: (B, len(z)) whose static entries hold; ``shares``: (B,)
+        of the feedback.
         """
         ...
 

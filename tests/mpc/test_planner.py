@@ -1,4 +1,4 @@
-"""Plans agree with the staged problem and the backward pass of iLQR, which are written in other ways."""
+"""Plans agree with a staged problem of their own and with the backward pass of iLQR, which keeps a costate."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import pytest
 from worlds.swung import TABLES, pendulum
 
 from symphys.errors import ProblemError
-from symphys.mpc.planner import LENGTHS, Planner, PlanPolicy, RecedingPlan, plan_feedback, shifted
+from symphys.mpc.planner import Planner, PlanPolicy, RecedingPlan, shifted
 from symphys.problem import problem_of_tables
 from symphys.shooting import Linearized, StagedMotion
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
-from symphys.solvers.ddp.forward_pass import forward_pass
+from symphys.solvers.ddp.forward_pass import MotionBatch, forward_pass
+from symphys.solvers.ddp.iteration import LENGTHS, LocalExpansion
 from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
 from symphys.transcription.staged.staged_problem import RolloutStages
 
@@ -62,36 +63,51 @@ def test_a_plan_is_a_motion_of_the_model() -> None:
     assert plan().x == pytest.approx(motion(plan().v.ravel()).x, abs=1e-10)
 
 
+def padded() -> PaddedKnots:
+    return PaddedKnots.of(knot_steps(stages()), np.full(20, -8.0), np.full(20, 8.0))
+
+
 @pytest.mark.slow
-def test_slopes_and_curvature_of_costs_are_those_of_the_staged_problem() -> None:
-    found = motion(plan().v.ravel())
-    wanted = stages().expand(found, np.zeros(len(stages().lower)), 2 * stages().penalties)
-    costs = planner()._costs.expand(found.x, plan().v, planner().p, 0.0)
-    n = stages().tangent_size
-    assert costs.slope[:, :n] == pytest.approx(wanted.x, abs=1e-9)
-    assert costs.slope[:-1, n:] == pytest.approx(wanted.u, abs=1e-9)
-    assert costs.curve[:, :n, :n] == pytest.approx(wanted.xx, abs=1e-9)
-    assert costs.curve[:-1, n:, n:] == pytest.approx(wanted.uu, abs=1e-9)
+def test_slopes_and_curvature_of_costs_are_those_of_differences() -> None:
+    """Squares and limits lie on top of each other; here each is differentiated for itself, along the motion."""
+    found, staged, h = motion(plan().v.ravel()), stages(), 1e-6
+    none, penalties = np.zeros(len(staged.lower)), 2 * staged.penalties
+    wanted = planner().stages.expand(found, none, penalties)
+
+    def value(x: np.ndarray, u: np.ndarray) -> float:
+        objective, limits = staged.measure(found.z[None], x[None], u[None])
+        beyond = limits - np.clip(limits, staged.lower, staged.upper)
+        return float(objective[0] + np.sum(staged.penalties * beyond**2))
+
+    assert wanted.value == pytest.approx(value(found.x, found.u), rel=1e-12)
+    for k in (0, 7, 20):
+        for i in range(staged.tangent_size):
+            step = np.zeros((1, staged.tangent_size))
+            step[0, i] = h
+            ends = []
+            for sign in (1, -1):
+                x = found.x.copy()
+                x[k] = staged.retract(x[k : k + 1], sign * step)[0]
+                ends.append(value(x, found.u))
+            assert wanted.x[k, i] == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-5, abs=1e-6)
+    for k in (0, 7, 19):
+        u, v = found.u.copy(), found.u.copy()
+        u[k], v[k] = u[k] + h, v[k] - h
+        assert wanted.u[k, 0] == pytest.approx((value(found.x, u) - value(found.x, v)) / (2 * h), rel=1e-5, abs=1e-6)
 
 
 @pytest.mark.slow
 def test_the_feedback_of_a_plan_is_that_of_the_backward_pass() -> None:
-    """With decisions that are held by their bounds among them."""
-    found = motion(plan().v.ravel())
-    made = planner()
-    slopes = stages().linearize(found)
-    costs = stages().expand(found, np.zeros(len(stages().lower)), 2 * stages().penalties)
-    room = -8 - plan().v, 8 - plan().v
-    bounds = Bounds(room[0].ravel(), room[1].ravel(), np.full(20, 2.0))
-    wanted = backward_pass([slopes], costs, knot_steps(stages()), stages().statics, bounds, 0.1)
-    own = made._costs.expand(found.x, plan().v, made.p, 0.0)
-    runs = [(slopes.a[13:], slopes.b[13:]), (slopes.a[:13], slopes.b[:13])]
-    got = plan_feedback(runs, own, room, 0.1 / made.scale**2)
+    """Slopes of the whole cost to go lead to the feedback of a costate, with decisions that bounds hold among them."""
+    found, made = motion(plan().v.ravel()), planner()
+    made.stages.begin(made.start, 0.0)
+    about = LocalExpansion(made.stages, found, made._limits, padded(), np.full(20, 2.0))
+    wanted, got = about.policy(0.1), about.policy(0.1, gradient=False)
     assert wanted is not None and got is not None
-    gains = [gain for gain in wanted.gains if gain is not None]
-    assert np.array([gain.ahead for gain in gains]) == pytest.approx(got[0], rel=1e-8, abs=1e-9)
-    assert np.array([gain.back for gain in gains]) == pytest.approx(got[1], rel=1e-7, abs=1e-8)
-    held = np.array([not gain.back.any() for gain in gains])
+    assert wanted.aligned[0] == pytest.approx(got.aligned[0], rel=1e-8, abs=1e-9)
+    assert wanted.aligned[1] == pytest.approx(got.aligned[1], rel=1e-7, abs=1e-8)
+    assert (wanted.first, wanted.second) == pytest.approx((got.first, got.second), rel=1e-9)
+    held = ~got.aligned[1].any(axis=(1, 2))
     assert held.any() and not held.all()
 
 
@@ -104,9 +120,8 @@ def test_the_compiled_rollout_is_the_forward_pass(monkeypatch: pytest.MonkeyPatc
     bounds = Bounds(-8 - found.z, 8 - found.z, np.full(20, 2.0))
     policy = backward_pass([slopes], costs, knot_steps(stages()), stages().statics, bounds, 1.0)
     assert policy is not None
-    padded = PaddedKnots.of(knot_steps(stages()), np.full(20, -8.0), np.full(20, 8.0))
     monkeypatch.setattr(stages(), "follow", lambda *_: None)
-    wanted = forward_pass(stages(), found, policy, padded, LENGTHS)
+    wanted = forward_pass(stages(), found, policy, padded(), LENGTHS)
     ahead = np.array([gain.ahead for gain in policy.gains if gain is not None])
     back = np.array([gain.back for gain in policy.gains if gain is not None])
     about = PlanPolicy(found.x[:-1], plan().v, ahead, back)
@@ -122,7 +137,7 @@ def test_without_a_compiler_a_rollout_is_the_same(monkeypatch: pytest.MonkeyPatc
     policy = PlanPolicy(plan().x[:-1], plan().v, np.full((20, 1), 0.3), plan().back)
     lengths = np.array([1.0, 0.25])
     compiled = made.follow(made.start, policy, lengths, 0.5)
-    monkeypatch.setitem(vars(made._rolled), "kernel", None)
+    monkeypatch.setattr(made.stages, "follow", lambda *_: None)
     for one, other in zip(compiled, made.follow(made.start, policy, lengths, 0.5), strict=True):
         assert one == pytest.approx(other, abs=1e-9)
 
@@ -165,15 +180,25 @@ def test_a_control_may_be_named_by_its_variable() -> None:
 
 
 @pytest.mark.slow
-def test_the_part_of_a_driven_input_that_a_variable_sets_goes_by_its_name() -> None:
-    """The sum of both is not known at the end of a step, and the message says what to write."""
+def test_an_input_that_a_force_law_adds_to_may_stand_beside_a_state() -> None:
+    """At the end of a step it is that of the step, which follows from the state before: a named part is too."""
     brake = {"name": "brake", "on": "bob.torque", "value": "-brake.c * bob.angular_velocity", "numbers": {"c": 0.1}}
     push = {"name": "push", "sets": "bob.torque[1]", "knots": 20}
     tables = {**TABLES, "force": [brake], "variable": [*TABLES["variable"], push]}
-    Planner(problem_of_tables({**tables, **with_cost(at="always", squares="bob.position[2] * push")}, "p"), threads=1)
-    driven = {**tables, **with_cost(at="always", squares="bob.position[2] * bob.torque[1]")}
-    with pytest.raises(ProblemError, match=r"effort: .*variable"):
-        Planner(problem_of_tables(driven, "p"), threads=1)
+    whole, part = (
+        Planner(problem_of_tables({**tables, **with_cost(at="always", squares=squares)}, "p"), threads=1)
+        for squares in ("bob.position[2] * bob.torque[1]", "bob.position[2] * push")
+    )
+    costs = [made.first(made.start, 0.0).cost for made in (whole, part)]
+    assert np.isfinite(costs).all() and costs[0] != pytest.approx(costs[1], rel=1e-6)
+    for made in (whole, part):
+        found = made.first(made.start, 0.0)
+        z = np.zeros(40)
+        z[made._aligned.new] = found.v
+        made.stages.begin(made.start, 0.0)
+        rolled = made.stages.roll_out(z, 0.0)
+        batch = MotionBatch(z[None], rolled.x[None], rolled.u[None])
+        assert made._costs(batch)[0] == pytest.approx(found.cost, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,10 @@ class ExpansionSums:
             _add(self.su, steps, statics, u)
         self._of_knots(blocks.constants, by_s, scaled)
 
+    def by_constants(self, slopes: Array) -> Array:
+        """(T, r, s) slopes by the static entries of z, from those by all constants (T, r, c)."""
+        return np.asarray(slopes @ self.of_constants)
+
     def by_statics(self, blocks: Blocks) -> Array:
         """(T, r, s) slopes by the static entries of z, through the constants."""
         return np.asarray(blocks.constants.slopes @ self.of_constants[blocks.constants.columns])

@@ -37,14 +37,14 @@ class Linearization:
         self.statics = statics_of(rollout)
         self.step = LinearizedStep(rollout, self.tangent, backend, threads, exact)
 
-    def motion(self, z: ArrayLike, smoothing: float) -> StagedMotion:
-        """The motion of z (len(z),)."""
+    def motion(self, z: ArrayLike, smoothing: float, start: Array | None = None) -> StagedMotion:
+        """The motion of z (len(z),), from its own first state or another one (nx,)."""
         given = np.asarray(z, float)
         x0, u, p = self.begun(given)
-        states = [x0]
+        states = [x0 if start is None else start]
         for k in range(self.rollout.steps):
             states.append(self.step.step(k, states[-1][None], u[None, k], p, smoothing)[0])
-        return StagedMotion(given, np.array(states), u, smoothing)
+        return StagedMotion(given, np.array(states), u, smoothing, gapless=True)
 
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Slopes of all steps about a motion.
@@ -52,18 +52,23 @@ class Linearization:
         What the static entries do to the first state beside its tangent, such as the velocity of one body of a robot,
         is part of the first of ``c``: with it sums over the steps are exact.
         """
-        p = self.begun(motion.z)[2]
-        slopes = self.step.slopes(motion.x[:-1], motion.u, p, motion.smoothing)
+        p, after = self.parameters(motion.z), motion.x[1:] if motion.gapless else None
+        slopes = self.step.slopes(motion.x[:-1], motion.u, p, motion.smoothing, after)
         return next(self._by_statics(motion, p, iter([slopes])))
 
     def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
         """Yield slopes of runs of steps, the last run first; all runs start at once."""
-        p = self.begun(motion.z)[2]
-        return self._by_statics(motion, p, self.step.slopes_from_end(motion.x[:-1], motion.u, p, motion.smoothing))
+        p, after = self.parameters(motion.z), motion.x[1:] if motion.gapless else None
+        runs = self.step.slopes_from_end(motion.x[:-1], motion.u, p, motion.smoothing, after)
+        return self._by_statics(motion, p, runs)
 
     def _by_statics(self, motion: StagedMotion, p: Array, runs: Iterator[Slopes]) -> Iterator[Linearized]:
         """Slopes of runs of steps, the last run first, with those by parameters made those by static entries."""
         start, left, parameters = self.start_slopes(motion)
+        if not len(self.statics):
+            for a, b, by_p in runs:
+                yield Linearized(a, b, by_p[:, :, :0], start)
+            return
         varied, end = self.step.arguments.varied, len(motion.u)
         for a, b, by_p in runs:
             c = by_p[:, :, varied] @ parameters[varied]
@@ -83,6 +88,14 @@ class Linearization:
         start = self._sparse(self.tangent.projection, x0, p) @ first
         left = first - self._sparse(self.tangent.basis, x0, p) @ start
         return start, np.where(np.abs(left) > ROUNDING * np.abs(first).max(initial=0.0), left, 0.0), parameters
+
+    def parameters(self, z: Array) -> Array:
+        """P (np,): without static entries the same for all z."""
+        return self.begun(z)[2] if len(self.statics) else self._parameters
+
+    @cached_property
+    def _parameters(self) -> Array:
+        return self.begun(np.zeros(int(self.rollout.z.shape[0])))[2]
 
     def begun(self, z: Array) -> tuple[Array, Array, Array]:
         """First state (nx,), inputs (N, m) without shares of phases, and p (np,)."""

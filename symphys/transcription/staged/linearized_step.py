@@ -26,6 +26,9 @@ from symphys.types import Array
 
 Slopes = tuple[Array, Array, Array]
 """(N, n, n), (N, n, m) and (N, n, np): the next state's tangent by the state's, by inputs and by parameters."""
+NOTHING = np.zeros(1)
+NOTHING.flags.writeable = False
+"""What slopes by parameters consist of where no parameter varies."""
 FEW = 16
 """Rows of a batch for which what a call prepares takes longer than what it computes."""
 
@@ -122,9 +125,9 @@ class LinearizedStep:
     def _cut(self, jacobians: Array) -> Slopes:
         """Split Jacobians into those by states, inputs and parameters."""
         _, n, m, np_ = self.arguments.sizes
-        a, b, varied = np.split(jacobians, [n, n + m], 2)
+        a, b, varied = jacobians[:, :, :n], jacobians[:, :, n : n + m], jacobians[:, :, n + m :]
         if not varied.shape[2]:
-            return a, b, np.broadcast_to(0.0, (len(jacobians), n, np_))
+            return a, b, np.ndarray((len(jacobians), n, np_), buffer=NOTHING, strides=(0, 0, 0))
         c = np.zeros((len(jacobians), n, np_))
         c[:, :, self.arguments.varied] = varied
         return a, b, c

@@ -8,10 +8,11 @@ Todorov, Control-Limited Differential Dynamic Programming, ICRA 2014, section II
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -32,15 +33,46 @@ from symphys.shooting import AffinePolicy
 from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.linearized_step import LinearizedStep
-from symphys.types import Array
+from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm
+from symphys.types import Array, Expr
 
 
-class RunningCosts(Protocol):
-    """What a motion costs at the start and the end of each step, and at its end: (x, new knots, p, time) -> (1,)."""
+class RunningCosts(NamedTuple):
+    """What a motion costs, as functions (state looked at, state before, inputs, p, number of the state) -> (1,).
+
+    Attributes:
+        before, after: at the start and at the end of each step.
+        end: at the end of the motion.
+    """
 
     before: ca.Function
     after: ca.Function
     end: ca.Function
+
+
+def running_costs(symbols: StageSymbols, terms: Sequence[StageTerm]) -> RunningCosts | None:
+    """Return the merit of a motion, limits by their squared violations; None where terms ask for more than a step has.
+
+    That is sums, entries of z, and instants other than the end.
+    """
+    if not symbols.plain:
+        return None
+    steps, limits = symbols.rollout.steps, iter(symbols.rollout.problem.constraints)
+    totals: dict[str, Expr] = {"before": ca.SX(0), "after": ca.SX(0), "end": ca.SX(0)}
+    for term in terms:
+        running = len(term.steps) == steps
+        if term.kind == "sum" or not (running or (term.after and term.steps[0] == steps - 1)):
+            return None
+        value = term.value
+        if term.kind == "limit":
+            limit = next(limits)
+            lower, upper = (ca.DM(np.broadcast_to(end, (term.size,))) for end in (limit.lower, limit.upper))
+            value = value - ca.fmin(ca.fmax(value, lower), upper)
+        cost: Expr = ca.sum1(value) if term.kind == "cost" else ca.sumsqr(value)
+        totals[("after" if term.after else "before") if running else "end"] += term.weight * cost
+    return RunningCosts(
+        *(ca.Function("costs", list(symbols.arguments), [ca.densify(ca.cse(each))]) for each in totals.values())
+    )
 
 
 class PolicySizes(NamedTuple):
@@ -117,8 +149,7 @@ class PolicyRollout:
             parts.append(row[:, first : first + size])
             parts[-1][:] = each
             first += size
-        if self.kernel is None:
-            return self._step_by_step(parts, policy, smoothing, clock)
+        assert self.kernel is not None, "there is a compiler"
         shared = [policy.old[0], *(getattr(policy, name).ravel() for name in SERIES), self.step.tangent.nominal]
         found = self.kernel.forward(row, np.concatenate([*shared, (clock, smoothing)]))
         x, u, new = (
@@ -126,30 +157,6 @@ class PolicyRollout:
             for name, more in (("x", steps + 1), ("u", steps), ("new", steps))
         )
         return PolicyMotions(x, u, new, found["cost"][:, 0])
-
-    def _step_by_step(self, parts: list[Array], policy: AffinePolicy, smoothing: float, clock: float) -> PolicyMotions:
-        lengths, shares, statics, p, start = parts
-        count, steps, given = len(lengths), len(policy.new), self.step.arguments.sizes[2]
-        x, u = np.empty((count, steps + 1, start.shape[1])), np.empty((count, steps, self.sizes.inputs))
-        new, held = np.empty((count, steps, self.sizes.new)), np.tile(policy.old[0], (count, 1))
-        x[:, 0], cost = start, np.zeros(count)
-        self.step.clock, dt = clock, self.step.rollout.dt
-        for k in range(steps):
-            off = self.step.tangent.difference(np.repeat(policy.x[None, k], count, axis=0), x[:, k])
-            answer = np.concatenate([off, held - policy.old[k], statics], axis=1) @ policy.back[k].T
-            wanted = policy.new[k] + lengths * policy.ahead[k] + shares * answer
-            new[:, k] = np.clip(wanted, policy.lower[k], policy.upper[k])
-            acting = np.concatenate([held, new[:, k]], axis=1)
-            u[:, k], held = acting @ policy.weights[k].T, acting @ policy.keep[k].T
-            x[:, k + 1] = self.step.step(k, x[:, k], u[:, k, :given], p, smoothing)
-            for row in range(count) if self.costs else ():
-                assert self.costs is not None
-                cost[row] += float(self.costs.before(x[row, k], new[row, k], p[row], clock + k * dt))
-                cost[row] += float(self.costs.after(x[row, k + 1], new[row, k], p[row], clock + (k + 1) * dt))
-        if self.costs:
-            ends = [self.costs.end(x[row, -1], new[row, -1], p[row], clock + steps * dt) for row in range(count)]
-            cost += np.array([float(each) for each in ends])
-        return PolicyMotions(x, u, new, cost)
 
 
 SERIES = ("x", "old", "new", "ahead", "back", "weights", "keep", "lower", "upper")
@@ -188,7 +195,7 @@ class PolicyPlaces:
         self.inputs = layout.series(inputs, steps)
         self.given = Place(self.inputs.offset, m, self.inputs.stride)
         self.u = self.given if self.rollout.feedback is None else layout.take(m)
-        self.time = layout.series(1, steps + 1)
+        self.time, self.tick = layout.series(1, steps + 1), layout.series(1, steps + 1)
 
     def outputs(self) -> dict[str, Place]:
         """All steps of each series, one after the other; those of no size are left out."""
@@ -214,9 +221,15 @@ def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts
     ]
     epilogue: tuple[FunctionCall, ...] = ()
     if costs is not None:
-        here = (places.x, places.v, places.p, places.time)
-        there = (places.x.later(), places.v, places.p, places.time.later())
-        last = (places.x.later(steps), places.v.later(steps - 1), places.p, places.time.later(steps))
+        here = (places.x, places.x, places.given, places.p, places.tick)
+        there = (places.x.later(), places.x, places.given, places.p, places.tick.later())
+        last = (
+            places.x.later(steps),
+            places.x.later(steps - 1),
+            places.given.later(steps - 1),
+            places.p,
+            places.tick.later(steps),
+        )
         body.append(FunctionCall(costs.before, here, (places.cost,), accumulate=True))
         body.append(FunctionCall(costs.after, there, (places.cost,), accumulate=True))
         still = tuple(each.still() for each in last)
@@ -235,7 +248,7 @@ def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts
 
 
 def _prologue(step: LinearizedStep, places: PolicyPlaces) -> tuple[FunctionCall, ...]:
-    """Return the calls for the start of a lane and the times of all states."""
+    """Return the calls for the start of a lane and the times and numbers of all states."""
     row, clock, steps = ca.SX.sym("row", places.row.size), ca.SX.sym("clock"), step.rollout.steps
     held, p = ca.SX.sym("held", places.first_held.size), ca.SX.sym("p", places.p.size)
     taken = (places.length, places.share, places.statics, places.p, places.x.still())
@@ -243,10 +256,14 @@ def _prologue(step: LinearizedStep, places: PolicyPlaces) -> tuple[FunctionCall,
     cut = [row[a:b] for a, b in pairwise(ends)]
     first = ca.Function("first", [row, held], [*cut, held])
     ticks: Any = clock / step.rollout.dt + ca.DM(np.arange(steps + 1))
-    times = ca.Function("times", [clock, p], [ca.densify(step.arguments.time(ticks, p))])
+    times = ca.Function("times", [clock, p], [ca.densify(each) for each in (step.arguments.time(ticks, p), ticks)])
     return (
         FunctionCall(first, (places.row, places.first_held), (*taken, places.held.still())),
-        FunctionCall(times, (places.clock, places.p), (Place(places.time.offset, steps + 1),)),
+        FunctionCall(
+            times,
+            (places.clock, places.p),
+            (Place(places.time.offset, steps + 1), Place(places.tick.offset, steps + 1)),
+        ),
     )
 
 

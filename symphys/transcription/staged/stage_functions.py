@@ -52,6 +52,7 @@ class StepRows(NamedTuple):
         u: (R, m).
         constants: (R, c) or (1, c).
         ticks: (R,) numbers of the states before.
+        clock: [steps] the time at which state 0 is, for formulas that name the time.
     """
 
     before: Array
@@ -59,6 +60,7 @@ class StepRows(NamedTuple):
     u: Array
     constants: Array
     ticks: Ints
+    clock: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,14 +108,29 @@ class StageFunctions:
     What is small stays on casadi's virtual machine, as does everything where no compiler is found.
     """
 
-    def __init__(self, functions: Sequence[ReadingFunction], steps: int, backend: str, threads: int | None) -> None:
-        """``steps``: of a horizon; ``backend``: a name of a kernel, or another for casadi's virtual machine."""
+    def __init__(
+        self,
+        functions: Sequence[ReadingFunction],
+        steps: int,
+        backend: str,
+        threads: int | None,
+        worth: int | None = None,
+    ) -> None:
+        """Note them; nothing is compiled before it is asked for.
+
+        Args:
+            functions: to evaluate together.
+            steps: of a horizon.
+            backend: a name of a kernel, or another for casadi's virtual machine.
+            threads: that share the steps; None: one for each processor.
+            worth: operations of a horizon above which they are compiled; None: ``COMPILED``.
+        """
         self.functions, self.backend, self.threads = list(functions), backend, threads
         keys = dict.fromkeys(segment for each in self.functions for segment in each.segments)
         order = ("before", "after", "u", "constants", "ticks", "next")
         self._segments = sorted((key for key in keys if key[1]), key=lambda key: order.index(key[0]))
         work = sum(each.function.n_instructions() for each in self.functions)
-        self._compiles = backend in PRECISIONS and work * steps > COMPILED
+        self._compiles = backend in PRECISIONS and work * steps > (COMPILED if worth is None else worth)
         self._gathered = {name: self._entries(name) for name in order}
         sizes = [int(each.function.numel_out(o)) for each in self.functions for o in range(each.function.n_out())]
         self._ends = np.cumsum([0, *sizes])
@@ -141,10 +158,10 @@ class StageFunctions:
             entries = self._gathered[name]
             if len(entries):
                 part = np.take(getattr(rows, name), entries, axis=1)
-                parts.append(np.broadcast_to(part, (count, part.shape[1])))
+                parts.append(part if len(part) == count else np.broadcast_to(part, (count, part.shape[1])))
         for name, more in (("ticks", 0), ("next", 1)):
             if len(self._gathered[name]):
-                parts.append((rows.ticks + more)[:, None].astype(float))
+                parts.append((rows.ticks + (rows.clock + more))[:, None])
         return np.concatenate([np.zeros((count, 0)), *parts], axis=1)
 
     @cached_property

@@ -215,6 +215,7 @@ class StageSymbols:
         constants: what is the same all along a motion: p, the entries ``named`` of z, the starts of ``MotionSums``.
         tick: the number of the state that is looked at.
         named: entries of z that some formula names by their variable.
+        plain: whether the constants are p alone.
     """
 
     def __init__(self, rollout: Rollout, tangent: Tangent, sums: MotionSums) -> None:
@@ -227,6 +228,7 @@ class StageSymbols:
         self.first = ca.SX.sym("first", self.state_size)
         self.u = ca.SX.sym("u", rollout.controls)
         self.constants = ca.SX.sym("constants", self.parameter_size + len(self.named) + starts)
+        self.plain = not len(self.named) and not starts
         self.tick = ca.SX.sym("tick")
         self.p = self.constants[: self.parameter_size]
         self.starts = self.constants[self.parameter_size + len(self.named) :]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -14,11 +15,17 @@ from symphys.shooting import AffinePolicy, Expansion, Followed, Linearized, Stag
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.expansion_sums import ExpansionSums
 from symphys.transcription.staged.linearization import Linearization, statics_of
-from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes
+from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes, running_costs
+from symphys.transcription.staged.square_stack import SquareStack, square_stacks
 from symphys.transcription.staged.stage_functions import StepRows
-from symphys.transcription.staged.stage_terms import StageTerm
+from symphys.transcription.staged.stage_terms import Kind, StageTerm
 from symphys.transcription.staged.term_slopes import Blocks, TermGroups, TermSlopes
 from symphys.types import Array, Ints
+
+SUMS: frozenset[Kind] = frozenset({"sum"})
+COSTS: frozenset[Kind] = frozenset({"cost"})
+LIMITS: frozenset[Kind] = frozenset({"limit"})
+TERMS: frozenset[Kind] = frozenset({"cost", "squares", "limit"})
 
 
 class SlopedTerm(NamedTuple):
@@ -47,7 +54,14 @@ class RolloutStages:
     then control knots that formulas name, each at the first step in which it acts.
     """
 
-    def __init__(self, rollout: Rollout, backend: str = BEST, threads: int | None = None, exact: bool = False) -> None:
+    def __init__(
+        self,
+        rollout: Rollout,
+        backend: str = BEST,
+        threads: int | None = None,
+        exact: bool = False,
+        priced: bool = False,
+    ) -> None:
         """Compile the step.
 
         Args:
@@ -55,12 +69,14 @@ class RolloutStages:
             backend: what evaluates the step.
             threads: that share a batch; None: one for each processor.
             exact: whether it is for smoothing 0 only.
+            priced: whether motions under a policy come with their merits, and an iteration shall take least time.
         """
         problem = rollout.problem
         self.rollout, self.steps = rollout, rollout.steps
         self.statics = statics_of(rollout)
         self._linearization = Linearization(rollout, backend, threads, exact)
         self.tangent = self._linearization.tangent
+        self._evaluated, self._priced = (backend, 1, 0) if priced else (backend, threads, None), priced
         self._groups = TermGroups(rollout, self.tangent, backend, threads)
         self.terms = self._groups.terms
         self._sums = len(self._groups.symbols.sums.sums)
@@ -76,6 +92,19 @@ class RolloutStages:
         columns = [np.concatenate(each) for each in zip(*parts, strict=True)] if parts else none
         self.lower, self.upper, self.penalties = columns[0], columns[1], columns[2]
 
+    def begin(self, x: Array, time: float) -> None:
+        """Let motions begin at a state (nx,) and a time [s]; the duration must not vary, and no formula take sums."""
+        assert not self._sums and not self.rollout.problem.free_duration
+        self._first, self._linearization.step.clock = x, time
+        self._groups.clock = time / self.rollout.dt
+
+    _first: Array | None = None
+
+    @property
+    def description(self) -> str:
+        """What evaluates slopes, in words."""
+        return self._linearization.step.description
+
     def start(self, Z: Array) -> Array:
         """(B, nx)."""
         return self._begun(Z)[0]
@@ -85,19 +114,31 @@ class RolloutStages:
         return self._begun(Z)[1]
 
     def _begun(self, Z: Array) -> tuple[Array, Array, Array]:
-        """First states, parameters, and the starts that formulas take; those that were asked for last are kept."""
-        key = len(Z), Z[:, self.statics].tobytes()
+        """First states, parameters, and the starts that formulas take, a row for each z."""
+        states, p, starts = self._distinct(Z)
+        if len(p) == len(Z) == len(states):
+            return states, p, starts
+        return np.repeat(states[:1], len(Z), axis=0), np.repeat(p, len(Z), axis=0), np.repeat(starts, len(Z), axis=0)
+
+    def _distinct(self, Z: Array) -> tuple[Array, Array, Array]:
+        """The same, one row without static entries; those that were asked for last are kept."""
+        single = not len(self.statics)  # then they are the same for all z
+        key = 0 if single else len(Z), Z[:, self.statics].tobytes()
         if self._known is None or self._known[0] != key:
-            parts = [self._linearization.begun(z) for z in Z]
+            rows = Z[:1] if single else Z
+            parts = [self._linearization.begun(z) for z in rows]
             states = np.array([np.append(x, np.zeros(self._sums)) for x, _, _ in parts])
-            starts = np.array([np.array(self._groups.symbols.sums.started(z)).ravel() for z in Z])
+            starts = np.array([np.array(self._groups.symbols.sums.started(z)).ravel() for z in rows])
             self._known = key, (states, np.array([p for _, _, p in parts]), starts)
-        return self._known[1]
+        states, p, starts = self._known[1]
+        return (states if self._first is None else self._first[None]), p, starts
 
     _known: tuple[tuple[int, bytes], tuple[Array, Array, Array]] | None = None
 
     def _constants(self, Z: Array, U: Array) -> Array:
         """(B, c): what the terms read that is the same all along each motion; knots are those of the inputs."""
+        if self._groups.symbols.plain:
+            return self._begun(Z)[1]
         _, p, starts = self._begun(Z)
         named = Z[:, self._groups.symbols.named]
         which, places = self._knots
@@ -118,28 +159,39 @@ class RolloutStages:
 
     def roll_out(self, z: Array, smoothing: float) -> StagedMotion:
         """The motion of z."""
-        motion = self._linearization.motion(z, smoothing)
+        motion = self._linearization.motion(z, smoothing, self._first)
         u = np.asarray(self.weights @ z).reshape(self.steps, self.input_size)
         if not self._sums:
-            return StagedMotion(motion.z, motion.x, u, smoothing)
+            return StagedMotion(motion.z, motion.x, u, smoothing, gapless=True)
         x = np.concatenate([motion.x, np.zeros((self.steps + 1, self._sums))], axis=1)
         rows = StepRows(x[:-1], x[1:], motion.u, self._constants(z[None], u[None]), np.arange(self.steps))
         x[1:, motion.x.shape[1] :] = np.cumsum(self._groups.summed(rows)[:, motion.x.shape[1] :], axis=0)
-        return StagedMotion(motion.z, x, u, smoothing)
+        return StagedMotion(motion.z, x, u, smoothing, gapless=True)
 
-    def follow(self, policy: AffinePolicy, about: Array, Z: Array, lengths: Array, smoothing: float) -> Followed | None:
+    def follow(
+        self,
+        policy: AffinePolicy,
+        about: Array,
+        Z: Array,
+        lengths: Array,
+        smoothing: float,
+        shares: Array | float = 1.0,
+    ) -> Followed | None:
         """The motions of step lengths (B,); None with sums, and without a compiler."""
         if self._sums:
             return None
         sizes = PolicySizes(policy.old.shape[1], policy.new.shape[1], self.input_size, len(self.statics))
         if self._rolled is None or self._rolled.sizes != sizes:
-            self._rolled = PolicyRollout(self._linearization.step, sizes, threads=self._linearization.step.threads)
+            costs = running_costs(self._groups.symbols, self.terms) if self._priced else None
+            threads = 1 if self._priced else self._linearization.step.threads
+            self._rolled = PolicyRollout(self._linearization.step, sizes, costs, threads)
         if self._rolled.kernel is None:
             return None
-        x, p, _ = self._begun(Z)
+        x, p, _ = self._distinct(Z)
         off = Z[:, self.statics] - about[self.statics]
-        motions = self._rolled(x, p, policy, lengths, smoothing, statics=off)
-        return motions.x, motions.u, motions.new
+        clock = self._linearization.step.clock
+        motions = self._rolled(x, p, policy, lengths, smoothing, clock, off, shares)
+        return motions.x, motions.u, motions.new, motions.cost if self._rolled.costs else None
 
     _rolled: PolicyRollout | None = None
 
@@ -172,7 +224,7 @@ class RolloutStages:
         p = self.parameters(motion.z[None])[0]
         after = self._linearization.step.step(np.arange(count), plain.x[:-1], plain.u, p, motion.smoothing)
         after = np.concatenate([after, np.zeros((count, self._sums))], axis=1)
-        for each in self._sloped(motion, after, True):
+        for each in self._sloped(motion, after, SUMS):
             row, steps, weight = n + each.term.number, each.term.steps, each.term.weight
             blocks = each.blocks
             before = blocks.first if each.term.after else blocks.x
@@ -218,7 +270,12 @@ class RolloutStages:
         """The augmented objective to second order."""
         sizes = self.steps, self.tangent_size, self.input_size, len(self.statics)
         sums, first = ExpansionSums(sizes, self._of_constants(motion), self._knots), 0
-        for each in self._sloped(motion, motion.x[1:], False):
+        stacked = not len(self._knots[0]) and not self._beside(motion).any()
+        if stacked:
+            constants, u = self._constants(motion.z[None], motion.u[None]), motion.u[:, : self._given]
+            for stack in self._stacks:
+                stack.add(sums, motion.x, u, constants, self._groups.clock, multipliers, penalties)
+        for each in self._sloped(motion, motion.x[1:], COSTS if stacked else TERMS):
             term, value = each.term, each.value
             if term.kind == "cost":
                 sums.value += term.weight * float(np.sum(value))
@@ -240,9 +297,14 @@ class RolloutStages:
                 sums.curvature(term, each.blocks, each.by_s, 2 * weight)
         if self._sums:
             worth = sums.x[-1, -self._sums :].copy()
-            for each in self._sloped(motion, motion.x[1:], True):
+            for each in self._sloped(motion, motion.x[1:], SUMS):
                 self._curve(sums, each, np.full(len(each.value), each.term.weight * worth[each.term.number]))
         return sums.expansion()
+
+    @cached_property
+    def _stacks(self) -> list[SquareStack]:
+        bounds, static = (self.lower, self.upper), bool(len(self.statics))
+        return square_stacks(self._groups.symbols, self.terms, bounds, static, self._evaluated)
 
     def _curve(self, sums: ExpansionSums, each: SlopedTerm, weight: Array) -> None:
         """Add the second derivative of weight (T,) times a number, as far as it is positive."""
@@ -257,9 +319,7 @@ class RolloutStages:
         values, by_s = [np.zeros(0)], [np.zeros((0, s))]
         x, u = (_Entries(), _Entries())
         sums = ExpansionSums((0, 0, 0, 0), np.zeros((0, 0)), self._knots)
-        for each in self._sloped(motion, motion.x[1:], False):
-            if each.term.kind != "limit":
-                continue
+        for each in self._sloped(motion, motion.x[1:], LIMITS):
             term, blocks = each.term, each.blocks
             rows = first + np.arange(each.value.size).reshape(each.value.shape)
             first += each.value.size
@@ -275,14 +335,20 @@ class RolloutStages:
 
         return np.concatenate(values), by_state, by_input, csr_array(np.concatenate(by_s))
 
-    def _sloped(self, motion: StagedMotion, after: Array, sums: bool) -> list[SlopedTerm]:
-        """Sums or all other terms with their slopes, from the states of a motion to the states ``after`` (N, nx)."""
+    def _beside(self, motion: StagedMotion) -> Array:
+        """(nx, s): what static entries do to the first state beside its tangent."""
+        return self._linearization.start_slopes(self._plain(motion))[1] if len(self.statics) else np.zeros((0, 0))
+
+    def _sloped(self, motion: StagedMotion, after: Array, kinds: frozenset[Kind]) -> list[SlopedTerm]:
+        """Terms of some kinds with their slopes, from the states of a motion to the states ``after`` (N, nx)."""
+        if not any(term.kind in kinds for term in self.terms):
+            return []
         constants = self._constants(motion.z[None], motion.u[None])
-        rows = StepRows(motion.x[:-1], after, motion.u[:, : self._given], constants, np.arange(self.steps))
-        of_constants = self._of_constants(motion)
-        left = self._linearization.start_slopes(self._plain(motion))[1] if len(self.statics) else np.zeros(0)
+        u, ticks = motion.u[:, : self._given], np.arange(self.steps)
+        rows = StepRows(motion.x[:-1], after, u, constants, ticks, self._groups.clock)
+        of_constants, left = self._of_constants(motion), self._beside(motion)
         result = []
-        for term, slopes, found in self._groups.slopes(rows, sums):
+        for term, slopes, found in self._groups.slopes(rows, kinds):
             value, blocks = slopes.values(found)
             by_s = blocks.constants.slopes @ of_constants[blocks.constants.columns]
             if left.any() and term.steps[0] == 0:
@@ -293,7 +359,8 @@ class RolloutStages:
     def _plain(self, motion: StagedMotion) -> StagedMotion:
         """Without sums and knots."""
         size = motion.x.shape[1] - self._sums
-        return StagedMotion(motion.z, motion.x[:, :size], motion.u[:, : self._given], motion.smoothing)
+        u = motion.u[:, : self._given]
+        return StagedMotion(motion.z, motion.x[:, :size], u, motion.smoothing, motion.gapless)
 
     def _of_constants(self, motion: StagedMotion) -> Array:
         """(c, s): the constants of the terms by the static entries of z."""

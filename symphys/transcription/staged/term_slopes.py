@@ -13,7 +13,7 @@ import numpy as np
 
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.stage_functions import ReadingFunction, StageFunctions, StepRows, reading
-from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm, motion_sums, stage_terms
+from symphys.transcription.staged.stage_terms import Kind, StageSymbols, StageTerm, motion_sums, stage_terms
 from symphys.transcription.staged.tangent import Tangent
 from symphys.types import Array, Expr, Ints
 
@@ -111,20 +111,13 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
         function = ReadingFunction(shared.function.function, shared.function.reads, term.after)
         return TermSlopes(function, shared.slopes, shared.curved, shared.parts, shared.bases, shared.acting)
     value, arguments = term.value, symbols.arguments[:4]
-    raw = [ca.sparsify(ca.jacobian(value, each)) for each in arguments]
-    moved = [_times(raw[i], symbols.bases[i]) if raw[i].nnz() else ca.SX(value.shape[0], 0) for i in (0, 1)]
-    constants: Expr = raw[3]
-    if symbols.shifts is not None:
-        for slope, shift in zip(raw[:2], symbols.shifts, strict=True):
-            more = symbols.constants.shape[0] - symbols.parameter_size
-            constants = constants + ca.horzcat(_times(slope, shift), ca.SX(value.shape[0], more))
-    slopes = [*moved, raw[2], constants]
+    slopes = tangent_slopes(symbols, value)
     second, acting = _second(value, arguments) if term.kind in ("cost", "sum") else (None, ())
     bases = [symbols.bases[i][acting[i].tolist(), :] if len(acting[i]) else ca.SX(0, 0) for i in (0, 1) if acting]
-    results = [value, *(_nonzeros(each) for each in slopes)]
+    results = [value, *(nonzeros(each) for each in slopes)]
     parts: tuple[slice, ...] = ()
     if second is not None:
-        results += [_nonzeros(second), *(_nonzeros(each) for each in bases)]
+        results += [nonzeros(second), *(nonzeros(each) for each in bases)]
         ends = np.cumsum([0, *(len(each) for each in acting)]).tolist()
         parts = tuple(slice(*pair) for pair in pairwise(ends))
     found = TermSlopes(
@@ -137,6 +130,18 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
     )
     known[term.key] = found
     return found
+
+
+def tangent_slopes(symbols: StageSymbols, value: Expr) -> list[Expr]:
+    """Sparse slopes of a value (r,) by the tangents of ``x`` and of ``first``, by inputs and by constants."""
+    raw = [ca.sparsify(ca.jacobian(value, each)) for each in symbols.arguments[:4]]
+    moved = [_times(raw[i], symbols.bases[i]) if raw[i].nnz() else ca.SX(value.shape[0], 0) for i in (0, 1)]
+    constants: Expr = raw[3]
+    if symbols.shifts is not None:
+        for slope, shift in zip(raw[:2], symbols.shifts, strict=True):
+            more = symbols.constants.shape[0] - symbols.parameter_size
+            constants = constants + ca.horzcat(_times(slope, shift), ca.SX(value.shape[0], more))
+    return [*moved, raw[2], constants]
 
 
 def raw_slopes(symbols: StageSymbols, term: StageTerm) -> ReadingFunction:
@@ -197,7 +202,8 @@ def _times(slope: Expr, matrix: Expr) -> Expr:
     )
 
 
-def _nonzeros(matrix: Expr) -> Expr:
+def nonzeros(matrix: Expr) -> Expr:
+    """Return the nonzeros of a sparse expression as a column."""
     return ca.vertcat(ca.SX(0, 1), *matrix.nonzeros())
 
 
@@ -218,10 +224,12 @@ class TermGroups:
     Attributes:
         symbols: that they are expressions of.
         terms: costs, targets and constraints in the problem's order, then sums.
+        clock: [steps] the time at which state 0 is.
     """
 
     def __init__(self, rollout: Rollout, tangent: Tangent, backend: str, threads: int | None) -> None:
         """Find them; nothing is compiled before it is asked for."""
+        self.clock = 0.0
         self.symbols = StageSymbols(rollout, tangent, motion_sums(rollout))
         self.terms = stage_terms(self.symbols)
         self._backend, self._threads = backend, threads
@@ -240,7 +248,7 @@ class TermGroups:
             parts = (X[:, steps], X[:, steps + 1], U[:, steps])
             before, after, u = (part.reshape(batch * len(steps), part.shape[2]) for part in parts)
             shared, ticks = np.repeat(constants, len(steps), axis=0), np.tile(steps, batch)
-            rows = StepRows(before, after, u, shared, ticks)
+            rows = StepRows(before, after, u, shared, ticks, self.clock)
             for number, (value,) in zip(group.numbers, functions(rows), strict=True):
                 found[number] = value.reshape(batch, len(steps), value.shape[1])
         return [(self.terms[number], found[number]) for number in sorted(found)]
@@ -259,13 +267,12 @@ class TermGroups:
                     after[here, first + term.number] += term.weight * value[:, 0]
         return after
 
-    def slopes(self, rows: StepRows, sums: bool) -> Iterator[tuple[StageTerm, TermSlopes, list[Array]]]:
-        """Return the raw values and slopes, one row a step, of the sums, or of all other terms in order."""
+    def slopes(self, rows: StepRows, kinds: frozenset[Kind]) -> Iterator[tuple[StageTerm, TermSlopes, list[Array]]]:
+        """Of the terms of some kinds, in order: what ``TermSlopes`` makes values and slopes of; a row a step."""
         found: dict[int, list[Array]] = {}
-        for group, functions in zip(self._groups, self._slope_functions, strict=True):
-            if group.sums == sums:
-                here = _rows(rows, self.terms[group.numbers[0]].steps)
-                found.update(zip(group.numbers, functions(here), strict=True))
+        for numbers, functions in self._of_kinds(kinds):
+            here = _rows(rows, self.terms[numbers[0]].steps)
+            found.update(zip(numbers, functions(here), strict=True))
         return ((self.terms[number], self._slopes[number], found[number]) for number in sorted(found))
 
     def beside(self, term: StageTerm, rows: StepRows) -> Array:
@@ -288,27 +295,38 @@ class TermGroups:
         for term in self.terms:
             made = known.setdefault(term.key, reading([term.value], self.symbols.arguments, term.after))
             functions.append(ReadingFunction(made.function, made.reads, term.after))
-        return self._grouped(functions, MOTIONS)
+        return [self._together([functions[i] for i in group.numbers], group.numbers, MOTIONS) for group in self._groups]
 
     @cached_property
-    def _slopes(self) -> list[TermSlopes]:
-        known: dict[Any, TermSlopes] = {}
-        return [term_slopes(self.symbols, term, known) for term in self.terms]
+    def _slopes(self) -> dict[int, TermSlopes]:
+        """By the number of a term, as they are asked for."""
+        return {}
 
     @cached_property
-    def _slope_functions(self) -> list[StageFunctions]:
-        return self._grouped([each.function for each in self._slopes], 1)
+    def _known(self) -> dict[Any, TermSlopes]:
+        return {}
 
-    def _grouped(self, functions: Sequence[ReadingFunction], motions: int) -> list[StageFunctions]:
-        """Evaluate the terms of each group together, for many motions at once."""
-        made = []
-        for group in self._groups:
-            steps = motions * len(self.terms[group.numbers[0]].steps)
-            made.append(StageFunctions([functions[i] for i in group.numbers], steps, self._backend, self._threads))
-        return made
+    @cached_property
+    def _sloped(self) -> dict[frozenset[Kind], list[tuple[list[int], StageFunctions]]]:
+        """By kinds of terms: numbers of terms at the same steps, and what evaluates them."""
+        return {}
+
+    def _of_kinds(self, kinds: frozenset[Kind]) -> list[tuple[list[int], StageFunctions]]:
+        if kinds not in self._sloped:
+            chosen = [[i for i in group.numbers if self.terms[i].kind in kinds] for group in self._groups]
+            for number in sorted(i for numbers in chosen for i in numbers if i not in self._slopes):
+                self._slopes[number] = term_slopes(self.symbols, self.terms[number], self._known)
+            made = ((each, [self._slopes[i].function for i in each]) for each in chosen if each)
+            self._sloped[kinds] = [(each, self._together(functions, each, 1)) for each, functions in made]
+        return self._sloped[kinds]
+
+    def _together(self, functions: Sequence[ReadingFunction], numbers: list[int], motions: int) -> StageFunctions:
+        """Functions of terms at the same steps, for so many motions at once."""
+        steps = motions * len(self.terms[numbers[0]].steps)
+        return StageFunctions(functions, steps, self._backend, self._threads)
 
 
 def _rows(rows: StepRows, here: Any) -> StepRows:
     """Some of them."""
     constants = rows.constants if len(rows.constants) == 1 else rows.constants[here]
-    return StepRows(rows.before[here], rows.after[here], rows.u[here], constants, rows.ticks[here])
+    return StepRows(rows.before[here], rows.after[here], rows.u[here], constants, rows.ticks[here], rows.clock)

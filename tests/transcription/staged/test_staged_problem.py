@@ -324,7 +324,8 @@ def test_compiled_terms_are_those_of_the_virtual_machine(
     Z, X, U = motion.z[None], motion.x[None], motion.u[None]
     slopes, costs = staged.limit_slopes(motion), staged.expand(motion, np.ones(len(staged.lower)), staged.penalties)
     objective, limits = staged.measure(Z, X, U)
-    assert all(functions._kernel is not None for functions in groups._values + groups._slope_functions)
+    sloped = [functions for group in groups._sloped.values() for _, functions in group]
+    assert sloped and all(functions._kernel is not None for functions in groups._values + sloped)
     _, plain, _ = made.__wrapped__(*case)
     expected, same = plain.limit_slopes(motion), plain.measure(Z, X, U)
     np.testing.assert_allclose(objective, same[0], rtol=1e-13)

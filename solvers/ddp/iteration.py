@@ -1,0 +1,87 @@
+"""One iteration of iLQR about a motion: steps and costs to second order, a policy, and the best motion along it.
+
+The solver ``ilqr`` and model predictive control iterate by this. They differ in what a motion is worth, in how damping
+follows success, and in how often they iterate.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from itertools import tee
+from typing import NamedTuple
+
+import numpy as np
+
+from symphys.shooting import Linearized, StagedMotion, StagedProblem
+from symphys.solvers.ddp.backward_pass import Bounds, Policy, backward_pass
+from symphys.solvers.ddp.forward_pass import MotionBatch, forward_pass
+from symphys.solvers.ddp.knots import PaddedKnots
+from symphys.types import Array
+
+LENGTHS = 0.5 ** np.arange(8.0)
+"""Step lengths that are tried side by side."""
+
+
+class BestMotion(NamedTuple):
+    """The lowest motion of a line search.
+
+    Attributes:
+        motion: itself.
+        value: of the augmented objective.
+        length: of the step.
+        expected: the fall of the objective that the policy expects of it.
+    """
+
+    motion: StagedMotion
+    value: float
+    length: float
+    expected: float
+
+
+class LocalExpansion:
+    """A problem to second order about a motion.
+
+    Attributes:
+        bounds: of changes of z.
+    """
+
+    def __init__(
+        self,
+        problem: StagedProblem,
+        motion: StagedMotion,
+        limits: tuple[Array, Array],
+        knots: PaddedKnots,
+        scale: Array,
+        slopes: Iterable[Linearized] | None = None,
+    ) -> None:
+        """Expand the objective while threads are at the slopes of the steps.
+
+        Args:
+            problem: to expand.
+            motion: about which.
+            limits: (c,) multipliers and penalties of its limits.
+            knots: of the problem.
+            scale: (len(z),) of the decision vector.
+            slopes: of the steps, from the last one, where these are begun already.
+        """
+        self.problem, self.motion, self.knots = problem, motion, knots
+        self._slopes = problem.linearize_from_end(motion) if slopes is None else slopes
+        self._costs = problem.expand(motion, *limits)
+        self.bounds = Bounds(knots.lower[:-1] - motion.z, knots.upper[:-1] - motion.z, scale)
+
+    def policy(self, damping: float, gradient: bool = True) -> Policy | None:
+        """Pass backwards over the steps; see ``backward_pass``."""
+        runs, self._slopes = tee(self._slopes)
+        statics = self.problem.statics
+        return backward_pass(runs, self._costs, self.knots.steps, statics, self.bounds, damping, gradient)
+
+    def search(self, policy: Policy, values: Callable[[MotionBatch], Array]) -> BestMotion:
+        """Follow a policy with all step lengths, side by side; ``values`` (B,) of motions decide."""
+        motions = forward_pass(self.problem, self.motion, policy, self.knots, LENGTHS)
+        found = values(motions)
+        found = np.where(np.isfinite(found), found, math.inf)
+        best = int(found.argmin())
+        length = float(LENGTHS[best])
+        expected = -(length * policy.first + length**2 * policy.second)
+        return BestMotion(motions.motion(best, self.motion.smoothing), float(found[best]), length, expected)

@@ -1,0 +1,179 @@
+"""Squares and limits to second order about a motion, all at once: their slopes lie on top of each other.
+
+A term that looks at one state alone is a row at each of the N + 1 states, whichever steps ask for it: formulas that
+running costs read at either side of a step are evaluated once. A term of the state after a step that also looks at what
+leads there is a row at each of the N steps. With rows r, slopes S and weights w the objective sum w r . r has the slope
+2 S' w r and the Gauss-Newton curvature 2 S' w S.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+import numpy as np
+
+from symphys.transcription.staged.expansion_sums import ExpansionSums
+from symphys.transcription.staged.stage_functions import StageFunctions, StepRows, reading
+from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm
+from symphys.transcription.staged.term_slopes import nonzeros, tangent_slopes
+from symphys.types import Array
+
+Evaluated = tuple[str, int | None, int | None]
+"""Backend, threads, and the operations of a horizon above which functions are compiled."""
+
+
+class SquareStack:
+    """Terms whose squares are summed, and limits, at all states of a motion or at all steps."""
+
+    def __init__(
+        self,
+        symbols: StageSymbols,
+        terms: Sequence[StageTerm],
+        places: Mapping[int, slice],
+        bounds: tuple[Array, Array],
+        at_steps: bool,
+        static: bool,
+        evaluated: Evaluated,
+    ) -> None:
+        """Write down their slopes; nothing is compiled before it is asked for.
+
+        Args:
+            symbols: that the terms are expressions of.
+            terms: to stack.
+            places: where limits are among all limits, by the ``id`` of the term.
+            bounds: (c,) each, of all limits.
+            at_steps: whether they look at both sides of a step; else they look at one state.
+            static: whether z has static entries.
+            evaluated: how; see ``StageFunctions``.
+        """
+        steps, self._at_steps = symbols.rollout.steps, at_steps
+        rows = steps if at_steps else steps + 1
+        values, weights, limits = list[ca.SX](), list[Array](), list[np.ndarray]()
+        known: dict[tuple[object, ...], int] = {}
+        for term in terms:
+            limit = places.get(id(term))
+            key = (*term.key, -1 if limit is None else limit.start)
+            if key not in known:
+                known[key] = len(values)
+                values.append(term.value)
+                weights.append(np.zeros((rows, term.size)))
+                limits.append(np.full((rows, term.size), -1))
+            ticks = term.steps if at_steps else term.states
+            if limit is None:
+                weights[known[key]][ticks] += term.weight
+            else:
+                limits[known[key]][ticks] = np.arange(limit.start, limit.stop).reshape(-1, term.size)
+        self._weights, whole = np.concatenate(weights, axis=1), np.concatenate(limits, axis=1)
+        self._limited = np.flatnonzero((whole >= 0).any(axis=0))
+        self._limits = whole[:, self._limited]
+        self._lower, self._upper = (np.append(each, 0.0)[self._limits] for each in bounds)
+        stacked = ca.vertcat(ca.SX(0, 1), *values)
+        x, first, u, constants = tangent_slopes(symbols, stacked)
+        self._n, self._m = symbols.tangent.size + len(symbols.sums.sums), int(symbols.u.shape[0])
+        wide = (_padded(x, self._n), _padded(first, symbols.tangent.size if at_steps and first.nnz() else 0), u)
+        sizes = [int(each.shape[1]) for each in wide]
+        slopes = ca.sparsify(ca.horzcat(*wide, constants if static else ca.SX(stacked.shape[0], 0)))
+        self._cuts = [slice(end - size, end) for size, end in zip(sizes, np.cumsum(sizes).tolist(), strict=True)]
+        self._wide, self._shape = sum(sizes), (rows, *slopes.shape)
+        self._places = tuple(np.array(each, np.int64) for each in slopes.sparsity().get_triplet())
+        function = reading([stacked, nonzeros(slopes)], symbols.arguments, at_steps)
+        self._functions = StageFunctions([function], rows, *evaluated)
+        unused = (self._weights == 0) & (whole < 0)
+        self._unused = (unused, unused[:, self._places[0]]) if unused.any() else None
+
+    def add(
+        self,
+        sums: ExpansionSums,
+        x: Array,
+        u: Array,
+        constants: Array,
+        clock: float,
+        multipliers: Array,
+        penalties: Array,
+    ) -> None:
+        """Add the terms about a motion.
+
+        Args:
+            sums: to add to.
+            x: (N + 1, nx) states.
+            u: (N, m) inputs of the rollout.
+            constants: (1, c) of the terms.
+            clock: [steps] the time of the first state.
+            multipliers: (c,) of all limits.
+            penalties: (c,) likewise.
+        """
+        steps, at_steps = len(u), self._at_steps
+        before, after = (x[:-1], x[1:]) if at_steps else (x, x)
+        u = u if at_steps else np.concatenate([u, u[-1:]])
+        ((r, packed),) = self._functions(StepRows(before, after, u, constants, np.arange(len(u)), clock))
+        if self._unused is not None:  # what nobody asks for may not be finite
+            r, packed = r.copy(), packed.copy()
+            r[self._unused[0]], packed[self._unused[1]] = 0.0, 0.0
+        slopes = np.zeros(self._shape)
+        slopes[:, self._places[0], self._places[1]] = packed
+        weights = self._weights
+        if len(self._limited):
+            r, weights = self._violations(r, multipliers, penalties)
+        sums.value += float(np.vdot(weights * r, r))
+        if slopes.shape[2] > self._wide:
+            slopes = np.concatenate([slopes[:, :, : self._wide], sums.by_constants(slopes[:, :, self._wide :])], axis=2)
+        bent = (2 * weights)[:, :, None] * slopes
+        slope, curve = (r[:, None] @ bent)[:, 0], slopes.transpose(0, 2, 1) @ bent
+        by_x, first, by_u = self._cuts
+        here = slice(1, None) if at_steps else slice(None)
+        mixed, m = (sums.uy if at_steps else sums.ux), self._m
+        sums.x[here] += slope[:, by_x]
+        sums.xx[here] += curve[:, by_x, by_x]
+        sums.u[:, :m] += slope[:steps, by_u]
+        sums.uu[:, :m, :m] += curve[:steps, by_u, by_u]
+        mixed[:, :m] += curve[:steps, by_u, by_x]
+        n = first.stop - first.start
+        if n:
+            sums.x[:-1, :n] += slope[:, first]
+            sums.xx[:-1, :n, :n] += curve[:, first, first]
+            sums.ux[:, :m, :n] += curve[:, by_u, first]
+        if sums.s.size:
+            s = slice(self._wide, None)
+            sums.s += slope[:, s].sum(axis=0)
+            sums.ss += curve[:, s, s].sum(axis=0)
+            sums.sx[here] += curve[:, s, by_x]
+            sums.su[:, :, :m] += curve[:steps, s, by_u]
+            if n:
+                sums.sx[:-1, :, :n] += curve[:, s, first]
+
+    def _violations(self, r: Array, multipliers: Array, penalties: Array) -> tuple[Array, Array]:
+        """(T, R) values, those of limits as their shifted violations, and weights."""
+        some, r, weights = self._limited, r.copy(), self._weights.copy()
+        multiplier, penalty = (np.append(each, 0.0)[self._limits] for each in (multipliers, penalties))
+        moved = r[:, some] + multiplier / np.where(penalty > 0, penalty, 1.0)
+        beyond = moved - np.clip(moved, self._lower, self._upper)
+        r[:, some] = beyond
+        weights[:, some] = penalty * (beyond != 0) / 2
+        return r, weights
+
+
+def square_stacks(
+    symbols: StageSymbols,
+    terms: Sequence[StageTerm],
+    bounds: tuple[Array, Array],
+    static: bool,
+    evaluated: Evaluated,
+) -> list[SquareStack]:
+    """Return the stacks of the squares and limits among terms; see ``SquareStack``."""
+    at_states, at_steps, places, first = list[StageTerm](), list[StageTerm](), dict[int, slice](), 0
+    for term in terms:
+        if term.kind == "limit":
+            places[id(term)] = slice(first, first + len(term.steps) * term.size)
+            first = places[id(term)].stop
+        if term.kind in ("squares", "limit"):
+            whole = ca.Function("term", list(symbols.arguments), [ca.densify(term.value)])
+            both = term.after and any(whole.jac_sparsity(0, i).nnz() for i in (1, 2))
+            (at_steps if both else at_states).append(term)
+    chosen = ((each, both) for each, both in ((at_states, False), (at_steps, True)) if each)
+    return [SquareStack(symbols, each, places, bounds, both, static, evaluated) for each, both in chosen]
+
+
+def _padded(slope: ca.SX, columns: int) -> ca.SX:
+    """A slope that may have no columns, with as many as it should have."""
+    return slope if slope.shape[1] == columns else ca.SX(slope.shape[0], columns)
