@@ -41,7 +41,7 @@ from symphys.types import Array
 
 NO_SQUARES = (
     "this problem has no residuals: a cost is no sum of squares (write it as one: `squares`, a formula whose squares "
-    "add up to the cost), or a net is too large or bodies are too many for a Jacobian (use another solver)"
+    "add up to the cost), or a net is too large for a Jacobian (use another solver)"
 )
 STALLED = (
     "no lower merit was found although the Jacobian promises one: it may be wrong there (`symphys check` compares "
