@@ -26,6 +26,8 @@ from symphys.codegen.toolchain.cache import Cache
 if TYPE_CHECKING:
     from symphys.codegen.emit.source import SourceFile
 
+SIGNAL_INTERVAL = 0.2
+"""[s] The main thread wakes so often: a signal that arrives as a wait begins, or in another thread, does not end it."""
 JOIN_TIMEOUT = 10.0
 """[s] to wait for a thread whose compiler was stopped."""
 ADVICE = "install gcc or clang (or `pip install ziglang`), or set CC to a C compiler"
@@ -135,7 +137,7 @@ class _Crew:
             for worker in workers:
                 worker.start()
             for _ in range(count):
-                if (error := self.ended.get()) is not None:
+                if (error := self._next_end()) is not None:
                     raise error
         finally:
             self.over.set()
@@ -144,6 +146,12 @@ class _Crew:
             for worker in workers:
                 if worker.ident is not None:
                     worker.join(JOIN_TIMEOUT)
+
+    def _next_end(self) -> BaseException | None:
+        """Wait for the error, or None, of the next command that is over, and for signals."""
+        while True:
+            with contextlib.suppress(Empty):
+                return self.ended.get(timeout=SIGNAL_INTERVAL)
 
     def work(self) -> None:
         """Run one command after the other; each leaves an error, or None."""
@@ -224,7 +232,8 @@ class Background:
 
     def finish(self) -> None:
         """Wait for its end."""
-        self._thread.join()
+        while self._thread.is_alive():
+            self._thread.join(SIGNAL_INTERVAL)
 
     def _run(self) -> None:
         try:

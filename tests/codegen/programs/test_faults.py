@@ -136,6 +136,37 @@ run_all(Struck([["sleep", "100000"]]), 100000, at_once=1)
 """
 
 
+ELSEWHERE = """
+import signal, threading, time
+from symphys.codegen.toolchain import processes
+
+def strike():
+    while not crew.started:
+        time.sleep(0.01)
+    signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+    time.sleep(100000)
+
+crew, plain = None, processes._Crew.run
+
+def run(self, at_once):
+    global crew
+    crew = self
+    threading.Thread(target=strike, daemon=True).start()
+    plain(self, at_once)
+
+processes._Crew.run = run
+processes.run_all([["sleep", "100000"]], 100000, at_once=1)
+"""
+
+
+@UNIX
+def test_ctrl_c_is_not_lost_as_a_wait_begins() -> None:
+    """A signal that another thread gets does not end the main thread's wait, as one that comes just before it."""
+    command = [sys.executable, "-c", ELSEWHERE]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=FOREVER, check=False)
+    assert found.returncode and "KeyboardInterrupt" in found.stderr
+
+
 @UNIX
 def test_ctrl_c_is_not_lost_in_a_finalizer() -> None:
     found = subprocess.run([sys.executable, "-c", STRUCK], capture_output=True, text=True, timeout=FOREVER, check=False)
