@@ -79,7 +79,7 @@ def follow_policy(
     smoothing: float,
     shares: Array | float = 1.0,
 ) -> Followed:
-    """The same as ``StagedProblem.follow``, step by step where that is not compiled."""
+    """Return the motions of ``StagedProblem.follow``, step by step where that is not compiled."""
     found = problem.follow(policy, about, z, lengths, smoothing, shares)
     if found is not None:
         return found
@@ -90,7 +90,8 @@ def follow_policy(
     x[:, 0] = problem.start(z)
     for k in range(steps):
         off = problem.difference(np.repeat(policy.x[None, k], count, axis=0), x[:, k])
-        answer = np.concatenate([off, held - policy.old[k], off_statics], axis=1) @ policy.back[k].T
+        beside = np.concatenate([off, held - policy.old[k], off_statics], axis=1)
+        answer = beside @ policy.back[k].T if policy.new.shape[1] else 0.0
         wanted = policy.new[k] + lengths[:, None] * policy.ahead[k] + share * answer
         new[:, k] = np.clip(wanted, policy.lower[k], policy.upper[k])
         acting = np.concatenate([held, new[:, k]], axis=1)

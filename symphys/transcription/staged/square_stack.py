@@ -116,7 +116,8 @@ class SquareStack:
         if len(self._limited):
             r, weights = self._violations(r, multipliers, penalties)
         sums.value += float(np.vdot(weights * r, r))
-        if slopes.shape[2] > self._wide:
+        by_statics = slopes.shape[2] > self._wide
+        if by_statics:
             slopes = np.concatenate([slopes[:, :, : self._wide], sums.by_constants(slopes[:, :, self._wide :])], axis=2)
         bent = (2 * weights)[:, :, None] * slopes
         slope, curve = (r[:, None] @ bent)[:, 0], slopes.transpose(0, 2, 1) @ bent
@@ -133,7 +134,7 @@ class SquareStack:
             sums.x[:-1, :n] += slope[:, first]
             sums.xx[:-1, :n, :n] += curve[:, first, first]
             sums.ux[:, :m, :n] += curve[:, by_u, first]
-        if sums.s.size:
+        if by_statics and sums.s.size:
             s = slice(self._wide, None)
             sums.s += slope[:, s].sum(axis=0)
             sums.ss += curve[:, s, s].sum(axis=0)
