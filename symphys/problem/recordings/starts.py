@@ -124,7 +124,7 @@ class Starts:
 def turn_on(joint: ParametricJoint, body: str, rate: float, state: State) -> None:
     """Give a body, in place, the rate of its joint; what the file's start has of it is replaced."""
     placed, point = placed_frames(joint, state)
-    ((slide, turn),) = (np.array(each, float).reshape(2, 3) for each in joint.kind.motions(placed))
+    ((slide, turn),) = ([np.array(ca.DM(part)).ravel() for part in each] for each in joint.kind.motions(placed))
     base = (joint.second or WORLD) if body == joint.first else joint.first
     sign = 1.0 if body == joint.first else -1.0
     spin, velocity, centre = motion_of(base, state)

@@ -38,7 +38,8 @@ def start_of(problem: Problem) -> dict[str, Any]:
     values = {**problem.initial, **problem.parameters, **problem.recordings[0].start}
     start = StartValues().of(problem.parametric, values)
     apart = {f"apart {k}": reading[:2] for k, reading in enumerate(start.joints())}
-    return {name: np.array(value).ravel() for name, value in start.quantities().items()} | apart
+    found = {name: value() if callable(value) else value for name, value in start.quantities().items()}
+    return {name: np.array(value).ravel() for name, value in found.items()} | apart
 
 
 def recorded(folder: Path, given: dict[str, Any], start: dict[str, str], **tables: Any) -> Problem:
