@@ -93,7 +93,9 @@ def test_a_robot_moves_as_from_its_tables() -> None:
 @pytest.mark.parametrize("name", ["Body", "Hinge", "make_world"])
 def test_examples_run(name: str) -> None:
     runner = doctest.DocTestRunner()
-    (example,) = (each for each in doctest.DocTestFinder(recurse=False).find(getattr(symphys, name), name, globs={}))
+    (example,) = (
+        each for each in doctest.DocTestFinder(recurse=False).find(getattr(symphys.model, name), name, globs={})
+    )
     assert example.examples
     assert runner.run(example).failed == 0
 
