@@ -22,7 +22,7 @@ from symphys.runs.job import solver_options
 from symphys.shooting import ScenarioSamples
 from symphys.solvers import SOLVERS, TraceRow
 from symphys.transcription import transcribe
-from symphys.transcription.randomization.transcription import KernelSamples, SampledEvaluator
+from symphys.transcription.randomization.transcription import KernelSamples, ScenarioGrids
 from symphys.types import Array
 
 UNSEEN, FEWER, SEED = 500, 64, 20161105
@@ -55,7 +55,7 @@ class Walks:
         """Compile the problem."""
         made = transcribe(problem, exact=True)
         scenario = made.shooting.scenario
-        assert isinstance(scenario, SampledEvaluator), made.backend.note
+        assert isinstance(scenario, ScenarioGrids), made.backend.note
         assert isinstance(scenario.evaluators[0], KernelSamples), "nets are within the step"
         self.problem, self.made, self.scenario, self.kernel = problem, made, scenario, scenario.evaluators[0].kernel
         names = [*(f"target {t.name}" for t in problem.targets), *(c.name for c in problem.constraints)]

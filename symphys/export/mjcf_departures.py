@@ -90,7 +90,7 @@ def joint_departures(start: StartState) -> Iterator[Departure]:
     yield Departure("refused", frames, "a frame without mass that is not between two joints of one chain")
     others = [joint for k, joint in enumerate(world.joints) if k not in trees]
     soft = [joint.name for joint in others if joint.soft and not expressible_loop(world, joint)]
-    text = "a joint that gives way, by another law than MuJoCo's; leave out its frequency"
+    text = "a compliant joint, whose law differs from MuJoCo's; leave out its frequency"
     yield Departure("left out", tuple(soft), text)
     loops = [joint.name for joint in others if not joint.soft and not expressible_loop(world, joint)]
     text = "a joint that closes a loop, which only ball, hinge and fixed joints between bodies with mass do there"
@@ -146,7 +146,7 @@ def soft_departures(start: StartState) -> Iterator[Departure]:
     loops = tuple(joint.name for joint in closing if not joint.soft)
     yield Departure("approximated", loops, "a rigid joint that closes a loop, as an equality constraint that gives way")
     soft = tuple(joint.name for joint in closing if joint.soft)
-    text = "a joint that gives way, as an equality constraint of the same frequency and damping ratio"
+    text = "a compliant joint, as an equality constraint of the same frequency and damping ratio"
     yield Departure("approximated", soft, text)
     coupled = tuple(element.get("name", "") for element in joint_equalities(start.reference))
     yield Departure("approximated", coupled, "a coupling that is exact here and gives way there")

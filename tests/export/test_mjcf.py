@@ -123,7 +123,7 @@ def test_the_start_is_a_keyframe() -> None:
             make_world([Body.ball("ball", 0.1, 1.0)], [Terrain("hill", lambda x, y: 0.1 * x * x)]),
             "hill: terrain beyond x from -10 to 10 m",
         ),
-        (World((ROD,), joints=(Joint("arm", HINGE, 0, None, ARM.frames, frequency=3),)), "arm: a joint that gives"),
+        (World((ROD,), joints=(Joint("arm", HINGE, 0, None, ARM.frames, frequency=3),)), "arm: a compliant joint"),
         (
             World((ROD,), joints=(Joint("arm", HINGE, 0, None, (JointFrame((0, 0, 1)), JointFrame())),)),
             "arm: a joint that does",

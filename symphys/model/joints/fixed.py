@@ -15,7 +15,7 @@ FIXED = Kind("fixed", turns=((0, 1), (1, 2), (2, 0)))
 class FixedJoint(JointSpec):
     """Nothing is left free."""
 
-    summary: ClassVar[str] = "nothing is left free"
+    summary: ClassVar[str] = "no degrees of freedom"
     anywhere: ClassVar[bool] = True
 
     @property

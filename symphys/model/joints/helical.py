@@ -11,10 +11,9 @@ from dataclasses import dataclass, field
 from math import isfinite, pi
 from typing import Any, ClassVar
 
-from symphys.model.joints.frames import single_axis
 from symphys.model.joints.hinge import angle
 from symphys.model.joints.kind import Coordinate, Kind
-from symphys.model.joints.specs import DIRECTION, MovingJoint, Vector
+from symphys.model.joints.specs import SingleAxisJoint
 from symphys.model.scalar import Scalar
 from symphys.types import Array
 
@@ -44,7 +43,7 @@ def helical(pitch: Scalar) -> HelicalKind:
 
 
 @dataclass(frozen=True)
-class HelicalJoint(MovingJoint):
+class HelicalJoint(SingleAxisJoint):
     """The second turns about an axis and moves along it as it does.
 
     Attributes:
@@ -65,7 +64,6 @@ class HelicalJoint(MovingJoint):
     summary: ClassVar[str] = "turns about an axis and moves along it"
     example: ClassVar[str] = "{ axis = [0, 0, 1], pitch = 0.005 }"
 
-    axis: Vector = field(kw_only=True, metadata=DIRECTION)
     pitch: Scalar = field(
         kw_only=True,
         metadata={
@@ -79,11 +77,6 @@ class HelicalJoint(MovingJoint):
         """Return the kind of joint."""
         return helical(self.pitch)
 
-    @property
-    def frame_axes(self) -> Array:
-        """Return the axes (3, 3) of both frames as columns, as the bodies lie, world frame."""
-        return single_axis(self.axis)
-
     def check_acting(self) -> None:
         """Raise ValueError for a pitch, a motor or a spring that is none."""
         if isinstance(self.pitch, int | float) and not (self.pitch and isfinite(self.pitch)):
@@ -93,4 +86,4 @@ class HelicalJoint(MovingJoint):
     @classmethod
     def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
         """Return the keys of its table in problem files."""
-        return {"axis": axes[:, 0].tolist(), "pitch": float(kind.numbers["pitch"])}
+        return {**super().table(kind, axes), "pitch": float(kind.numbers["pitch"])}

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
 from symphys.maths.smoothing import angle_of
-from symphys.model.joints.frames import single_axis
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
-from symphys.model.joints.specs import DIRECTION, MovingJoint, Vector
-from symphys.types import Array, Expr
+from symphys.model.joints.specs import SingleAxisJoint
+from symphys.types import Expr
 
 
 def angle(placed: PlacedFrames) -> Expr:
@@ -26,7 +25,7 @@ HINGE = Kind("hinge", turns=((0, 1), (0, 2)), coordinates=(Coordinate("angle", a
 
 
 @dataclass(frozen=True)
-class Hinge(MovingJoint):
+class Hinge(SingleAxisJoint):
     """The second turns about an axis.
 
     Attributes:
@@ -50,19 +49,7 @@ class Hinge(MovingJoint):
     summary: ClassVar[str] = "turns about an axis"
     example: ClassVar[str] = "{ axis = [0, 1, 0] }"
 
-    axis: Vector = field(kw_only=True, metadata=DIRECTION)
-
     @property
     def kind(self) -> Kind:
         """Return the kind of joint."""
         return HINGE
-
-    @property
-    def frame_axes(self) -> Array:
-        """Return the axes (3, 3) of both frames as columns, as the bodies lie, world frame."""
-        return single_axis(self.axis)
-
-    @classmethod
-    def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
-        """Return the keys of its table in problem files."""
-        return {"axis": axes[:, 0].tolist()}

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
-from symphys.model.joints.frames import single_axis
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
-from symphys.model.joints.specs import DIRECTION, MovingJoint, Vector
-from symphys.types import Array, Expr
+from symphys.model.joints.specs import SingleAxisJoint
+from symphys.types import Expr
 
 
 def position(placed: PlacedFrames) -> Expr:
@@ -23,7 +22,7 @@ SLIDER = Kind("slider", (1, 2), ((0, 1), (1, 2), (2, 0)), (ALONG,))
 
 
 @dataclass(frozen=True)
-class Slider(MovingJoint):
+class Slider(SingleAxisJoint):
     """The second moves along an axis and does not turn.
 
     Attributes:
@@ -44,19 +43,7 @@ class Slider(MovingJoint):
     example: ClassVar[str] = "{ axis = [1, 0, 0] }"
     anywhere: ClassVar[bool] = True
 
-    axis: Vector = field(kw_only=True, metadata=DIRECTION)
-
     @property
     def kind(self) -> Kind:
         """Return the kind of joint."""
         return SLIDER
-
-    @property
-    def frame_axes(self) -> Array:
-        """Return the axes (3, 3) of both frames as columns, as the bodies lie, world frame."""
-        return single_axis(self.axis)
-
-    @classmethod
-    def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
-        """Return the keys of its table in problem files."""
-        return {"axis": axes[:, 0].tolist()}

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from symphys.model.joints.frames import single_axis
 from symphys.model.joints.joint import Limits, Spring
 from symphys.model.joints.kind import Kind
 from symphys.model.joints.motor import Motor
@@ -38,8 +39,8 @@ class JointSpec:
         point: (3,) where the joint is as the bodies lie [m], world coordinates.
         anchors: instead of point: (3,) on the first and on the second, each in its body's frame [m], that of the world
             in world coordinates; as the bodies lie the two must meet.
-        frequency: [Hz] of a joint that gives way; 0: rigid.
-        damping: damping ratio of a joint that gives way.
+        frequency: natural frequency of a compliant joint [Hz]; 0: rigid.
+        damping: damping ratio of a compliant joint.
         collide: whether the two bodies may touch each other.
     """
 
@@ -142,3 +143,24 @@ class MovingJoint(JointSpec):
             if (lower is not None and value < lower) or (upper is not None and value > upper):
                 raise ValueError(f"start: {value:g} is beyond the limits of this joint")
         return values if any(values) else ()
+
+
+@dataclass(frozen=True)
+class SingleAxisJoint(MovingJoint):
+    """A joint with one coordinate, about or along an axis.
+
+    Attributes:
+        axis: (3,) of any length but 0, as the bodies lie, world coordinates.
+    """
+
+    axis: Vector = field(kw_only=True, metadata=DIRECTION)
+
+    @property
+    def frame_axes(self) -> Array:
+        """Return the axes (3, 3) of both frames as columns, as the bodies lie, world frame."""
+        return single_axis(self.axis)
+
+    @classmethod
+    def table(cls, kind: Kind, axes: Array) -> dict[str, Any]:
+        """Return the keys of its table in problem files."""
+        return {"axis": axes[:, 0].tolist()}

@@ -47,7 +47,7 @@ class NamedJoint(Protocol):
 
     @property
     def frequency(self) -> float:
-        """[Hz] of a joint that gives way; 0: rigid."""
+        """Return the natural frequency of a compliant joint [Hz]; 0: rigid."""
 
     @property
     def start(self) -> tuple[float, ...]:

@@ -18,7 +18,7 @@ def forward_kinematics(
     Args:
         joints: all joints; their frames are where the bodies lie in the file.
         initial: the state as the file has it.
-        faults: gets a start of a joint that gives way, or closes a loop of joints with a start.
+        faults: collects starts of a joint that is compliant, or closes a loop of joints with a start.
     """
     if not any(joint.start for joint in joints):
         return {name: value.copy() for name, value in initial.items()}

@@ -25,7 +25,7 @@ class ParametricJoint:
         frames: of the first and of the second.
         motor, limits, spring: along every coordinate.
         armature, friction: see ``Joint``.
-        frequency: [Hz] of a joint that gives way; 0: rigid.
+        frequency: natural frequency of a compliant joint [Hz]; 0: rigid.
         damping: its damping ratio.
         collide: whether the two bodies may touch each other.
         start: the coordinates at the start; empty: all 0, as the bodies lie in the file.

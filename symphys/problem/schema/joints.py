@@ -175,6 +175,6 @@ class JointTable(kinds_of_joints()):  # type: ignore[misc]
         description="inertia that turns with each coordinate, as a rotor does, seen through its gear [kg m^2], or [kg]",
     )
     friction: NonNegative = Field(default=0.0, description="dry friction along every coordinate [N m], or [N]")
-    frequency: NonNegative = Field(default=0.0, description="of a joint that gives way [Hz]; 0: rigid")
-    damping: NonNegative | None = Field(default=None, description="damping ratio of a joint that gives way; default 1")
+    frequency: NonNegative = Field(default=0.0, description="natural frequency of a compliant joint [Hz]; 0: rigid")
+    damping: NonNegative | None = Field(default=None, description="damping ratio of a compliant joint; default 1")
     collide: bool = Field(default=False, description="whether the two bodies may touch each other")

@@ -65,7 +65,7 @@ class KernelSamples:
         return values(outputs, slopes)
 
 
-class SampledEvaluator:
+class ScenarioGrids:
     """See ``ScenarioEvaluator``: a sampler, and what evaluates its samples, for each grid."""
 
     def __init__(
@@ -101,7 +101,7 @@ class SampledEvaluator:
 class NominalEvaluator(WithoutResiduals):
     """Evaluates points in the nominal sample; see ``Evaluator``."""
 
-    def __init__(self, scenario: SampledEvaluator) -> None:
+    def __init__(self, scenario: ScenarioGrids) -> None:
         """Wrap an evaluator of samples."""
         self.scenario = scenario
 
@@ -146,7 +146,7 @@ def with_scenarios(
     except (KernelUnavailable, ProgramError) as error:
         description = replace(plain.backend, note=f"{WITHOUT}: {error}")
         return replace(plain, problem=problem, backend=description)
-    scenario = SampledEvaluator(list(grids), samplers, [evaluator for evaluator, _ in made])
+    scenario = ScenarioGrids(list(grids), samplers, [evaluator for evaluator, _ in made])
     shooting = replace(
         plain.shooting, evaluator=NominalEvaluator(scenario), scenario=scenario, squares=False, nlp=Nlp(None)
     )
