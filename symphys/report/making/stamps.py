@@ -30,18 +30,19 @@ OWN_PAGES = frozenset({RUN_PAGE, BATCH_PAGE})
 PACKAGE = Path(__file__).parents[2]
 DRAWING = (
     "archives.py",
+    "deprecated.py",
     "errors.py",
     "files.py",
     "findings",
     "interrupts.py",
     "json_values.py",
+    "later.py",
     "model",
     "report",
     "results",
     "suggest.py",
     "trajectory.py",
     "types.py",
-    "verbs.py",
     "version.py",
 )
 """Modules and rooms of the package whose code takes part in a page."""
