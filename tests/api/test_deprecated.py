@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from tools.repeats import few
 
 import symphys
 from symphys.deprecated import CALLS, NAMES
@@ -48,9 +49,7 @@ def test_a_package_can_still_be_called(name: str, tmp_path: Path) -> None:
     assert str(error.value) == str(wanted.value)
 
 
-@pytest.mark.parametrize(
-    "statement", ["import symphys", "import symphys.report", "from symphys.report import outdated"]
-)
+@few("statement", ["import symphys", "import symphys.report", "from symphys.report import outdated"], 1)
 def test_a_package_can_be_called_however_it_is_imported(statement: str) -> None:
     code = f"import symphys\n{statement}\ntry: symphys.report('nothing')\nexcept symphys.SymphysError: print('called')"
     done = subprocess.run(

@@ -62,6 +62,7 @@ def test_one_unsolved_run_exits_1_and_the_others_are_done(run: Run, throw: Path,
     assert not read_result(Path("o/unreachable/least_squares-seed0/result.json")).solved
 
 
+@pytest.mark.slow
 def test_what_an_unsolved_run_misses_has_a_unit_and_the_bound_that_holds_it_back_is_named(
     run: Run, unreachable: Path
 ) -> None:

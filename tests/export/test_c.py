@@ -139,6 +139,7 @@ def test_two_threads_do_not_disturb_each_other(kick: Transcription, folder: Path
     np.testing.assert_array_equal(together, [gradient(1), gradient(2)])
 
 
+@pytest.mark.slow
 def test_no_other_name_is_exported(library: Any, folder: Path) -> None:
     assert library.problem_1st_kick_u_step
     for name in ("step", "evaluate", "run", "f0", "PROGRAM"):

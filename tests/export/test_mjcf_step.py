@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.export import problem_model
 from symphys.export.mjcf_actuation import inertias
@@ -109,7 +110,7 @@ def test_a_box_on_soft_ground_is_held_by_friction() -> None:
     assert abs(data.qpos[0]) < 1e-3 and 0.045 < data.qpos[2] < 0.05
 
 
-@pytest.mark.parametrize(("way", "mu"), [([1, 0, 0], 0.5), ([0, 1, 0], 0.2)])
+@few(("way", "mu"), [([1, 0, 0], 0.5), ([0, 1, 0], 0.2)], 1)
 def test_friction_along_and_across_a_direction_brakes_there_as_here(way: list[int], mu: float) -> None:
     """A box that slides along x, where mu is 0.5, or along y, where it is 0.2; MuJoCo's tangents are y and x."""
     box = {"name": "b", "shape": {"box": {"size": [0.4, 0.4, 0.1]}}, "mass": 2.0, "position": [0, 0, 0.05]}
@@ -134,6 +135,7 @@ def test_a_soft_foot_has_its_own_mass_behind_it_whatever_hangs_on_it() -> None:
     assert -data.qpos[0] == pytest.approx(5.5 * 9.81 / (0.5 * (2 * math.pi * 15) ** 2), rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_robot_of_the_timing_table_stands() -> None:
     """Commanded to its start it stays there; at 10 ms with stiff gains it sank by 6 cm, or was thrown."""
     pose = [0, 0, np.deg2rad(25), np.deg2rad(-50)] * 4

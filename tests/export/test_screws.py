@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys import simulate
 from symphys.export import problem_model
@@ -80,7 +81,7 @@ def test_mujoco_moves_a_screw_alike(pitch: float) -> None:
     assert data.qpos[:2] == pytest.approx([motion["swing.angle"][-1], motion["screw.angle"][-1]], abs=1e-5)
 
 
-@pytest.mark.parametrize("pitch", [0.2, -0.1])
+@few("pitch", [0.2, -0.1], 1)
 def test_a_screw_comes_back(pitch: float, tmp_path: Path) -> None:
     problem = arm(pitch)
     made = problem_model(problem)
@@ -106,13 +107,14 @@ def imported(tmp_path: Path, **given: Any) -> dict[str, Any]:
     return read_robot(path, ImportOptions()).tables
 
 
-@pytest.mark.parametrize(
+@few(
     ("given", "pitch"),
     [
         ({}, 0.02 * pi),
         ({"way": -1}, -0.02 * pi),
         ({"first": "screw", "second": "lift", "ratio": -50}, -0.04 * pi),
     ],
+    1,
     ids=["slide follows", "axes against each other", "hinge follows"],
 )
 def test_a_slide_that_follows_a_hinge_is_a_screw(tmp_path: Path, given: dict[str, Any], pitch: float) -> None:
@@ -128,9 +130,10 @@ def test_a_slide_that_follows_a_hinge_is_a_screw(tmp_path: Path, given: dict[str
     assert [sensor["name"] for sensor in tables["sensor"]] == ["turned"]
 
 
-@pytest.mark.parametrize(
+@few(
     "given",
     [{"more": 'damping="1"'}, {"more": 'range="-1 1"'}, {"more": 'stiffness="3"'}, {"square": 0.3}],
+    1,
     ids=["damped", "limited", "sprung", "curved"],
 )
 def test_other_slides_stay_coupled(tmp_path: Path, given: dict[str, Any]) -> None:

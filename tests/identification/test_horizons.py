@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from data.analytic_recordings import TRUTHS, AnalyticRecordings, Truth, recordings, tumble
+from tools.repeats import few
 
 from symphys.identification import (
     FitOptions,
@@ -67,7 +68,7 @@ def test_a_share_has_the_rows_of_its_time() -> None:
         assert np.array_equal(r, whole[:20]) and by_shared.shape == (20, 2) and by_own.shape == (20, 1)
 
 
-@pytest.mark.parametrize("known", [True, False])
+@few("known", [True, False], 1)
 @pytest.mark.parametrize("after", [3, 8, 11])
 def test_an_interruption_in_any_of_them_loses_nothing(known: bool, after: int) -> None:
     problem = recordings(TRUTHS["bounce"], 4, off=1.1, noise_known=np.array([known]))

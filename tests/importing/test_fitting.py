@@ -91,6 +91,7 @@ def test_deviations_are_distances_both_ways() -> None:
     assert off < 0.01
 
 
+@pytest.mark.slow
 def test_inner_walls_do_not_count() -> None:
     """A box with a smaller box inside it is that box."""
     outer, inner = (Placed("box", PLACE, TURN, s * np.array(SIZES["box"])).surface() for s in (1.0, 0.6))

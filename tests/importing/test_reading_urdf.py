@@ -114,6 +114,7 @@ def test_mimic_and_dynamics_are_taken_over(tmp_path: Path) -> None:
     assert elbow["friction"] == 0.2
 
 
+@pytest.mark.slow
 def test_masses_are_those_of_the_file(tmp_path: Path) -> None:
     """A link without <inertial> has none, whatever its shapes; an inertia that MuJoCo refuses is kept."""
     ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'

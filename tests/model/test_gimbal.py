@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tools.repeats import few
 
 from symphys.errors import ProblemError
 from symphys.model.gimbal import Screw, locks
@@ -49,7 +50,7 @@ def test_a_chain_that_cannot_is_not(name: str) -> None:
     assert not locks(FREE[name])
 
 
-@pytest.mark.parametrize(("wheel", "locking"), [(X, True), (Z, False), (Y, False), ([0.6, 0.8, 0], False)])
+@few(("wheel", "locking"), [(X, True), (Z, False), (Y, False), ([0.6, 0.8, 0], False)], 2)
 def test_a_frame_that_holds_three_joints_locks_where_nothing_beyond_it_answers(wheel: object, locking: bool) -> None:
     """A flywheel on the inner ring answers turns of it about all but one axis, which must be the one that locks."""
     screws = [hinge(Z), hinge(Y), hinge(X), hinge(wheel)]

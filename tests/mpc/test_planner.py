@@ -142,6 +142,7 @@ def test_without_a_compiler_a_rollout_is_the_same(monkeypatch: pytest.MonkeyPatc
         assert one == pytest.approx(other, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_shift_by_whole_steps_drops_what_is_past() -> None:
     moved = shifted(plan(), 3 * plan().dt)
     assert moved.v[:-3] == pytest.approx(plan().v[3:])

@@ -17,6 +17,7 @@ HEIGHTS, RADIUS, RESTITUTION, NOISE = (1.0, 0.7, 1.3), 0.05, 0.75, 0.002
 """Of the recorded bounces: where the ball is let go [m], its radius [m], and the noise of its height [m]."""
 
 
+@pytest.mark.slow
 def test_there_is_a_way_into_the_basket_without_the_board() -> None:
     """A parabola straight into the ring: nothing touches the ball on its way."""
     start, ring, time = flights.BASKET_START, flights.RING, flights.BASKET_TIME
@@ -58,6 +59,7 @@ def test_the_guess_catches_the_ball_and_puts_it_elsewhere() -> None:
     assert abs(motion["bowl.position"][-1, 0] - 1) > 0.4
 
 
+@pytest.mark.slow
 def test_the_last_ball_of_a_row_flies_off_with_the_speed_of_the_formula() -> None:
     """In Huygens' row, in the guess, and without the balls between."""
     assert slides.kept_in_row(slides.ROW) == (pytest.approx((4 / 3) ** 4), pytest.approx(0.300564, abs=1e-6))

@@ -14,6 +14,7 @@ mujoco = pytest.importorskip("mujoco")
 MODELS = {"half_cheetah_run": "half_cheetah", "hopper_run": "hopper", "walker2d_walk": "walker2d_v5", "ant_walk": "ant"}
 
 
+@pytest.mark.slow
 @few("name", MODELS, 1)
 def test_the_model_is_untouched(name: str) -> None:
     """Masses, motors and friction are those of the file, and every motor is driven by both controllers."""

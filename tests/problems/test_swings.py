@@ -26,6 +26,7 @@ def test_the_cart_and_pole_move_as_their_equations_say() -> None:
     assert motion.joint_separation.max() < 1e-5
 
 
+@pytest.mark.slow
 def test_the_double_pendulum_moves_as_its_equations_say() -> None:
     """For half a second, under pushes at random; what the time step leaves is of its size."""
     pushes = 1.0 + 3 * np.random.default_rng(3).standard_normal(61)

@@ -83,6 +83,7 @@ def test_figures_hold_the_numbers(folder: Path) -> None:
     assert not (folder / "figures" / "correlations.svg").exists(), "of one number there are none"
 
 
+@pytest.mark.slow
 def test_a_replay_is_what_was_measured_beside_the_simulation(folder: Path) -> None:
     replays, found = read_replays(folder), read_identification(folder)
     assert [each.name for each in replays] == [name for name, _ in found.worst(3)]

@@ -77,6 +77,7 @@ def test_rows_are_data_that_hold_every_run(long: tuple[Path, str]) -> None:
     assert text.count("sha256-") == 1 and "http" not in text.replace("http-equiv", "")
 
 
+@pytest.mark.slow
 def test_few_runs_have_no_table(made: Path, tmp_path: Path) -> None:
     shutil.copytree(made / "ball_throw", tmp_path / "few")
     text = write_batch_report(tmp_path / "few").read_text(encoding="utf-8")

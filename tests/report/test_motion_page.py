@@ -18,6 +18,7 @@ from symphys.results.text_files import ReportError
 from symphys.results.trajectories import read_trajectory
 
 
+@pytest.mark.slow
 def test_page_plays_and_draws(made: Path, tmp_path: Path) -> None:
     run = made / "two_balls" / "gradient-seed0"
     out = write_motion(run / "guess.npz", run / "scene.json", tmp_path / "new" / "motion.html", title="Two <balls>")

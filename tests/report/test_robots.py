@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from data.walker import DT, LEGS, NAMES, SCENE, STEPS, TURNED, hinge, motion
 from tools.page_scripts import NODE, plays_to_the_end, run_script
+from tools.repeats import few
 
 from symphys.report.charts.drawing import draw_chart
 from symphys.report.figures import style
@@ -175,6 +176,7 @@ def test_a_strip_does_not_go_up_or_down_since_only_its_first_picture_has_numbers
     assert strip.size[1] > 20
 
 
+@pytest.mark.slow
 def test_numbers_below_a_strip_do_not_meet(load: Load) -> None:
     with style.paper():
         figure = draw_strip(*load(motion(speed=5.0)))
@@ -196,6 +198,7 @@ def data_of(load: Load, arrays: dict[str, Any], scene: dict[str, Any] = SCENE) -
     return json.loads(json.dumps(motion_data(*load(arrays, scene), None, NUMBERS)))
 
 
+@pytest.mark.slow
 def test_the_camera_goes_along_only_with_what_travels_far(load: Load) -> None:
     assert data_of(load, motion())["follow"] is None
     assert data_of(load, motion(speed=1.0))["follow"] is None
@@ -206,7 +209,7 @@ def test_the_camera_goes_along_only_with_what_travels_far(load: Load) -> None:
 
 
 @NODE
-@pytest.mark.parametrize("speed", [0.0, 5.0])
+@few("speed", [0.0, 5.0], 1)
 def test_script_plays_a_robot_to_the_end(load: Load, speed: float) -> None:
     plays_to_the_end(data_of(load, motion(speed)))
 

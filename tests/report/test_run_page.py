@@ -106,6 +106,7 @@ def test_page_needs_nothing_else(shown: Shown) -> None:
     assert "url(" not in text
 
 
+@pytest.mark.slow
 def test_figures_are_files_too(shown: Shown) -> None:
     figures = list((shown.folder / "figures").iterdir())
     drawn = [path for path in figures if path.suffix == ".svg"]
@@ -117,6 +118,7 @@ def test_figures_are_files_too(shown: Shown) -> None:
     assert all(path.read_text(encoding="utf-8").lstrip().startswith("<?xml") for path in drawn)
 
 
+@pytest.mark.slow
 def test_knots_and_controls_are_drawn(batch: Path) -> None:
     page = Page(read(batch / "two_balls" / "gradient-seed0"))
     assert "push: 480 knots of 2 components" in page.text
@@ -180,6 +182,7 @@ def test_text_from_files_is_escaped(run_dir: Path, edit: Callable[..., None]) ->
     assert all("<script" not in path.read_text(encoding="utf-8") for path in (run_dir / "figures").glob("*.svg"))
 
 
+@pytest.mark.slow
 @few("text", ["$\\frac{$", "球 \N{ROCKET}", "\x00\x1b\ud800", "a" * 5000, ""], 1)
 def test_any_name_can_be_drawn(run_dir: Path, edit: Callable[..., None], text: str) -> None:
     found = json.loads((run_dir / "result.json").read_text())

@@ -168,6 +168,7 @@ def test_the_page_of_a_batch_says_who_used_stages(batch: Path, edit: Edit) -> No
     assert "only start and end are drawn" in text
 
 
+@pytest.mark.slow
 def test_a_page_of_stages_is_made_the_same_twice(staged: Path) -> None:
     pages = [write_run_report(staged).read_bytes() for _ in range(2)]
     assert pages[0] == pages[1]

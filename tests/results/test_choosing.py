@@ -111,6 +111,7 @@ def test_the_best_is_by_verdict_then_by_a_column() -> None:
     assert runs(best([{**rows[0], "objective": None}, rows[2]])) == ["2"], "one without an objective is not the best"
 
 
+@pytest.mark.slow
 def test_the_table_as_files(tmp_path: Path) -> None:
     record(tmp_path, recorded(objective=1 / 3), ground__friction=0.6, objective__stop="met", ball__fixed=True)
     record(tmp_path, recorded(seed=1, objective=math.inf, verdict="not_solved", outputs={"height [m]": 1.0}))

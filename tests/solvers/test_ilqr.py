@@ -79,6 +79,7 @@ def test_what_was_interrupted_comes_to_the_same_answer(stop: int) -> None:
     np.testing.assert_array_equal(rest.z, whole.z)
 
 
+@pytest.mark.slow
 def test_gains_bring_a_disturbed_motion_back() -> None:
     """From a start that is off, the swing-up ends far away with the same torques, and upright with the gains."""
     problem = boxed(acrobot())

@@ -41,7 +41,7 @@ def same(a: Outcome, b: Outcome) -> None:
 
 
 @descents
-@pytest.mark.parametrize("problem", [rosenbrock(), target(), quadratic()], ids=["rosenbrock", "target", "quadratic"])
+@few("problem", [rosenbrock(), target(), quadratic()], 2, ids=["rosenbrock", "target", "quadratic"])
 def test_each_is_that_of_the_solve_alone(name: str, problem: Any) -> None:
     for seed, found in enumerate(together(name, problem)):
         same(found, solve(name, problem, seed))

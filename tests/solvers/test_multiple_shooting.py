@@ -65,6 +65,7 @@ def test_a_body_turns_by_180_degrees(backend: str, hessian: str) -> None:
     assert np.linalg.norm(problem.staged().roll_out(found.z, 0.0).x[:, :4], axis=1) == pytest.approx(1)
 
 
+@pytest.mark.slow
 @every_backend
 def test_a_free_parameter_of_all_steps(backend: str) -> None:
     """The scale of the inertia: static entries act in every interval."""

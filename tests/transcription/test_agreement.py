@@ -15,7 +15,7 @@ from symphys.shooting import StagedProblem
 from symphys.transcription import Transcription, transcribe
 from symphys.types import Array
 
-HEAVY = {"loop of joints", "orientation"}
+HEAVY = {"loop of joints", "orientation", "reactions of joints", "soft joint", "a leg that lands"}
 """What takes seconds to build."""
 COMPILED = {"impacts with friction", "smoothed contact", "references"}
 """What is compiled in every run of the tests; kernels of the others in those of ``make test-all``."""

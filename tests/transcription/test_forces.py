@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from tools.repeats import few
 
 from symphys.errors import ProblemError
 from symphys.problem import Problem, problem_of_tables
@@ -91,7 +92,7 @@ JOINTED = [
 ]
 
 
-@pytest.mark.parametrize(("on", "value"), JOINTED)
+@few(("on", "value"), JOINTED, 1)
 def test_an_arm_in_oil_stops_after_its_momentum_over_c(on: str, value: str) -> None:
     """As a torque on the body, as a motor's command, and as a force 0.3 m from the hinge."""
     inertia, share = 0.4 * MASS * 0.01 + MASS * 0.09, 1.5

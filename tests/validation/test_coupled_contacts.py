@@ -56,6 +56,7 @@ def pressing(friction: float, angle_deg: float, sign: int) -> float:
     return 9.81 / (1 + (rx * rx + sign * friction * rx * rz) / INERTIA)
 
 
+@pytest.mark.slow
 @few("friction", [1.2, 1.4, 2.0, 3.0], 1)
 def test_the_tip_of_a_rod_that_trails(friction: float) -> None:
     """No paradox there, at any friction; the last sweep changes nothing."""

@@ -139,7 +139,7 @@ def test_derivatives_by_the_coefficients_and_the_start(smoothing: float, shape: 
     assert slope == pytest.approx(central_difference(end, at), rel=1e-5, abs=1e-6)
 
 
-@pytest.mark.parametrize("mu", [(0.0, 0.5), (0.5, 0.0), (0.5, 0.2), (0.0, 0.0)])
+@few("mu", [(0.0, 0.5), (0.5, 0.0), (0.5, 0.2), (0.0, 0.0)], 2)
 @pytest.mark.parametrize("direction", [X, Z, (0.01, 0.0, 1.0)])
 def test_values_and_slopes_are_finite_everywhere(mu: tuple[float, float], direction: tuple[float, ...]) -> None:
     """At rest, in the air, sliding; without friction one way; with a direction that is normal to the ground."""
@@ -173,7 +173,7 @@ def test_a_direction_of_a_body_turns_with_it() -> None:
     assert end == pytest.approx([2 - 0.3 * G * ACROSS, 0, 0], abs=1e-9)
 
 
-@pytest.mark.parametrize("frame", ["one", "other"])
+@few("frame", ["one", "other"], 1)
 def test_the_order_of_two_bodies_does_not_matter(frame: str) -> None:
     """Two balls that hit each other off their centres; the impulse on one is opposite to that on the other."""
     bodies = {"one": Body.ball("one", 0.1, 1.0), "other": Body.ball("other", 0.2, 3.0)}

@@ -55,6 +55,7 @@ def heights(kind: Callable[[str, float], Body], masses: tuple[float, ...], drop:
     return places[:, 2] - SIZE / 2 - SIZE * np.arange(count), max(speeds)
 
 
+@pytest.mark.slow
 @few(("kind", "ratio", "depth"), [(ball, 1e3, 1e-9), (ball, 1e4, 1e-7), thorough(cube, 1e2, 1e-4)], 1)
 @few("drop", [0.0, 0.02], 1)
 def test_a_light_body_carries_a_heavy_one(kind: Callable[[str, float], Body], ratio: float, depth: float, drop: float):

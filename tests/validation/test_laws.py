@@ -117,6 +117,7 @@ def test_v12_corner_impact_converges_at_second_order(mu):
     assert errors[2] < errors[0] / 8
 
 
+@pytest.mark.slow
 def test_compound_comes_to_rest_and_stays():
     """Four spheres in a square, dropped turned: at rest on all four, not moving, not drifting."""
     feet = tuple(Sphere(0.1, (x, y, 0.0)) for x in (-0.4, 0.4) for y in (-0.4, 0.4))

@@ -203,6 +203,7 @@ def test_a_box_that_falls_past_an_edge_meets_the_side(z: float, down: float, dt:
     assert it["velocity"][-1] == pytest.approx([0, 0, struck - GRAVITY * 0.15], abs=2e-3)
 
 
+@pytest.mark.slow
 @few("beside", [0.0, -1e-4, 1e-4], 1)
 def test_a_box_lands_on_a_seam(beside: float) -> None:
     """At speed, so that its front comes over the seam as it lands."""

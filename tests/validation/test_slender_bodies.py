@@ -69,7 +69,7 @@ def test_free_rotation_keeps_its_energy(name: str, angle: float) -> None:
         assert float(ca.norm_2(q)) == pytest.approx(1, abs=1e-14)
 
 
-@pytest.mark.parametrize("name", ["brick", "plate", "coin"])
+@few("name", ["brick", "plate", "coin"], 1)
 def test_free_rotation_is_that_of_euler(name: str) -> None:
     """q' = w q / 2, w = I^-1 L by an independent integration; the error falls with the fourth power of the step."""
     inertia, momentum, time = SOLIDS[name], np.array([0.4, -0.7, 0.5]) * np.mean(SOLIDS[name]), 2.0
@@ -140,6 +140,7 @@ def thrown(name: str, speeds: tuple[float, float], count: int) -> Array:
     return np.asarray(most / first)
 
 
+@pytest.mark.slow
 @first("speeds", [(5.0, 15.0), (1.0, 5.0)])
 @few("name", THROWN, 1)
 def test_no_throw_at_a_wall_gains_energy(name: str, speeds: tuple[float, float]) -> None:

@@ -66,6 +66,7 @@ def eccentric(dt: float) -> Array:
     return np.append(states["b.position"][-1], states["b.orientation"][-1])
 
 
+@pytest.mark.slow
 def test_a_bar_on_a_soft_joint_at_its_end_is_of_second_order() -> None:
     fine = eccentric(0.0005)
     errors = [np.linalg.norm(eccentric(dt) - fine) for dt in (0.02, 0.01, 0.005)]

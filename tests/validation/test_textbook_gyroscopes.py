@@ -66,7 +66,7 @@ def test_lagranges_top(spin: float) -> None:
     assert errors[2][1] < errors[0][1] / 13
 
 
-@pytest.mark.parametrize("share", [0.8, 0.95, 1.05, 1.5])
+@few("share", [0.8, 0.95, 1.05, 1.5], 1)
 def test_sleeping_top(share: float) -> None:
     """Upright it stands iff C^2 s^2 > 4 A m g l; its axis obeys A u'' - i C s u' - m g l u = 0 for small tilts."""
     mass, arm, a, c = 0.5, 0.05, 2.5e-3 + 0.5 * 0.05**2, 5e-3

@@ -142,6 +142,7 @@ def test_ball_strikes_a_rod_on_a_pivot(e: float, dt: float) -> None:
     assert slope[mine] == pytest.approx(differences(exact, at), abs=1e-6)
 
 
+@pytest.mark.slow
 @few("speed", [1.0, 2.0, 4.0], 1)
 def test_rod_rolls_straight_on(speed: float) -> None:
     """A rod of 30 cm and 4 cm across keeps its speed, up to 2 rad in a step, also when nudged along itself."""

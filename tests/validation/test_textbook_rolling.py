@@ -167,7 +167,7 @@ def groove(slope: Any, lean: float, mu: float, dt: float = 0.01) -> Lab:
     return Lab(world, Scheme(dt=dt), parameters=[slope])
 
 
-@pytest.mark.parametrize("lean", [0.3, 0.9])
+@few("lean", [0.3, 0.9], 1)
 def test_ball_rolls_down_a_groove(lean: float) -> None:
     """The contacts are r cos(lean) below the centre: a = g sin(alpha) / (1 + 2 / (5 cos^2 lean))."""
     alpha, time = 0.2, 0.5
@@ -179,6 +179,7 @@ def test_ball_rolls_down_a_groove(lean: float) -> None:
     assert slope[[0, 3], 0] == pytest.approx(share * np.cos(alpha) * np.array([1, time / 2]), abs=1e-5)
 
 
+@pytest.mark.slow
 @first("dt", [0.01, 0.005])
 def test_ball_rolls_in_a_bowl(dt: float) -> None:
     """Small swings in z = (x^2 + y^2) / 2, where the radius is 1: T = 2 pi sqrt(7 (1 - r) / 5 g) if it rolls."""
@@ -194,7 +195,7 @@ def test_ball_rolls_in_a_bowl(dt: float) -> None:
 
 
 @first("dt", [0.01, 0.0025])
-@pytest.mark.parametrize("share", [0.97, 1.03])
+@few("share", [0.97, 1.03], 1)
 def test_ball_climbs_a_step_if_it_is_fast_enough(share: float, dt: float) -> None:
     """Plastic and rough, angular momentum about the edge is kept: it climbs h iff v > r sqrt(70 g h) / (7 r - 5 h)."""
     h, radius = 0.02, 0.1

@@ -10,7 +10,7 @@ import pytest
 from data.textbook import G, differences, final, spinning, turn
 from scipy.integrate import solve_ivp
 from tools.laboratory import Lab
-from tools.repeats import first, thorough
+from tools.repeats import few, first, thorough
 from worlds.blocks import turned_by
 from worlds.linkage import energy
 
@@ -19,7 +19,7 @@ from symphys.model.world import Body, Law, Scheme, make_world
 from symphys.types import Array
 
 
-@pytest.mark.parametrize("e", [1.0, 0.8])
+@few("e", [1.0, 0.8], 1)
 def test_superball_under_a_table(e: float) -> None:
     """Garwin 1969, with Coulomb's law in place of his: floor, then the table's underside, then floor; by v and w too.
 

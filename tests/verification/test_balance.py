@@ -103,6 +103,7 @@ def test_momentum_closes_for_shipped_problems(name):
         assert found["gains"] == []
 
 
+@pytest.mark.slow
 def test_a_force_that_does_not_act_as_recorded_is_found():
     shot = transcribe(load_problem(find("bank_shot")), backend="casadi")
     record = shot.record(shot.shooting.start(0))

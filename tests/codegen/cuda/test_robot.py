@@ -99,6 +99,7 @@ def test_what_was_compiled_is_kept(tmp_path: Path) -> None:
     assert (cache.info().kernels, cache.clear(), cache.info().kernels) == (1, 1, 0)
 
 
+@pytest.mark.slow
 def test_warps_share_the_work_and_meet_no_word_at_once() -> None:
     planned = plan(hopping(), SEEDED, FAST_MEMORY)
     alone, shared = (schedules(planned, hopping(), warps) for warps in (1, 4))

@@ -115,7 +115,7 @@ BESIDE = {
 """Two things, how far apart, in how many places they will touch."""
 
 
-@pytest.mark.parametrize("name", BESIDE)
+@few("name", BESIDE, 11)
 @pytest.mark.parametrize("flip", [False, True])
 def test_aligned_shapes_touch_where_they_should(name: str, flip: bool) -> None:
     """Faces, edges and corners along each other: the gap, and that the points carry all of the region."""

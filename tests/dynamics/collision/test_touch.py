@@ -121,7 +121,7 @@ def test_what_lies_still_or_parts_is_not_hit(pair: tuple[str, str]) -> None:
             assert not met(function, *parts[0], *parts[1], DT).hit.any()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@few("kind", KINDS, 3)
 @pytest.mark.parametrize("static", ["plane", "terrain"])
 def test_touching_ground(kind: str, static: str) -> None:
     """A slope as a plane, and as terrain; a paraboloid follows in the next test."""

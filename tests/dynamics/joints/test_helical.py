@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from tools.laboratory import Lab
+from tools.repeats import few
 
 from symphys import Problem, SymphysError, simulate
 from symphys.model import Body, HelicalJoint, make_world
@@ -146,7 +147,7 @@ def test_the_schemes_hold_the_thread_that_they_are_made_for() -> None:
         assert [joint.name for k, joint in enumerate(joints) if k not in tree_joints(joints)] == [held]
 
 
-@pytest.mark.parametrize("scheme", ["loop", "tree"])
+@few("scheme", ["loop", "tree"], 1)
 @pytest.mark.parametrize("pitch", [0.1, -0.02])
 def test_a_driven_nut_lifts_by_its_pitch(scheme: str, pitch: float) -> None:
     """(I + m h^2) q'' = tau + m g h with h = pitch / 2 pi, the nut held from turning; z = -h q."""

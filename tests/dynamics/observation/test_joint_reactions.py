@@ -203,6 +203,7 @@ def test_a_foot_on_the_ground_takes_its_part_of_the_load() -> None:
     assert torque[1] == pytest.approx(2.5, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_a_tool_that_slides_pulls_its_carriage_by_friction() -> None:
     """At constant speed the joint above a tool carries mu m g, and nothing along its own free direction."""
     carriage, tool = (
@@ -315,6 +316,7 @@ def turning(closing: str, dt: float, **soft: float) -> Array:
     return np.array([wrench(world, name, x) for name in ("axle", "pin", "knee", "pivot")])
 
 
+@pytest.mark.slow
 def test_joints_of_trees_and_of_loops_agree() -> None:
     """Whichever joint closes the loop, to first order in the step: its force is that of the middle of the last step."""
     apart = []
@@ -388,6 +390,7 @@ def test_problems_remember_the_inputs_of_the_step_before() -> None:
     assert abs(found[2] - wrench(world, "pivot", x[: Layout(world).size])[2]) > 0.1
 
 
+@pytest.mark.slow
 def test_a_recorded_load_cell_finds_a_mass() -> None:
     """Of a swing that a push drives, recorded as the force in its pivot and as the acceleration of its body."""
     still = {key: value for key, value in PENDULUM.items() if key not in ("variable", "output", "target")}
