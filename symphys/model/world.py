@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from math import inf, prod
+from math import prod
 from operator import itemgetter
 from types import MappingProxyType
 from typing import Any
@@ -23,6 +23,7 @@ from symphys.model.jointed import jointed
 from symphys.model.joints import Joint
 from symphys.model.joints.coupling import JointCoupling
 from symphys.model.joints.specs import JointSpec
+from symphys.model.numbers import declare, table_key
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Static, Surface, contact_points, surface
 from symphys.model.site import Site
@@ -42,10 +43,8 @@ NOTHING: Mapping[Any, Any] = MappingProxyType({})
 class Law:
     """How two surfaces act on each other.
 
-    Problem files are read by these fields. A new one needs its key in ``ContactTable`` and ``PairTable``, in
-    ``SurfaceTable`` where surfaces state it. Its metadata say whether they do, by ``combine``, which makes one of the
-    numbers of two surfaces, and the least and the largest value that is ``physical``. Variables may set those that a
-    table states; where 0 leaves equations out, it is ``structural``: then variables set it only where it is not 0.
+    [contact], [[pair]] and the tables of surfaces have a key for each field, by its metadata; see ``declare``. Surfaces
+    state those with ``combine``, which makes one value of those of two surfaces.
 
     Attributes:
         friction: Coulomb's coefficient mu; |tangential impulse| <= mu * normal impulse, on the exact disc. Two numbers:
@@ -62,15 +61,66 @@ class Law:
     """
 
     friction: Scalar | tuple[Scalar, Scalar] = field(
-        default=0.5, metadata={"combine": lambda both: _product(*both), "physical": (0.0, inf)}
+        default=0.5,
+        metadata={
+            "combine": lambda both: _product(*both),
+            **declare(
+                "",
+                "Coulomb's coefficient, or two: [along, across] friction_direction; those of two surfaces are "
+                "multiplied",
+                "friction",
+                least=0.0,
+                phase="impulse",
+            ),
+        },
     )
-    restitution: Scalar = field(default=0.0, metadata={"combine": prod, "physical": (0.0, 1.0)})
-    torsion: Scalar = field(default=0.0, metadata={"combine": sum, "physical": (0.0, inf), "structural": True})
-    rolling: Scalar = field(default=0.0, metadata={"combine": sum, "physical": (0.0, inf), "structural": True})
-    frequency: Scalar = field(default=0.0, metadata={"physical": (0.0, inf), "structural": True})
-    damping: Scalar = field(default=1.0, metadata={"physical": (0.0, inf)})
-    friction_direction: tuple[float, ...] | None = field(default=None, metadata={"combine": itemgetter(0)})
-    friction_frame: str | None = field(default=None, metadata={"states": "pairs"})
+    restitution: Scalar = field(
+        default=0.0,
+        metadata={
+            "combine": prod,
+            **declare(
+                "",
+                "share of the speed that is left after a bounce; those of two surfaces are multiplied",
+                least=0.0,
+                most=1.0,
+                phase="start",
+            ),
+        },
+    )
+    torsion: Scalar = field(
+        default=0.0,
+        metadata={
+            "combine": sum,
+            **declare("m", "resists spinning about the normal: a radius", least=0.0, structural=True),
+        },
+    )
+    rolling: Scalar = field(
+        default=0.0,
+        metadata={"combine": sum, **declare("m", "resists rolling: a radius", least=0.0, structural=True)},
+    )
+    frequency: Scalar = field(
+        default=0.0,
+        metadata=declare(
+            "Hz", "natural frequency of a soft contact; 0: rigid", least=0.0, exceeds=True, structural=True
+        ),
+    )
+    damping: Scalar = field(default=1.0, metadata=declare("", "damping ratio of a soft contact; default 1", least=0.0))
+    friction_direction: tuple[float, ...] | None = field(
+        default=None,
+        metadata={
+            "combine": itemgetter(0),
+            **table_key(
+                "nonzero direction",
+                "along which the first of two coefficients holds: in the frame of a body, with which it turns; in "
+                "world axes where it belongs to what stands still, to a pair or to [contact]. Its part across the "
+                "contact's normal counts",
+            ),
+        },
+    )
+    friction_frame: str | None = field(
+        default=None,
+        metadata=table_key("identifier", "the body in whose frame friction_direction is; default: world axes"),
+    )
     friction_side: int | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from symphys.errors import SymphysError
 from symphys.model.jointed import REST
-from symphys.model.joints import JOINTS, AffineMotor, Joint, Motor, Servo, VelocityMotor
+from symphys.model.joints import JOINTS, Joint, Motor
 from symphys.model.joints.frames import MEET
+from symphys.model.joints.motor import motor_kind
 from symphys.model.joints.placing import PlacedJoint
 from symphys.model.joints.start import State, moved_to_zero, placed_frames, spanning_tree, unmoved
 from symphys.model.scalar import is_zero
@@ -135,8 +135,4 @@ def ends(limits: Sequence[Any]) -> list[float]:
 
 def motor_table(motor: Motor) -> dict[str, Any]:
     """A motor by its kind."""
-    if isinstance(motor, AffineMotor):
-        given = {field.name: getattr(motor, field.name) for field in fields(motor)}
-        return {"affine": {key: floats(value) for key, value in given.items() if value is not None}}
-    kind = "servo" if isinstance(motor, Servo) else "velocity" if isinstance(motor, VelocityMotor) else "torque"
-    return {kind: numbers(motor)}
+    return {motor_kind(motor): numbers(motor)}

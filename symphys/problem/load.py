@@ -150,11 +150,15 @@ def build(
     nominal = parametric.world({})
     check_laws(parametric, nominal, faults)
     check_couplings(nominal, faults)
-    known = quantities(initial, parametric.parameters(), input_sizes(nominal)) | duration_quantity(simulation.duration)
+    known = quantities(parametric, initial, input_sizes(nominal)) | duration_quantity(simulation.duration)
     warm = simulation.warm_start
     sensors, controllers = read_control(document, parametric, known, functions, starts, given, warm, faults)
     sets = read_sets(document.phase, parametric, faults)
-    known |= named_quantities(document, controllers, sets) | delay_quantities(references) | start_quantities(parametric)
+    known |= (
+        named_quantities(document, controllers, sets, parametric)
+        | delay_quantities(references)
+        | start_quantities(parametric)
+    )
     variables = read_variables(document.variable, known, simulation, faults)
     check_variables(document, simulation, parametric, nominal, variables, faults)
     sampled = {name: quantity for name, quantity in known.items() if quantity.kind not in ("duration", "recording")}
@@ -199,11 +203,14 @@ def named_quantities(
     document: Document,
     controllers: Sequence[FeedbackController],
     sets: Mapping[str, Mapping[str, tuple[float, ...]]],
+    parametric: ParametricWorld,
 ) -> dict[str, Quantity]:
     """Collect what variables may set besides the world: numbers of controllers, laws, phases; clocks of recordings."""
     delays = [(name, each.delay) for table in document.recording for name, each in table.input_tables.items()]
     clocks = recording_quantities((table.name for table in document.recording), delays)
-    return weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets) | clocks
+    return (
+        weight_quantities(controllers) | force_quantities(document.force) | phase_quantities(sets, parametric) | clocks
+    )
 
 
 def checked_start(starts: StartValues, parametric: ParametricWorld, values: Mapping[str, Any], faults: Faults) -> Any:

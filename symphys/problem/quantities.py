@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
-from math import inf, pi
+from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
+from symphys.model.numbers import Number
 from symphys.model.state_layout import input_sizes
 from symphys.model.world import COMBINE
 from symphys.problem.feedback import FeedbackController
 from symphys.problem.model import DURATION, Kind, ProblemData, Variable, VariableSlot
 from symphys.problem.parametric.joints import OWN
-from symphys.problem.parametric.parts import STRUCTURAL, VARIABLE
+from symphys.problem.parametric.parts import COEFFICIENTS
 from symphys.problem.parametric.world import CONTACT, ParametricWorld
 from symphys.problem.references import DELAY, ReferenceTrajectory
 from symphys.suggest import hint, quote
@@ -22,29 +23,29 @@ from symphys.types import Array
 
 SLOT = re.compile(r"\s*([^\[\]\s]+)\s*(?:\[\s*(-?\d{1,9})?\s*(:)?\s*(-?\d{1,9})?\s*\])?\s*")
 EDGE = "edge"
-LIMITS: dict[str, tuple[float, float]] = {
-    "mass": (0.0, inf),
-    "radius": (0.0, inf),
-    "size": (0.0, inf),
-    "length": (0.0, inf),
-    EDGE: (0.0, inf),
-    "duration": (0.0, inf),
-    "second_moments": (0.0, inf),
-    "correlations": (-1.0, 1.0),
-    "tilt": (-pi / 2, pi / 2),
-    **VARIABLE,
-}
-"""What is physical; masses, sizes and frequencies must exceed their limit."""
-ACTING = ("gain", "torque", "velocity", "range", "stiffness", "damping", "armature")
-"""Parameters of joints, motors and springs, which must not be negative."""
-OPEN = ("mass", "radius", "size", "length", "duration", "frequency")
-SMALL = ("second_moments",)
-SCALES = {"centre_of_mass": 0.01, "correlations": 0.1, "tilt": 0.01, DELAY: 0.01}
-"""How much what is usually 0 typically changes: [m], [-], [rad] and [s]."""
-MOST_ROUND = 0.99
+LARGEST_EDGE = 0.99
 """Of half of a box's smallest edge: the largest radius of its edges, unless ``upper`` says otherwise."""
 LEAST_SHARE = 1e-3
-"""Masses, moments, sizes and frequencies stay above this share of their value in the file, unless ``lower`` is less."""
+"""What must exceed its least value stays above this share of its value in the file, unless ``lower`` is less."""
+START: Mapping[str, Number] = {
+    "position": Number("m", scale=1.0),
+    "orientation": Number("", scale=1.0),
+    "velocity": Number("m/s", scale=1.0),
+    "angular_velocity": Number("rad/s", scale=1.0),
+}
+"""Numbers of a body at the start."""
+INPUT: Mapping[str, Number] = {"force": Number("N", scale=1.0), "torque": Number("N m", scale=1.0)}
+"""Inputs of a body."""
+COMMAND = Number(None, scale=1.0)
+"""The command of a motor; motors say more of it."""
+WEIGHT = Number("", scale=0.1)
+"""A number of a controller."""
+OWN_SIZE = Number(None)
+"""A number of a force law."""
+DELAYED = Number("s", scale=0.01)
+DURATION_NUMBER = Number("s", least=0.0, exceeds=True)
+CLOCK: Mapping[str, Number] = {"offset": Number("s", scale=0.01), "scale": Number("", least=0.0)}
+"""Numbers of the clock of a recording."""
 
 
 class SlotError(ValueError):
@@ -53,64 +54,72 @@ class SlotError(ValueError):
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something that a variable can set: (components,) as the file has it.
-
-    ``own_scale``: whether it typically changes by its own size, as parameters do. ``like``: the parameter in whose
-    place it stands; None for what stands for itself. ``ends``: least and largest value, where its name does not say.
-    """
+    """Something that a variable can set: (components,) as the file has it, and what is known of it."""
 
     kind: Kind
     nominal: Array
-    own_scale: bool = False
-    like: str | None = None
-    ends: tuple[float, float] | None = None
+    number: Number
 
 
 def quantities(
-    initial: Mapping[str, Array], parameters: Mapping[str, Array], inputs: Mapping[str, int]
+    parametric: ParametricWorld, initial: Mapping[str, Array], inputs: Mapping[str, int]
 ) -> dict[str, Quantity]:
     """Every quantity of a world by name: states at the start, inputs with their sizes, then parameters."""
-    found = {name: Quantity("initial", value) for name, value in initial.items()}
-    found |= {name: Quantity("control", np.zeros(size)) for name, size in inputs.items()}
-    return found | {name: Quantity("parameter", value, own_scale=True) for name, value in parameters.items()}
+    found = {name: Quantity("initial", value, START[last_part(name)]) for name, value in initial.items()}
+    found |= {
+        name: Quantity("control", np.zeros(size), INPUT.get(last_part(name), COMMAND)) for name, size in inputs.items()
+    }
+    return found | {
+        name: Quantity("parameter", value, parametric.numbers[name]) for name, value in parametric.parameters().items()
+    }
+
+
+def last_part(name: str) -> str:
+    """The key of a name: ``velocity`` of ``ball.velocity``."""
+    return name.rpartition(".")[2]
 
 
 def start_quantities(parametric: ParametricWorld) -> dict[str, Quantity]:
     """Coordinates of joints at the start, within the limits of the joints, and their rates."""
-    found = {name: Quantity("initial", value) for name, value in parametric.starts().items()}
+    found, values = dict[str, Quantity](), parametric.starts()
     for joint in parametric.joints:
         name, low, high = f"{joint.name}.start", joint.limits.lower, joint.limits.upper
-        if name in found:
-            found[name] = replace(found[name], ends=(-inf if low is None else low, inf if high is None else high))
+        if name in values:
+            least, most = -inf if low is None else low, inf if high is None else high
+            numbers = Number("{angle}", least, most, scale=1.0), Number("{angle}/s", scale=1.0)
+            for key, each in zip((name, f"{name}_rate"), numbers, strict=True):
+                found[key] = Quantity("initial", values[key], each.along(joint.kind.turning))
     return found
 
 
 def duration_quantity(duration: float) -> dict[str, Quantity]:
     """Return the duration of the motion [s] as a quantity."""
-    return {DURATION: Quantity("duration", np.array([duration]), own_scale=True)}
+    return {DURATION: Quantity("duration", np.array([duration]), DURATION_NUMBER)}
 
 
 def weight_quantities(controllers: Iterable[FeedbackController]) -> dict[str, Quantity]:
     """The numbers of controllers by name, such as ``brain.weights``."""
-    return {name: Quantity("weight", value) for controller in controllers for name, value in controller.weights.items()}
+    return {
+        name: Quantity("weight", value, WEIGHT)
+        for controller in controllers
+        for name, value in controller.weights.items()
+    }
 
 
 def recording_quantities(names: Iterable[str], delays: Iterable[tuple[str, float]]) -> dict[str, Quantity]:
     """Return the time offset [s] and the scale of each [[recording]], and the delays of inputs [s]."""
     found = dict[str, Quantity]()
     for name in names:
-        found[f"{name}.offset"] = Quantity("recording", np.zeros(1))
-        found[f"{name}.scale"] = Quantity("recording", np.ones(1), own_scale=True)
+        found[f"{name}.offset"] = Quantity("recording", np.zeros(1), CLOCK["offset"])
+        found[f"{name}.scale"] = Quantity("recording", np.ones(1), CLOCK["scale"])
     for name, delay in delays:
-        found[f"{name}.{DELAY}"] = Quantity("recording", np.array([delay]), own_scale=True)
+        found[f"{name}.{DELAY}"] = Quantity("recording", np.array([delay]), DELAYED)
     return found
 
 
 def delay_quantities(references: Iterable[ReferenceTrajectory]) -> dict[str, Quantity]:
     """The delays of references by name, such as ``walk.delay`` [s]."""
-    return {
-        name: Quantity("weight", value, own_scale=True) for each in references for name, value in each.weights.items()
-    }
+    return {name: Quantity("weight", value, DELAYED) for each in references for name, value in each.weights.items()}
 
 
 def read_slot(text: str, known: Mapping[str, Quantity]) -> VariableSlot:
@@ -142,14 +151,14 @@ def unknown(name: str, known: Collection[str]) -> str:
     """The nearest quantities; for a coefficient that no table states, how to state it."""
     owner, _, key = name.rpartition(".")
     owners = dict.fromkeys(other.rpartition(".")[0] for other in known)
-    of_contact = key in VARIABLE and (key in COMBINE or owner == CONTACT or "-" in owner)
+    of_contact = key in COEFFICIENTS and (key in COMBINE or owner == CONTACT or "-" in owner)
     if owner in owners and (of_contact or key in OWN or (f"{owner}.size" in known and key == EDGE)):
-        above = key in STRUCTURAL or key == EDGE or f"{owner}.anchor" in known
+        above = (key in COEFFICIENTS and COEFFICIENTS[key].structural) or key == EDGE or f"{owner}.anchor" in known
         what = "a value above 0" if above else "a value"
         return f"{owner} states no {key}: give it {what} there first, so that this variable has something to change"
     same_owner = [other for other in known if owner and other.startswith(f"{owner}.")]
     tables = "" if key in COMBINE else ": [contact] and [[pair]] may state it"
-    stated = f"; what states no {key} has none to vary{tables}" if key in VARIABLE else ""
+    stated = f"; what states no {key} has none to vary{tables}" if key in COEFFICIENTS else ""
     if key == DELAY:
         stated += "; a [[reference]] must state its delay, 0 too, for a variable to set it; of what a [[recording]] "
         stated += "drives by its inputs it is knee.command.delay"
@@ -174,31 +183,13 @@ def set_quantities(problem: ProblemData, variable: Variable) -> str:
     return f"{', '.join(others)} and {last} to the same values" if others else last
 
 
-def physical(name: str, kind: Kind) -> tuple[float, float]:
-    """Least and largest value of a quantity that is physical."""
-    key = name.rpartition(".")[2]
-    if kind == "recording":
-        return (0.0, inf) if key == "scale" else (-inf, inf)
-    if kind == "weight":
-        return -inf, inf
-    return (0.0, inf) if kind == "parameter" and key in ACTING else LIMITS.get(key, (-inf, inf))
-
-
-def extremes(name: str, quantity: Quantity) -> tuple[float, float, bool]:
-    """Least and largest value that a quantity may have, and whether it must exceed the least."""
-    if quantity.ends is not None:
-        return *quantity.ends, False
-    name, kind = (name, quantity.kind) if quantity.like is None else (quantity.like, "parameter")
-    return *physical(name, kind), kind != "weight" and name.rpartition(".")[2] in OPEN
-
-
 def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Array]:
     """(components,) twice: the bounds that hold where the file states none."""
-    least, most, above = extremes(slot.name, known[slot.name])
-    low, high = (np.full(len(slot.components), limit) for limit in (least, most))
-    if above or slot.name.rpartition(".")[2] in SMALL:
-        low = LEAST_SHARE * known[slot.name].nominal[list(slot.components)]
+    quantity = known[slot.name]
+    low, high = (np.full(len(slot.components), limit) for limit in (quantity.number.least, quantity.number.most))
+    if quantity.number.exceeds or quantity.number.floored:
+        low = LEAST_SHARE * quantity.nominal[list(slot.components)]
     owner, _, key = slot.name.rpartition(".")
-    if key == EDGE and known[slot.name].kind == "parameter":
-        high = np.full(1, MOST_ROUND * known[f"{owner}.size"].nominal.min() / 2)
+    if key == EDGE and quantity.kind == "parameter":
+        high = np.full(1, LARGEST_EDGE * known[f"{owner}.size"].nominal.min() / 2)
     return low, high

@@ -5,43 +5,34 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from symphys.dynamics.observation import NamedSensor, named_sensors
-from symphys.model.joints import AffineMotor, Joint, Servo, TorqueMotor, VelocityMotor
+from symphys.model.joints import Joint
+from symphys.model.joints.joint import joint_numbers
+from symphys.model.numbers import Number
+from symphys.model.shapes import SHAPES, Plane
 from symphys.model.world import World
 from symphys.problem.model import ALIVE, Variable
+from symphys.problem.parametric.parts import COEFFICIENTS, INERTIAL
+from symphys.problem.quantities import INPUT, START
 
-UNITS = {
-    "position": "m",
-    "orientation": "",
-    "velocity": "m/s",
-    "angular_velocity": "rad/s",
-    "force": "N",
-    "torque": "N m",
+OTHERS = {
     "reaction_force": "N",
     "reaction_torque": "N m",
     "lag": "s",
     "delay": "s",
     "duration": "s",
-    "mass": "kg",
-    "radius": "m",
-    "offset": "m",
     "gravity": "m/s^2",
-    "friction": "",
-    "restitution": "",
 }
-"""By the last part of a name, of what is no sensor (``SENSOR_KINDS``); world frame. A pure number has none."""
-TURNING = {
-    **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N m"),
-    **{"lock": "N, then N m", "gain": "1/s", "velocity": "rad/s", "rest": "rad"},
-    **{"stiffness": "N m/rad", "damping": "N m s/rad", "armature": "kg m^2", "friction": "N m"},
-    **{"start": "rad", "start_rate": "rad/s"},
+"""By the last part of a name, of what is neither a sensor (``SENSOR_KINDS``) nor declared."""
+SIZES = {each.name: Number("m") for shape in SHAPES.values() for each in (*shape.size_keys, *shape.optional_keys)}
+DECLARED = {**COEFFICIENTS, **INERTIAL, **SIZES, **Plane.numbers, **START, **INPUT}
+"""What is declared of numbers of bodies, of static surfaces and of laws of contact."""
+ALONG = {
+    **dict.fromkeys(("motor", "lower", "upper", "spring"), "{torque}"),
+    "anchor": "m",
+    "start": "{angle}",
+    "start_rate": "{angle}/s",
 }
-SLIDING = {
-    **dict.fromkeys(("motor", "lower", "upper", "spring", "torque"), "N"),
-    **{"lock": "N, then N m", "gain": "1/s", "velocity": "m/s", "rest": "m"},
-    **{"stiffness": "N/m", "damping": "N s/m", "armature": "kg", "friction": "N"},
-    **{"start": "m", "start_rate": "m/s"},
-}
-"""Of what belongs to joints, likewise."""
+"""Units of what belongs to joints and is no number of theirs."""
 
 
 def quantity_unit(name: str, world: World) -> str | None:
@@ -54,18 +45,19 @@ def _unit(name: str, world: World, sensors: Mapping[str, NamedSensor]) -> str | 
         return sensors[name].unit
     owner, _, key = name.rpartition(".")
     joint = next((joint for joint in world.joints if joint.name == owner), None)
-    return UNITS.get(key) if joint is None else joint_unit(joint, key)
+    if joint is not None:
+        return joint_unit(joint, key)
+    return DECLARED[key].unit if key in DECLARED else OTHERS.get(key)
 
 
 def joint_unit(joint: Joint, key: str) -> str | None:
     """Return the unit of a quantity of a joint; a command has the unit of what its motor follows."""
-    units = {**(TURNING if joint.kind.turning else SLIDING), **joint.kind.units}
-    if key == "gain" and isinstance(joint.motor, AffineMotor):  # force by command, which has any unit
-        return None
-    if key != "command":
-        return units.get(key)
-    followed = {Servo: "rest", VelocityMotor: "velocity", TorqueMotor: "torque"}
-    return next((units[what] for kind, what in followed.items() if isinstance(joint.motor, kind)), None)
+    if key == "lock":
+        return "N, then N m"
+    known = joint_numbers(joint.kind, joint.motor, joint.spring)
+    if key == "command" and joint.motor is not None:
+        return joint.motor.command.along(joint.kind.turning).unit
+    return known[key].unit if key in known else Number(ALONG.get(key)).along(joint.kind.turning).unit
 
 
 def formula_units(world: World, names: Iterable[str], variables: Iterable[Variable]) -> dict[str, str]:

@@ -11,7 +11,8 @@ import casadi as ca
 import numpy as np
 
 from symphys.model.body import Body
-from symphys.model.joints import AffineMotor, Joint, Motor, Servo, TorqueMotor, VelocityMotor
+from symphys.model.joints import AffineMotor, Joint, Motor
+from symphys.model.joints.motor import motor_kind
 from symphys.model.shapes import Fixture, Plane, Scalar, Shape, Terrain
 from symphys.model.world import World
 from symphys.problem import Problem
@@ -20,14 +21,6 @@ from symphys.results.scene import Scene, SceneBody, SceneFixture, ScenePlane, Sc
 from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneJointFrame, SceneMotor
 from symphys.trajectory import Trajectory
 from symphys.types import Array
-
-MOTORS: dict[type[Motor], str] = {
-    Servo: "servo",
-    VelocityMotor: "velocity",
-    TorqueMotor: "torque",
-    AffineMotor: "affine",
-}
-"""As problem files call them."""
 
 
 def make_scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | None = None) -> Scene:
@@ -107,7 +100,7 @@ def make_motor(motor: Motor) -> SceneMotor:
     numbers = {key: float(v) for key, v in asdict(motor).items() if v is not None and not isinstance(v, tuple)}
     if isinstance(motor, AffineMotor) and math.isfinite(motor.torque):
         numbers["torque"] = motor.torque
-    return SceneMotor(MOTORS[type(motor)], numbers)
+    return SceneMotor(motor_kind(motor), numbers)
 
 
 def plain(vector: Any) -> Array:

@@ -21,7 +21,6 @@ from symphys.expression import Formula
 from symphys.model.state_layout import input_columns, input_sizes, input_symbols
 from symphys.model.world import Scheme, World
 from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable, placing
-from symphys.problem.parametric.by_phase import lagged
 from symphys.problem.references import reference_values
 from symphys.transcription.feedback.sensor_memory import SensorMemory
 from symphys.types import Array, Expr
@@ -95,7 +94,7 @@ def phase_numbers(problem: Problem) -> PhaseNumbers:
     sets: dict[str, list[tuple[str, PhaseShare]]] = {}
     for phase in setting:
         for name in phase.sets:
-            late = lagged(problem.parametric, name)
+            late = problem.parametric.numbers[name].phase == "impulse"
             if (phase.name, late) not in shares:
                 called = f"{phase.name}.{'share_of_impulses' if late else 'share'}"
                 ticks = phase.ticks(simulation.steps)

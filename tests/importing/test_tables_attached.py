@@ -94,7 +94,7 @@ def test_force_and_torque_sensors_read_what_mujoco_senses() -> None:
 def names_at_start(problem: Any) -> dict[str, Any]:
     """What names in formulas are at the start."""
     world = problem.world()
-    known = quantities(problem.initial, problem.parameters, input_sizes(world))
+    known = quantities(problem.parametric, problem.initial, input_sizes(world))
     known |= duration_quantity(problem.simulation.duration)
     values = at_guess(problem.parametric, known, ())
     return formula_names(values, StartValues().of(problem.parametric, values), ())

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 from symphys.model.joints.hinge import angle
 from symphys.model.joints.kind import Coordinate, Kind
 from symphys.model.joints.specs import SingleAxisJoint
+from symphys.model.numbers import declare
 from symphys.model.scalar import Scalar
 from symphys.types import Array
 
@@ -22,14 +23,7 @@ from symphys.types import Array
 class HelicalKind(Kind):
     """The kind of a screw with a ``pitch``: displacement in a turn [m], negative for a left-hand thread."""
 
-    units: ClassVar[Mapping[str, str]] = {"pitch": "m"}
-
-    pitch: Scalar = 0.0
-
-    @property
-    def numbers(self) -> dict[str, Scalar]:
-        """Return the pitch by its key in problem files."""
-        return {"pitch": self.pitch}
+    pitch: Scalar = field(default=0.0, metadata=declare("m"))
 
     def valued(self, numbers: Mapping[str, Scalar]) -> Kind:
         """Return the kind of another pitch."""
@@ -66,10 +60,9 @@ class HelicalJoint(SingleAxisJoint):
 
     pitch: Scalar = field(
         kw_only=True,
-        metadata={
-            "value": "nonzero",
-            "about": "how far the second body moves along the axis in a turn [m]; negative for a left-hand thread",
-        },
+        metadata=declare(
+            "m", "how far the second body moves along the axis in a turn; negative for a left-hand thread", "nonzero"
+        ),
     )
 
     @property

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from symphys.maths.angles import nearest
 from symphys.model.joints.kind import Kind, PlacedFrames
 from symphys.model.joints.motor import AffineMotor, Motor, given_torque
+from symphys.model.numbers import Number, declare, numbers_of
 from symphys.model.scalar import Scalar, is_zero
 
 PARTS = ("motor", "lower", "upper", "spring", "friction")
@@ -45,9 +46,24 @@ class Limits:
 class Spring:
     """Along a coordinate: torque = -stiffness (angle - rest) - damping rate; SI units, forces where it slides."""
 
-    stiffness: Scalar = 0.0
-    damping: Scalar = 0.0
-    rest: Scalar = 0.0
+    stiffness: Scalar = field(
+        default=0.0,
+        metadata=declare("{torque}/{angle}", "torque per angle, or force per length", least=0.0, phase="impulse"),
+    )
+    damping: Scalar = field(
+        default=0.0,
+        metadata=declare("{torque} s/{angle}", "torque per rate, or force per velocity", least=0.0, phase="impulse"),
+    )
+    rest: Scalar = field(
+        default=0.0,
+        metadata=declare("{angle}", "where it gives nothing, through any number of turns", phase="impulse"),
+    )
+
+
+def joint_numbers(kind: Kind, motor: Motor | None, spring: Spring | None) -> dict[str, Number]:
+    """Return what is known of the numbers of a joint by key: its own, those of its kind, its motor and its spring."""
+    declared = [numbers_of(each) for each in (kind, Joint, motor, spring) if each is not None]
+    return {key: each.along(kind.turning) for found in declared for key, each in found.items()}
 
 
 @dataclass(frozen=True)
@@ -77,8 +93,21 @@ class Joint:
     spring: Spring | None = None
     frequency: Scalar = 0.0
     damping: Scalar = 1.0
-    armature: Scalar = 0.0
-    friction: Scalar = 0.0
+    armature: Scalar = field(
+        default=0.0,
+        metadata=declare(
+            "{inertia}",
+            "inertia that turns with each coordinate, as a rotor does, seen through its gear",
+            least=0.0,
+            structural=True,
+        ),
+    )
+    friction: Scalar = field(
+        default=0.0,
+        metadata=declare(
+            "{torque}", "dry friction along every coordinate", least=0.0, structural=True, phase="impulse"
+        ),
+    )
     start: tuple[float, ...] = ()
 
     def value(self, k: int, placed: PlacedFrames, near: Any) -> Any:

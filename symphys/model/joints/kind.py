@@ -11,12 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
 
 import casadi as ca
 
 from symphys.maths import rotation
 from symphys.maths.angles import nearest
+from symphys.model.numbers import numbers_of
 from symphys.model.scalar import Scalar, is_zero
 from symphys.types import Expr
 
@@ -100,9 +100,6 @@ class Kind:
         coordinates: what is left. Axes of the second frame come before those of the first.
     """
 
-    units: ClassVar[Mapping[str, str]] = {}
-    """Units of ``numbers``."""
-
     name: str
     slides: tuple[int, ...] | None = None
     turns: tuple[tuple[int, int], ...] = ()
@@ -111,7 +108,7 @@ class Kind:
     @property
     def numbers(self) -> dict[str, Scalar]:
         """Return the numbers of the kind by their keys in problem files; variables may set them."""
-        return {}
+        return {key: getattr(self, key) for key in numbers_of(self)}
 
     def valued(self, numbers: Mapping[str, Scalar]) -> Kind:
         """Return this kind with other ``numbers``."""

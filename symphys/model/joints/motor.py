@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from math import inf
+from types import MappingProxyType
+from typing import ClassVar
 
+from symphys.model.numbers import Number, declare, table_key
 from symphys.model.scalar import Scalar, is_zero
+
+LARGEST = declare("{torque}", "the most that it gives", "positive", least=0.0, phase="impulse")
+"""Metadata of the largest torque of a motor that aims at a velocity."""
+FASTEST = declare("{angle}/s", "the fastest that it aims at", "positive", least=0.0, phase="start")
+"""Metadata of the largest velocity at which a motor aims."""
 
 
 @dataclass(frozen=True)
@@ -19,25 +28,49 @@ class Servo:
         range: largest command [rad], or [m], either way; None: any.
     """
 
-    gain: Scalar
-    torque: Scalar
-    velocity: Scalar
-    range: Scalar | None = None
+    summary: ClassVar[str] = (
+        "A motor whose command is an angle, or a position: the target velocity is gain (command - angle). Angles "
+        "count whole turns: a command of 18.85 rad is three turns."
+    )
+    example: ClassVar[str] = "{ gain = 20, torque = 30, velocity = 8 }"
+    command: ClassVar[Number] = Number("{angle}", scale=1.0)
+
+    gain: Scalar = field(
+        metadata=declare(
+            "1/s", "target velocity per difference of angle or position", "positive", least=0.0, phase="start"
+        )
+    )
+    torque: Scalar = field(metadata=LARGEST)
+    velocity: Scalar = field(metadata=FASTEST)
+    range: Scalar | None = field(
+        default=None,
+        metadata=declare(
+            "{angle}", "commands are held within so much either way; default: any", "positive", least=0.0, phase="start"
+        ),
+    )
 
 
 @dataclass(frozen=True)
 class VelocityMotor:
     """Follows a velocity, the command, with at most ``torque``; the command is held in +-velocity."""
 
-    torque: Scalar
-    velocity: Scalar
+    summary: ClassVar[str] = "A motor whose command is a velocity."
+    example: ClassVar[str] = "{ torque = 30, velocity = 8 }"
+    command: ClassVar[Number] = Number("{angle}/s", scale=1.0)
+
+    torque: Scalar = field(metadata=LARGEST)
+    velocity: Scalar = field(metadata=FASTEST)
 
 
 @dataclass(frozen=True)
 class TorqueMotor:
     """Gives the command as a torque, held in +-torque."""
 
-    torque: Scalar
+    summary: ClassVar[str] = "A motor whose command is a torque [N m], or a force [N] where the joint slides."
+    example: ClassVar[str] = "{ torque = 30 }"
+    command: ClassVar[Number] = Number("{torque}", scale=1.0)
+
+    torque: Scalar = field(metadata=declare("{torque}", "the most that it gives", "positive", least=0.0, phase="start"))
 
 
 @dataclass(frozen=True)
@@ -57,13 +90,33 @@ class AffineMotor:
         force_range: least and largest force before the gear; None: any.
     """
 
-    gain: Scalar = 1.0
-    offset: Scalar = 0.0
-    kp: Scalar = 0.0
-    kv: Scalar = 0.0
-    gear: Scalar = 1.0
-    command_range: tuple[float, float] | None = None
-    force_range: tuple[float, float] | None = None
+    summary: ClassVar[str] = (
+        "A motor whose torque is affine in its command and in the joint's coordinate and rate. It is gear clip(gain "
+        "clip(command, command_range) + offset - kp gear q - kv gear v, force_range); q and v are the joint's "
+        "coordinate and its rate. MuJoCo's motor, position, velocity and general actuators are such."
+    )
+    example: ClassVar[str] = "{ gear = 150, command_range = [-1, 1] }"
+    command: ClassVar[Number] = Number(None, scale=1.0)
+
+    gain: Scalar = field(default=1.0, metadata=declare(None, "force by command, before the gear", phase="start"))
+    offset: Scalar = field(
+        default=0.0, metadata=declare("{torque}", "force at command 0, before the gear", phase="start")
+    )
+    kp: Scalar = field(
+        default=0.0, metadata=declare("{torque}/{angle}", "by the position behind the gear", phase="impulse")
+    )
+    kv: Scalar = field(
+        default=0.0, metadata=declare("{torque} s/{angle}", "by the velocity behind the gear", phase="impulse")
+    )
+    gear: Scalar = field(
+        default=1.0, metadata=declare("", "ratio of the gear; a negative one turns the direction around")
+    )
+    command_range: tuple[float, float] | None = field(
+        default=None, metadata=table_key("ends", "least and largest command; default: any")
+    )
+    force_range: tuple[float, float] | None = field(
+        default=None, metadata=table_key("ends", "least and largest force before the gear [N m] or [N]; default: any")
+    )
 
     @property
     def passive(self) -> bool:
@@ -81,6 +134,16 @@ class AffineMotor:
 
 
 Motor = Servo | VelocityMotor | TorqueMotor | AffineMotor
+
+MOTORS: Mapping[str, type[Motor]] = MappingProxyType(
+    {"servo": Servo, "velocity": VelocityMotor, "torque": TorqueMotor, "affine": AffineMotor}
+)
+"""By their keys in the ``motor`` of [[joint]] tables; each class says what its keys are."""
+
+
+def motor_kind(motor: Motor) -> str:
+    """Return the key of a motor's kind in problem files."""
+    return next(word for word, kind in MOTORS.items() if type(motor) is kind)
 
 
 def given_torque(motor: Motor | None) -> bool:

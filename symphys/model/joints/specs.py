@@ -18,6 +18,7 @@ from symphys.model.joints.frames import single_axis
 from symphys.model.joints.joint import Limits, Spring
 from symphys.model.joints.kind import Kind
 from symphys.model.joints.motor import Motor
+from symphys.model.numbers import table_key
 from symphys.model.scalar import Scalar
 from symphys.types import Array
 
@@ -25,7 +26,7 @@ Vector = Sequence[float] | Array
 """three of them"""
 AXIS = "[x, y, z], world coordinates at the start, any length but 0"
 """Description of an axis in the schema of problem files."""
-DIRECTION = {"value": "direction", "about": f"about or along which the second body moves: {AXIS}"}
+DIRECTION = table_key("direction", f"about or along which the second body moves: {AXIS}")
 """Metadata of the field of a kind with one axis."""
 
 

@@ -11,6 +11,7 @@ from symphys.maths.smoothing import angle_of
 from symphys.model.joints.frames import two_axes
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 from symphys.model.joints.specs import AXIS, MovingJoint, Vector
+from symphys.model.numbers import table_key
 from symphys.types import Array, Expr
 
 
@@ -50,11 +51,11 @@ class UniversalJoint(MovingJoint):
 
     axes: tuple[Vector, Vector] = field(
         kw_only=True,
-        metadata={
-            "value": "directions",
-            "about": "two, perpendicular to each other: the first stays with the first body, the second with the "
-            f"second; each {AXIS}",
-        },
+        metadata=table_key(
+            "directions",
+            "two, perpendicular to each other: the first stays with the first body, the second with the second; each "
+            f"{AXIS}",
+        ),
     )
 
     @property

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any, ClassVar
 
+from symphys.model.numbers import Number
 from symphys.model.scalar import Scalar
 from symphys.model.shapes.box import Box
 from symphys.model.shapes.capsule import Capsule
@@ -65,6 +67,7 @@ class Fixture:
     """
 
     plural: ClassVar[str] = "blocks"
+    numbers: ClassVar[Mapping[str, Number]] = MappingProxyType({"position": Number("m")})
 
     name: str
     shape: Shape

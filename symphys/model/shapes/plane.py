@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import pi
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import casadi as ca
 
+from symphys.model.numbers import Number
 from symphys.model.scalar import Scalar, is_zero
 
 
@@ -24,6 +27,9 @@ class Plane:
     kind: ClassVar[str] = "plane"
     plural: ClassVar[str] = "planes"
     contact_points: ClassVar[Mapping[str, int]] = {}
+    numbers: ClassVar[Mapping[str, Number]] = MappingProxyType(
+        {"offset": Number("m"), "tilt": Number("rad", least=-pi / 2, most=pi / 2, scale=0.01)}
+    )
 
     name: str
     normal: tuple[Scalar, ...] = (0.0, 0.0, 1.0)

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
+from symphys.model.numbers import Number
 from symphys.model.scalar import Scalar, is_zero
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -34,6 +35,10 @@ class SizeKey:
     description: str = "of the round surface [m]"
     count: int = 1
     reason: str = ""
+
+    def number(self, optional: bool) -> Number:
+        """Return what is known of it; an optional size may be 0."""
+        return Number("m", least=0.0, exceeds=not optional)
 
 
 @dataclass(frozen=True)
@@ -126,6 +131,13 @@ class SolidShape(ABC):
     def parameters(self) -> dict[str, Any]:
         """The ``sizes`` that variables may set."""
         return self.sizes
+
+    @property
+    def numbers(self) -> dict[str, Number]:
+        """Return what is known of each of the ``parameters``."""
+        optional = {each.name for each in self.optional_keys}
+        keys = {each.name: each for each in (*self.size_keys, *self.optional_keys)}
+        return {name: keys[name].number(name in optional) for name in self.parameters}
 
     @property
     def flatness(self) -> str:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar
+
+from symphys.model.numbers import Number
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,7 @@ class Terrain:
     kind: ClassVar[str] = "terrain"
     plural: ClassVar[str] = "terrains"
     contact_points: ClassVar[Mapping[str, int]] = {}
+    numbers: ClassVar[Mapping[str, Number]] = MappingProxyType({})
 
     name: str
     height: Callable[[Any, Any], Any]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot
 from typing import Any
@@ -75,7 +75,7 @@ class Placement:
             "velocity": self.direction(table.velocity),
             "angular_velocity": self.direction(table.angular_velocity),
         }
-        return table.model_copy(update=update)
+        return copied(table, update)
 
     def block(self, place: Place, table: BlockTable) -> SchemaTable:
         """A static solid."""
@@ -83,7 +83,7 @@ class Placement:
             "position": self.point(table.position),
             "orientation": self.orientation(place, table.orientation),
         }
-        return table.model_copy(update=update)
+        return copied(table, update)
 
     def plane(self, place: Place, table: PlaneTable) -> SchemaTable:
         """A static wall."""
@@ -93,7 +93,7 @@ class Placement:
         if table.offset is not None:
             unit = np.array(update["normal"]) / (hypot(*table.normal) or 1.0)
             update["offset"] = table.offset + float(unit @ np.array(self.include.position))
-        return table.model_copy(update=update)
+        return copied(table, update)
 
     def joint(self, place: Place, table: JointTable) -> SchemaTable:
         """A joint: its point, axes, and an anchor on the world."""
@@ -138,3 +138,8 @@ MOVES: dict[str, Callable[[Placement, Place, Any], SchemaTable]] = {
     "block": Placement.block,
     "terrain": Placement.terrain,
 }
+
+
+def copied(table: SchemaTable, update: Mapping[str, Any]) -> SchemaTable:
+    """Return a table with other values of some keys."""
+    return table.model_copy(update=update)

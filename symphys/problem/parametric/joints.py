@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from symphys.model.joints import Joint, JointFrame, Kind, Limits, Motor, Spring
+from symphys.model.joints.joint import joint_numbers
+from symphys.model.numbers import Number, numbers_of
+from symphys.model.scalar import Scalar
 from symphys.problem.parametric.parts import Numbers, PairRule, Value
 
 Part = TypeVar("Part", bound=Motor | Spring)
-OWN = ("armature", "friction")
+OWN = tuple(numbers_of(Joint))
 """Numbers of the joint itself, parameters where they are not 0."""
 
 
@@ -58,10 +61,15 @@ class ParametricJoint:
         """The parameter that says where the joint is on its second side, (3,) [m]: body frame, or the world's."""
         return f"{self.name}.anchor"
 
+    @property
+    def numbers(self) -> Mapping[str, Number]:
+        """Return what is known of its numbers, by key."""
+        return {**joint_numbers(self.kind, self.motor, self.spring), "anchor": Number("m")}
+
     def parameters(self) -> dict[str, Numbers]:
         """Return names and values of parameters: of kind, motor, spring, the anchor, armature and friction if not 0."""
         parts = [part for part in (self.motor, self.spring) if part is not None]
-        found = {f"{self.name}.{key}": getattr(part, key) for part in parts for key in given(part)}
+        found = {f"{self.name}.{key}": number for part in parts for key, number in given(part).items()}
         found |= {f"{self.name}.{key}": number for key, number in self.kind.numbers.items()}
         found |= {f"{self.name}.{key}": getattr(self, key) for key in OWN if getattr(self, key)}
         return found | {self.anchor: self.frames[1].point}
@@ -88,7 +96,7 @@ class ParametricJoint:
         return replace(part, **{key: value(f"{self.name}.{key}") for key in given(part)})
 
 
-def given(part: Motor | Spring) -> list[str]:
-    """The numbers that there are; ranges are none."""
-    values = {field.name: getattr(part, field.name) for field in fields(part)}
-    return [key for key, value in values.items() if value is not None and not isinstance(value, tuple)]
+def given(part: Motor | Spring) -> dict[str, Scalar]:
+    """The numbers that there are."""
+    values = {key: getattr(part, key) for key in numbers_of(part)}
+    return {key: value for key, value in values.items() if value is not None}

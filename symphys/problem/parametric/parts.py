@@ -20,6 +20,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.model.body import Body
+from symphys.model.numbers import Number, numbers_of
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Shape, Sphere, Static, Surface
 from symphys.model.shapes.inertia import NOISE, Tensor, inertia_of, specific
@@ -60,22 +61,26 @@ Numbers = float | tuple[float, ...]
 Value = Callable[[str], Any]
 """A parameter's value by name: a scalar, or a tuple of them."""
 
-LAW = {each.name: each.metadata for each in fields(Law) if each.metadata}
+LAW = tuple(each.name for each in fields(Law) if "value" in each.metadata)
 """The coefficients of a contact law, all of which a [[pair]] table may state."""
-VARIABLE: dict[str, tuple[float, float]] = {
-    name: about["physical"] for name, about in LAW.items() if "physical" in about
-}
-"""Those that are parameters where stated: the least and the largest value that is physical."""
-STRUCTURAL = tuple(name for name, about in LAW.items() if "structural" in about)
-"""Those whose 0 leaves equations out of the step, so that they are parameters only where they are not 0."""
+COEFFICIENTS = numbers_of(Law)
+"""Those that are parameters where stated."""
 DISTRIBUTION = ("second_moments", "correlations")
 """Parameters of a body that follow from mass, shape and inertia unless they are set."""
 CENTRE = "centre_of_mass"
+INERTIAL: Mapping[str, Number] = {
+    "mass": Number("kg", least=0.0, exceeds=True),
+    "second_moments": Number("kg m^2", least=0.0, floored=True),
+    "correlations": Number("", least=-1.0, most=1.0, scale=0.1),
+    CENTRE: Number("m", scale=0.01),
+}
+"""Parameters of every body with mass."""
 
 
 def stated(states: Mapping[str, Any]) -> dict[str, Numbers]:
     """Return the coefficients that variables may set."""
-    return {key: number for key, number in states.items() if key in VARIABLE and (number or key not in STRUCTURAL)}
+    known = {key: number for key, number in states.items() if key in COEFFICIENTS}
+    return {key: number for key, number in known.items() if number or not COEFFICIENTS[key].structural}
 
 
 @dataclass(frozen=True)
@@ -120,6 +125,11 @@ class ParametricBody:
             }
         own |= self._sizes
         return {f"{self.name}.{key}": numbers for key, numbers in (own | stated(self.states)).items()}
+
+    @property
+    def numbers(self) -> Mapping[str, Number]:
+        """Return what is known of its numbers, by key."""
+        return {**INERTIAL, **COEFFICIENTS, **(self.shapes[0].numbers if len(self.shapes) == 1 else {})}
 
     def valued(self, overrides: Mapping[str, Any], value: Value) -> Body:
         """The body with its parameters' values; mass by density and inertia follow the size unless overridden."""
@@ -229,6 +239,11 @@ class ParametricStatic:
         """Parameter names and values."""
         return {f"{self.name}.{key}": number for key, number in (self.static.parameters | stated(self.states)).items()}
 
+    @property
+    def numbers(self) -> Mapping[str, Number]:
+        """Return what is known of its numbers, by key."""
+        return {**COEFFICIENTS, **self.static.numbers}
+
     def valued(self, value: Value) -> Static:
         """The surface with its parameters' values."""
         return self.static.with_parameters({key: value(f"{self.name}.{key}") for key in self.static.parameters})
@@ -248,6 +263,11 @@ class PairRule:
     between: frozenset[str]
     collide: bool
     states: Mapping[str, Any]
+
+    @property
+    def numbers(self) -> Mapping[str, Number]:
+        """Return what is known of its numbers, by key."""
+        return COEFFICIENTS
 
     def parameters(self) -> dict[str, Numbers]:
         """Parameter names and values."""

@@ -17,12 +17,14 @@ import numpy as np
 from symphys.model.body import Body
 from symphys.model.joints import Joint
 from symphys.model.joints.coupling import CouplingSpec, placed_couplings
+from symphys.model.numbers import Number
 from symphys.model.shapes import Scalar, Static
 from symphys.model.site import Site
 from symphys.model.world import Law, Pair, Side, Statements, World, points_of
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.parts import (
+    COEFFICIENTS,
     LAW,
     Numbers,
     PairRule,
@@ -64,10 +66,23 @@ class ParametricWorld:
     def parameters(self) -> dict[str, Array]:
         """Every parameter with its value: (1,), or (3,) for gravity, the size of a box and the place of a block."""
         found: dict[str, Numbers] = {"gravity": self.gravity, **self.contact_parameters}
-        parts: tuple[Part | PairRule | ParametricJoint, ...] = (*self.parts, *self.pairs, *self.joints)
-        for part in parts:
+        for part in self.owners_of_numbers:
             found |= part.parameters()
         return {name: np.atleast_1d(np.array(numbers, float)) for name, numbers in found.items()}
+
+    @cached_property
+    def numbers(self) -> dict[str, Number]:
+        """What is known of each of the ``parameters``, by name."""
+        found = {"gravity": Number("m/s^2", phase="start")}
+        found |= {name: COEFFICIENTS[name.rpartition(".")[2]] for name in self.contact_parameters}
+        for part in self.owners_of_numbers:
+            found |= {name: part.numbers[name.removeprefix(f"{part.name}.")] for name in part.parameters()}
+        return found
+
+    @property
+    def owners_of_numbers(self) -> tuple[Part | PairRule | ParametricJoint, ...]:
+        """Bodies, statics, pairs and joints."""
+        return (*self.parts, *self.pairs, *self.joints)
 
     @cached_property
     def contact_parameters(self) -> dict[str, Numbers]:

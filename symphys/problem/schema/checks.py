@@ -90,6 +90,23 @@ def vector(count: int) -> Callable[[object], list[float]]:
     return check
 
 
+def friction(value: object) -> float | tuple[float, float]:
+    """Check Coulomb's coefficient, or two: along a direction and across it."""
+    numbers: list[Any] = value if isinstance(value, list) and len(value) == 2 else [value]
+    if not all(is_number(number) and number >= 0 for number in numbers):
+        raise fault(f"must be a number of at least 0, or two: [along, across] friction_direction, not {shown(value)}")
+    found = [float(number) for number in numbers]
+    return (found[0], found[1]) if len(found) == 2 else found[0]
+
+
+def direction(value: object) -> tuple[float, ...]:
+    """Check three numbers that are not all 0."""
+    numbers = vector(3)(value)
+    if not any(numbers):
+        raise fault("must not be zero; [1, 0, 0] is along x")
+    return tuple(numbers)
+
+
 def ends(value: object) -> list[float]:
     """A lower and an upper bound; either may be infinite."""
     if not isinstance(value, list) or len(value) != 2:

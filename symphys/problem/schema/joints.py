@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Annotated, Any
 
 from pydantic import Field, create_model
 
-from symphys.model.joints import JOINTS
+from symphys.model.joints import JOINTS, Joint, Spring
+from symphys.model.joints.motor import MOTORS
+from symphys.problem.schema.declared import keys_of, table_of
 from symphys.problem.schema.shapes import UPRIGHT
 from symphys.problem.schema.types import (
     Coordinates,
@@ -14,34 +17,33 @@ from symphys.problem.schema.types import (
     Finite,
     Identifier,
     NonNegative,
-    NonZero,
     Orientation,
-    Positive,
     SchemaTable,
     Vector,
 )
-
-VALUES: dict[str, Any] = {
-    "direction": Vector,
-    "directions": Annotated[list[Vector], Field(min_length=2, max_length=2)],
-    "nonzero": NonZero,
-}
-"""Types of the keys of kinds of joints, by the metadata of ``JointSpec``."""
 
 
 def kinds_of_joints() -> type[SchemaTable]:
     """Make a table with an optional table for each kind of joint, after the keys of ``HeldTable``."""
     found: dict[str, Any] = {}
     for word, spec in JOINTS.items():
-        keys: dict[str, Any] = {
-            each.name: (VALUES[each.metadata["value"]], Field(description=each.metadata["about"]))
-            for each in spec.own_fields()
-        }
-        name = f"{word.capitalize()}JointTable"
         about = f"{spec.summary[:1].upper()}{spec.summary[1:]}."
-        table = create_model(name, __base__=SchemaTable, __doc__=about, __module__=__name__, **keys)
+        table = table_of(f"{word.capitalize()}JointTable", fields(spec), about)
         found[word] = (table | None, Field(default=None, description=f"{spec.example}: {spec.summary}"))
     return create_model("KindsOfJointsTable", __base__=HeldTable, __module__=__name__, **found)
+
+
+def kinds_of_motors() -> type[SchemaTable]:
+    """Make a table with an optional table for each kind of motor."""
+    found: dict[str, Any] = {}
+    for word, motor in MOTORS.items():
+        table = table_of(f"{word.capitalize()}Table", fields(motor), motor.summary)
+        found[word] = (table | None, Field(default=None, description=motor.example))
+    return create_model("KindsOfMotorsTable", __base__=SchemaTable, __module__=__name__, **found)
+
+
+OWN = {name: field for name, (_, field) in keys_of(fields(Joint)).items()}
+"""Keys of what every joint has."""
 
 
 class HeldTable(SchemaTable):
@@ -53,66 +55,12 @@ class HeldTable(SchemaTable):
     )
 
 
-class ServoTable(SchemaTable):
-    """A motor whose command is an angle, or a position: the target velocity is gain (command - angle).
-
-    Angles count whole turns: a command of 18.85 rad is three turns.
-    """
-
-    gain: Positive = Field(description="target velocity per difference of angle or position [1/s]")
-    torque: Positive = Field(description="the most that it gives [N m], or [N] where the joint slides")
-    velocity: Positive = Field(description="the fastest that it aims at [rad/s], or [m/s]")
-    range: Positive | None = Field(
-        default=None, description="commands are held within so much either way [rad], or [m]; default: any"
-    )
+class MotorTable(kinds_of_motors()):  # type: ignore[misc]
+    """One kind of motor."""
 
 
-class VelocityTable(SchemaTable):
-    """A motor whose command is a velocity."""
-
-    torque: Positive = Field(description="the most that it gives [N m], or [N] where the joint slides")
-    velocity: Positive = Field(description="the fastest that it aims at [rad/s], or [m/s]")
-
-
-class TorqueTable(SchemaTable):
-    """A motor whose command is a torque [N m], or a force [N] where the joint slides."""
-
-    torque: Positive = Field(description="the most that it gives [N m], or [N] where the joint slides")
-
-
-class AffineTable(SchemaTable):
-    """A motor whose torque is affine in its command and in the joint's coordinate and rate.
-
-    It is gear clip(gain clip(command, command_range) + offset - kp gear q - kv gear v, force_range); q and v are the
-    joint's coordinate and its rate. MuJoCo's motor, position, velocity and general actuators are such.
-    """
-
-    gain: Finite = Field(default=1.0, description="force by command, before the gear")
-    offset: Finite = Field(default=0.0, description="force at command 0, before the gear [N m], or [N]")
-    kp: Finite = Field(default=0.0, description="by the position behind the gear [N m/rad], or [N/m]")
-    kv: Finite = Field(default=0.0, description="by the velocity behind the gear [N m s/rad], or [N s/m]")
-    gear: Finite = Field(default=1.0, description="ratio of the gear; a negative one turns the direction around")
-    command_range: Ends | None = Field(default=None, description="least and largest command; default: any")
-    force_range: Ends | None = Field(
-        default=None, description="least and largest force before the gear [N m], or [N]; default: any"
-    )
-
-
-class MotorTable(SchemaTable):
-    """One of four kinds of motors."""
-
-    servo: ServoTable | None = Field(default=None, description="{ gain = 20, torque = 30, velocity = 8 }")
-    velocity: VelocityTable | None = Field(default=None, description="{ torque = 30, velocity = 8 }")
-    torque: TorqueTable | None = Field(default=None, description="{ torque = 30 }")
-    affine: AffineTable | None = Field(default=None, description="{ gear = 150, command_range = [-1, 1] }")
-
-
-class SpringTable(SchemaTable):
+class SpringTable(table_of("SpringNumbersTable", fields(Spring))):  # type: ignore[misc]
     """Along every coordinate: torque = -stiffness (angle - rest) - damping rate."""
-
-    stiffness: NonNegative = Field(default=0.0, description="torque per angle [N m/rad], or force per length [N/m]")
-    damping: NonNegative = Field(default=0.0, description="torque per rate [N m s/rad], or force per velocity [N s/m]")
-    rest: Finite = Field(default=0.0, description="where it gives nothing [rad], through any number of turns, or [m]")
 
 
 class CouplingTable(SchemaTable):
@@ -170,11 +118,8 @@ class JointTable(kinds_of_joints()):  # type: ignore[misc]
     )
     start_deg: Coordinates | None = Field(default=None, description="the same in degrees, where the joint turns")
     spring: SpringTable | None = Field(default=None, description="{ stiffness = 5, damping = 0.1, rest = 0 }")
-    armature: NonNegative = Field(
-        default=0.0,
-        description="inertia that turns with each coordinate, as a rotor does, seen through its gear [kg m^2], or [kg]",
-    )
-    friction: NonNegative = Field(default=0.0, description="dry friction along every coordinate [N m], or [N]")
+    armature: NonNegative = OWN["armature"]
+    friction: NonNegative = OWN["friction"]
     frequency: NonNegative = Field(default=0.0, description="natural frequency of a compliant joint [Hz]; 0: rigid")
     damping: NonNegative | None = Field(default=None, description="damping ratio of a compliant joint; default 1")
     collide: bool = Field(default=False, description="whether the two bodies may touch each other")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from dataclasses import fields
+from typing import Annotated
 
-from pydantic import Field, PlainValidator, WithJsonSchema
+from pydantic import Field
 
-from symphys.model.world import GRAVITY, Scheme
-from symphys.problem.reading.value_texts import shown
-from symphys.problem.schema.checks import fault, is_number, vector
+from symphys.model.world import GRAVITY, Law, Scheme
+from symphys.problem.schema.declared import table_of
 from symphys.problem.schema.shapes import EXAMPLES, UPRIGHT, ShapeTable, SolidTable
 from symphys.problem.schema.types import (
     Finite,
@@ -24,39 +24,12 @@ from symphys.problem.schema.types import (
     Smoothing,
     Spacing,
     Vector,
-    vector_schema,
 )
 
 Sweeps = Annotated[int, Field(ge=1, le=1000)]
 PositionSweeps = Annotated[int, Field(ge=0, le=1000)]
 Cuts = Annotated[int, Field(ge=0, le=8)]
 DEFAULT = Scheme()
-
-
-def friction(value: object) -> float | tuple[float, float]:
-    """Coulomb's coefficient, or two: along a direction and across it."""
-    numbers: list[Any] = value if isinstance(value, list) and len(value) == 2 else [value]
-    if not all(is_number(number) and number >= 0 for number in numbers):
-        raise fault(f"must be a number of at least 0, or two: [along, across] friction_direction, not {shown(value)}")
-    found = [float(number) for number in numbers]
-    return (found[0], found[1]) if len(found) == 2 else found[0]
-
-
-def direction(value: object) -> tuple[float, ...]:
-    """Three numbers that are not all 0."""
-    numbers = vector(3)(value)
-    if not any(numbers):
-        raise fault("must not be zero; [1, 0, 0] is along x")
-    return tuple(numbers)
-
-
-NUMBER = {"type": "number", "minimum": 0}
-Friction = Annotated[
-    float | tuple[float, float],
-    PlainValidator(friction),
-    WithJsonSchema({"anyOf": [NUMBER, {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}]}),
-]
-Direction = Annotated[tuple[float, ...], PlainValidator(direction), WithJsonSchema(vector_schema(3))]
 
 
 class SimulationTable(SchemaTable):
@@ -119,29 +92,17 @@ class WorldTable(SchemaTable):
     )
 
 
-class SurfaceTable(SchemaTable):
+STATED = [each for each in fields(Law) if "combine" in each.metadata]
+"""Coefficients that surfaces state."""
+REST = [each for each in fields(Law) if "combine" not in each.metadata]
+
+
+class SurfaceTable(table_of("StatedTable", STATED, optional=True)):  # type: ignore[misc]
     """What one surface brings into its contacts.
 
     Friction and restitution of a contact are the product of what its two surfaces state, torsion and rolling their
     sum; if neither surface states it, the one in [contact] holds; a [[pair]] table overrides all.
     """
-
-    friction: Friction | None = Field(
-        default=None,
-        description="Coulomb's coefficient, or two: [along, across] friction_direction; those of two surfaces are "
-        "multiplied",
-    )
-    friction_direction: Direction | None = Field(
-        default=None,
-        description="along which the first of two coefficients holds: in the frame of a body, with which it turns; in "
-        "world axes where it belongs to what stands still, to a pair or to [contact]. Its part across the contact's "
-        "normal counts",
-    )
-    restitution: Share | None = Field(
-        default=None, description="share of the speed after a bounce; stated ones are multiplied"
-    )
-    torsion: NonNegative | None = Field(default=None, description="resists spinning about the normal: a radius [m]")
-    rolling: NonNegative | None = Field(default=None, description="resists rolling: a radius [m]")
 
 
 class MemberTable(SurfaceTable):
@@ -217,26 +178,11 @@ class TerrainTable(MemberTable):
     origin: Pair | None = Field(default=None, description="x and y of the first height [m]; default [0, 0]")
 
 
-class ContactTable(SchemaTable):
+class ContactTable(table_of("LawTable", fields(Law))):  # type: ignore[misc]
     """The law of contacts for which no surface and no pair states anything else."""
 
-    friction: Friction = Field(
-        default=0.5, description="Coulomb's coefficient, or two: [along, across] friction_direction"
-    )
-    restitution: Share = Field(default=0.0, description="share of the speed that is left after a bounce")
-    torsion: NonNegative = Field(default=0.0, description="resists spinning about the normal: a radius [m]")
-    rolling: NonNegative = Field(default=0.0, description="resists rolling: a radius [m]")
-    frequency: NonNegative = Field(default=0.0, description="of soft contacts [Hz]; 0: contacts are rigid")
-    damping: NonNegative | None = Field(default=None, description="damping ratio of soft contacts; default 1")
-    friction_direction: Direction | None = Field(
-        default=None, description="along which the first of two coefficients holds, in world axes"
-    )
-    friction_frame: Identifier | None = Field(
-        default=None, description="the body in whose frame friction_direction is; default: world axes"
-    )
 
-
-class PairTable(SurfaceTable):
+class PairTable(table_of("PairLawTable", REST, base=SurfaceTable, optional=True)):  # type: ignore[misc]
     """What holds between two surfaces, whatever they state."""
 
     between: Annotated[list[str], Field(min_length=2, max_length=2)] = Field(
@@ -244,8 +190,3 @@ class PairTable(SurfaceTable):
         "that one a table with two groups"
     )
     collide: bool = Field(default=True, description="false: the two pass through each other")
-    frequency: NonNegative | None = Field(default=None, description="of a soft contact [Hz]; 0: rigid")
-    damping: NonNegative | None = Field(default=None, description="damping ratio of the soft contact")
-    friction_frame: Identifier | None = Field(
-        default=None, description="the body in whose frame friction_direction is; default: world axes"
-    )

@@ -25,6 +25,11 @@ def vector_schema(count: int) -> dict[str, Any]:
     return {"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count}
 
 
+def coefficient_schema() -> dict[str, Any]:
+    """The JSON Schema of a number of at least 0."""
+    return {"type": "number", "minimum": 0}
+
+
 def positive_schema(count: int) -> dict[str, Any]:
     """The JSON Schema of a list of ``count`` positive numbers."""
     return {
@@ -51,7 +56,7 @@ def numbers_schema() -> dict[str, Any]:
 
 def stages_schema() -> dict[str, Any]:
     """The JSON Schema of a number of at least 0, or a list of them."""
-    number = {"type": "number", "minimum": 0}
+    number = coefficient_schema()
     return {"anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}
 
 
@@ -133,6 +138,12 @@ Prior = Annotated[
     WithJsonSchema({"type": "array", "items": coordinates_schema(), "minItems": 2, "maxItems": 2}),
 ]
 Smoothing = Annotated[list[float], PlainValidator(checks.smoothing), WithJsonSchema(stages_schema())]
+Friction = Annotated[
+    float | tuple[float, float],
+    PlainValidator(checks.friction),
+    WithJsonSchema({"anyOf": [coefficient_schema(), {**vector_schema(2), "items": coefficient_schema()}]}),
+]
+Direction = Annotated[tuple[float, ...], PlainValidator(checks.direction), WithJsonSchema(vector_schema(3))]
 Interpolation = Literal["constant", "linear"]
 Stop = Literal["met", "converged"]
 

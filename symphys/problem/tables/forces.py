@@ -12,7 +12,7 @@ from symphys.dynamics.observation import SENSOR_KINDS
 from symphys.expression import FormulaError, parse
 from symphys.problem.feedback import ForceLaw
 from symphys.problem.model import Phase, Variable, VariableSlot
-from symphys.problem.quantities import Quantity, SlotError, read_slot
+from symphys.problem.quantities import OWN_SIZE, Quantity, SlotError, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.control import ForceTable
 from symphys.problem.tables.simulation import find_phase
@@ -27,7 +27,7 @@ VARYING = ("parameter", "weight")
 def force_quantities(tables: Sequence[ForceTable]) -> dict[str, Quantity]:
     """The numbers of all force laws by the names that variables and formulas use, such as ``drag.c``."""
     return {
-        f"{table.name}.{key}": Quantity("weight", np.ravel(np.array(value, float)), own_scale=True)
+        f"{table.name}.{key}": Quantity("weight", np.ravel(np.array(value, float)), OWN_SIZE)
         for table in tables
         for key, value in table.numbers.items()
     }

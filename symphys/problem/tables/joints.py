@@ -5,27 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
 from symphys.model.gimbal import Screw, locks
 from symphys.model.joints import (
     JOINTS,
-    AffineMotor,
     JointFrame,
     Kind,
     Limits,
     Motor,
-    Servo,
     Spring,
-    TorqueMotor,
-    VelocityMotor,
 )
 from symphys.model.joints.frames import WORLD
+from symphys.model.joints.motor import MOTORS
 from symphys.model.scalar import is_zero
-from symphys.problem.parametric.joints import ParametricJoint
+from symphys.problem.parametric.joints import OWN, ParametricJoint
 from symphys.problem.reading.faults import Faults, Place
-from symphys.problem.schema.joints import JointTable, MotorTable, SpringTable
+from symphys.problem.schema.joints import JointTable, MotorTable
 from symphys.problem.tables.joint_frames import read_joint_frames
 from symphys.suggest import hint, quote
 from symphys.types import Array
@@ -207,13 +205,12 @@ class JointReader:
             frames=read_joint_frames(self.place, table, spec, word, self.initial, self.faults),
             motor=self.motor(table.motor),
             limits=limits,
-            spring=read_spring(table.spring),
+            spring=None if table.spring is None else Spring(**dict(table.spring)),
             frequency=table.frequency,
             damping=1.0 if table.damping is None else table.damping,
             collide=table.collide,
             start=self.start(kind, limits),
-            armature=table.armature,
-            friction=table.friction,
+            **{key: getattr(table, key) for key in OWN},
         )
 
     def check_between(self) -> None:
@@ -260,21 +257,14 @@ class JointReader:
         """The one that is given."""
         if table is None:
             return None
-        given = [key for key in type(table).model_fields if getattr(table, key) is not None]
+        given = [word for word in MOTORS if getattr(table, word) is not None]
         if len(given) != 1:
             start = f"has {' and '.join(given)}; give only" if given else "give"
-            text = "servo = { gain = 20, torque = 30, velocity = 8 }, velocity = { torque = 30, velocity = 8 }, "
-            self.add("motor", f"{start} one of {text}torque = {{ torque = 30 }}, affine = {{ gear = 150 }}")
+            examples = ", ".join(f"{word} = {motor.example}" for word, motor in MOTORS.items())
+            self.add("motor", f"{start} one of {examples}")
             return None
-        if table.servo is not None:
-            return Servo(table.servo.gain, table.servo.torque, table.servo.velocity, table.servo.range)
-        if table.velocity is not None:
-            return VelocityMotor(table.velocity.torque, table.velocity.velocity)
-        if table.torque is not None:
-            return TorqueMotor(table.torque.torque)
-        assert table.affine is not None
-        ranges = {key: ends_of(getattr(table.affine, key)) for key in ("command_range", "force_range")}
-        return AffineMotor(**{**dict(table.affine), **ranges})
+        numbers = dict(getattr(table, given[0]))
+        return MOTORS[given[0]](**{key: frozen(value) for key, value in numbers.items()})
 
     def limits(self, kind: Kind) -> Limits:
         """Read the limits in rad or m."""
@@ -310,11 +300,6 @@ class JointReader:
         return values
 
 
-def ends_of(ends: Sequence[float] | None) -> tuple[float, float] | None:
-    """A range; None where there is none."""
-    return None if ends is None else (float(ends[0]), float(ends[1]))
-
-
-def read_spring(table: SpringTable | None) -> Spring | None:
-    """The spring along every coordinate."""
-    return None if table is None else Spring(table.stiffness, table.damping, table.rest)
+def frozen(value: Any) -> Any:
+    """Make tuples of lists."""
+    return tuple(value) if isinstance(value, list) else value

@@ -12,9 +12,8 @@ from symphys.dynamics.observation import SENSOR_KINDS
 from symphys.expression import Formula
 from symphys.problem.feedback import Sensor
 from symphys.problem.model import Phase, Simulation, Termination
-from symphys.problem.parametric.by_phase import changing
 from symphys.problem.parametric.world import ParametricWorld
-from symphys.problem.quantities import Quantity, physical, unknown
+from symphys.problem.quantities import Quantity, unknown
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
 from symphys.problem.schema import Document
@@ -82,11 +81,12 @@ def read_sets(
     tables: Sequence[PhaseTable], parametric: ParametricWorld, faults: Faults
 ) -> dict[str, dict[str, tuple[float, ...]]]:
     """Read the numbers that hold in each phase alone; note those that cannot change from step to step."""
-    nominal, able = parametric.parameters(), changing(parametric)
+    nominal, known = parametric.parameters(), parametric.numbers
+    able = [name for name in nominal if known[name].phase]
     found: dict[str, dict[str, tuple[float, ...]]] = {table.name: {} for table in tables}
     for index, table in enumerate(tables):
         for name, value in dotted(table.sets):
-            numbers, (low, high), place = row_of(value), physical(name, "parameter"), ("phase", index, "sets")
+            numbers, place = row_of(value), ("phase", index, "sets")
             if name not in nominal:
                 faults.add(place, f"there is no parameter {quote(name)}; {unknown(name, nominal)}")
             elif name not in able:
@@ -94,8 +94,8 @@ def read_sets(
             elif numbers is None or len(numbers) != nominal[name].size:
                 count = nominal[name].size
                 faults.add(place, f"{name} takes {'a number' if count == 1 else f'{count} numbers'}, not {value!r}")
-            elif not all(low <= number <= high for number in numbers):
-                faults.add(place, f"{name} must lie in [{low:g}, {high:g}], not {value!r}")
+            elif not all(known[name].least <= number <= known[name].most for number in numbers):
+                faults.add(place, f"{name} must lie in [{known[name].least:g}, {known[name].most:g}], not {value!r}")
             else:
                 found[table.name][name] = numbers
     faults.stop_if_any()
@@ -109,10 +109,12 @@ def row_of(value: object) -> tuple[float, ...] | None:
     return tuple(map(float, row)) if plain else None
 
 
-def phase_quantities(sets: Mapping[str, Mapping[str, tuple[float, ...]]]) -> dict[str, Quantity]:
+def phase_quantities(
+    sets: Mapping[str, Mapping[str, tuple[float, ...]]], parametric: ParametricWorld
+) -> dict[str, Quantity]:
     """The numbers of all phases by the names that variables and formulas use, such as ``ice.ground.friction``."""
     return {
-        f"{phase}.{name}": Quantity("weight", np.array(numbers), own_scale=True, like=name)
+        f"{phase}.{name}": Quantity("weight", np.array(numbers), parametric.numbers[name])
         for phase, own in sets.items()
         for name, numbers in own.items()
     }

@@ -11,15 +11,11 @@ from numpy.typing import NDArray
 
 from symphys.problem.checks.magnitude import check_mass
 from symphys.problem.model import Kind, Simulation, Variable, VariableSlot
-from symphys.problem.quantities import SCALES, Quantity, SlotError, extremes, limits, read_slot
+from symphys.problem.quantities import Quantity, SlotError, limits, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.objectives import VariableTable
 from symphys.problem.schema.types import NestedList
 from symphys.types import Array, Bools
-
-WEIGHTS = 0.1
-CLOCK = 0.01
-"""[s]: offsets of clocks."""
 
 
 class VariableReader:
@@ -46,7 +42,7 @@ class VariableReader:
         self.count = len(slots[0].components)
         self.check_knots(kind, simulation)
         limit = [limits(slot, self.known) for slot in slots]
-        scale = self.numbers("scale", self.usual_scale(slots, kind))
+        scale = self.numbers("scale", self.usual_scale(slots))
         variable = Variable(
             name=self.table.name,
             kind=kind,
@@ -109,16 +105,13 @@ class VariableReader:
         same = all(np.array_equal(a, b) for a, b in pairwise(values))
         return values[0] if same else None
 
-    def usual_scale(self, slots: Sequence[VariableSlot], kind: Kind) -> Array | float:
-        """Parameters vary by their own size, numbers of controllers by WEIGHTS, clocks by CLOCK, others by 1."""
-        value, key = self.nominal(slots), slots[0].name.rpartition(".")[2]
-        if key in SCALES and all(self.known[slot.name].own_scale for slot in slots):
-            return SCALES[key]
-        if not all(self.known[slot.name].own_scale for slot in slots):
-            return {"weight": WEIGHTS, "recording": CLOCK}.get(kind, 1.0)
-        if value is None:
-            return 1.0
-        return np.where(value == 0, 1.0, np.abs(value))
+    def usual_scale(self, slots: Sequence[VariableSlot]) -> Array | float:
+        """How much quantities typically change: by the least of their scales, else by their own size."""
+        scales = [scale for slot in slots if (scale := self.known[slot.name].number.scale) is not None]
+        if scales:
+            return min(scales)
+        value = self.nominal(slots)
+        return 1.0 if value is None else np.where(value == 0, 1.0, np.abs(value))
 
     def numbers(self, key: str, default: NestedList | Array | None) -> Array:
         """(components * knots,): the key's value, or the default, for every component and knot."""
@@ -166,11 +159,12 @@ class VariableReader:
         """Bounds must not allow a negative mass, and the like; a quaternion must not be zero."""
         for slot in variable.slots:
             name = slot.name.rpartition(".")[2]
-            low, high, above = extremes(slot.name, self.known[slot.name])
-            if np.any(variable.lower < low) or (above and np.any(variable.lower <= low)):
-                self.add("lower", f"{slot.name} must {'be greater than' if above else 'be at least'} {low:g}")
-            if np.any(variable.upper > high):
-                self.add("upper", f"{slot.name} must be at most {high:g}")
+            number = self.known[slot.name].number
+            if np.any(variable.lower < number.least) or (number.exceeds and np.any(variable.lower <= number.least)):
+                what = "be greater than" if number.exceeds else "be at least"
+                self.add("lower", f"{slot.name} must {what} {number.least:g}")
+            if np.any(variable.upper > number.most):
+                self.add("upper", f"{slot.name} must be at most {number.most:g}")
             if name == "mass":
                 check_mass((*self.place, "guess"), float(variable.guess[0]), self.faults)
             if name == "orientation" and len(slot.components) == 4 and not np.any(variable.guess):
