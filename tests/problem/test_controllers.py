@@ -61,7 +61,7 @@ def refused(folder: Path, old: str, new: str) -> str:
         ('"pivot.command"', '"pivot.comand"', ['controller "brain".drives', "pivot.command"]),
         ('"pivot.command"', '"arm.mass"', ['controller "brain".drives', "forces, torques and commands"]),
         ('"pivot.command"', '["pivot.command", "pivot.command"]', ['controller "brain".drives', "twice"]),
-        ("net = { hidden = [3] }", "", ['controller "brain"', "linear = {}"]),
+        ("net = { hidden = [3] }", "", ['controller "brain"', "linear = { gains"]),
         ("net = {", "linear = {}\nnet = {", ['controller "brain"', "linear and net"]),
         ("hidden = [3]", "hidden = [0]", ['controller "brain".net.hidden']),
         ("hidden = [3]", 'activation = "sine"', ['controller "brain".net.activation', "tanh"]),

@@ -3,9 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from symphys.types import Expr
+
+
+class DeclaredLaw(Protocol):
+    """What a kind of controller says of its table in problem files; see ``CONTROLLERS``.
+
+    Its other fields with metadata are keys of the table too; see ``symphys.model.numbers``.
+
+    Attributes:
+        summary: description of the table.
+        example: of the table.
+        numbers: descriptions of the numbers that a table gives, by the names of ``ControlLaw.sizes``; 0 by default.
+        needed: those of them that a table must give, each one number.
+        blind: whether it senses nothing.
+    """
+
+    summary: ClassVar[str]
+    example: ClassVar[str]
+    numbers: ClassVar[Mapping[str, str]]
+    needed: ClassVar[tuple[str, ...]]
+    blind: ClassVar[bool]
 
 
 class ControlLaw(Protocol):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import ClassVar
 
 import casadi as ca
 
@@ -13,6 +15,17 @@ from symphys.types import Expr
 @dataclass(frozen=True)
 class Linear:
     """u = K o + b; see ``ControlLaw``. ``gains`` holds K row by row (m n,), ``offsets`` b (m,)."""
+
+    summary: ClassVar[str] = "Gains times what is sensed, and offsets."
+    example: ClassVar[str] = "{ gains = [[0.1, 0.2]] }"
+    numbers: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "gains": "for each output a list with a number for each input; or 0",
+            "offsets": "a number for each output; default 0",
+        }
+    )
+    needed: ClassVar[tuple[str, ...]] = ()
+    blind: ClassVar[bool] = False
 
     senses: int
     outputs: int

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import ClassVar
 
 import casadi as ca
 
+from symphys.model.numbers import table_key
 from symphys.types import Expr
 
 
@@ -18,8 +21,24 @@ class Periodic:
     other. Nothing is sensed.
     """
 
+    summary: ClassVar[str] = "Sines of one frequency and its multiples, about offsets."
+    example: ClassVar[str] = "{ frequency = 1.5 }"
+    numbers: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "frequency": "of the first harmonic [Hz]",
+            "offsets": "a number for each output; default 0",
+            "sines": "a number for each output, or a list of them for each harmonic; default 0",
+            "cosines": "likewise; default 0",
+        }
+    )
+    needed: ClassVar[tuple[str, ...]] = ("frequency",)
+    blind: ClassVar[bool] = True
+
     outputs: int
-    harmonics: int = 1
+    harmonics: int = field(
+        default=1,
+        metadata=table_key("count", "number of sines: of the frequency, twice the frequency, and so on"),
+    )
     senses: int = 0
 
     @property

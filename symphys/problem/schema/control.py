@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from dataclasses import fields
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from symphys.dynamics.observation import SENSOR_KINDS
+from symphys.model.controllers import CONTROLLERS
+from symphys.problem.schema.declared import keys_of
 from symphys.problem.schema.types import Finite, Identifier, NonNegative, Numbers, SchemaTable, Texts
 
 Width = Annotated[int, Field(ge=1, le=100_000)]
@@ -26,27 +29,6 @@ class SensorTable(SchemaTable):
         description=f'formulas, joined one after the other: {SENSED}, "knee.command" (of the step before), '
         '"torso.position[2]", "sin(2 * pi * time)"'
     )
-
-
-class LinearTable(SchemaTable):
-    """Gains times what is sensed, and offsets."""
-
-    gains: Numbers | None = Field(default=None, description="for each output a list with a number for each input; or 0")
-    offsets: Numbers | None = Field(default=None, description="a number for each output; default 0")
-
-
-class PeriodicTable(SchemaTable):
-    """Sines of one frequency and its multiples, about offsets."""
-
-    frequency: Finite = Field(description="of the first harmonic [Hz]")
-    harmonics: Annotated[int, Field(ge=1, le=100)] = Field(
-        default=1, description="number of sines: of the frequency, twice the frequency, and so on"
-    )
-    offsets: Numbers | None = Field(default=None, description="a number for each output; default 0")
-    sines: Numbers | None = Field(
-        default=None, description="a number for each output, or a list of them for each harmonic; default 0"
-    )
-    cosines: Numbers | None = Field(default=None, description="likewise; default 0")
 
 
 class NetTable(SchemaTable):
@@ -72,8 +54,8 @@ class FunctionTable(SchemaTable):
     weights: Numbers | None = Field(default=None, description="its numbers at the start; default 0")
 
 
-class ControllerTable(SchemaTable):
-    """What drives inputs, step after step. Where several drive the same input, their outputs add up."""
+class DrivingTable(SchemaTable):
+    """What is driven, and what is sensed."""
 
     name: Identifier = Field(
         description='variables set its numbers: "name.weights", "name.gains", "name.frequency", ...'
@@ -81,8 +63,27 @@ class ControllerTable(SchemaTable):
     drives: Texts = Field(description='"knee.command", "ball.force[0:2]", or a list')
     senses: list[str] = Field(default=[], description="names of sensors, joined one after the other")
     scale: Numbers = Field(default=1.0, description="factor of all outputs, or one for each")
-    linear: LinearTable | None = Field(default=None, description="{ gains = [[0.1, 0.2]] }")
-    periodic: PeriodicTable | None = Field(default=None, description="{ frequency = 1.5 }")
+
+
+def kinds_of_controllers() -> type[SchemaTable]:
+    """Make a table with an optional table for each kind of controller that says its own keys."""
+    found: dict[str, Any] = {}
+    for word, law in CONTROLLERS.items():
+        numbers: dict[str, Any] = {
+            key: (Finite, Field(description=about))
+            if key in law.needed
+            else (Numbers | None, Field(default=None, description=about))
+            for key, about in law.numbers.items()
+        }
+        keys = {**numbers, **keys_of(fields(law))}
+        table = create_model(f"{word.capitalize()}Table", __base__=SchemaTable, __doc__=law.summary, **keys)
+        found[word] = (table | None, Field(default=None, description=law.example))
+    return create_model("KindsOfControllersTable", __base__=DrivingTable, **found)
+
+
+class ControllerTable(kinds_of_controllers()):  # type: ignore[misc]
+    """What drives inputs, step after step. Where several drive the same input, their outputs add up."""
+
     net: NetTable | None = Field(default=None, description="{ hidden = [32, 32] }")
     function: FunctionTable | None = Field(default=None, description="{ weights = [0, 0] }, and a function from Python")
 

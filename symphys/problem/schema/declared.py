@@ -25,6 +25,7 @@ from symphys.problem.schema.types import (
 )
 
 VALUES: dict[str, Any] = {
+    "count": Annotated[int, pydantic.Field(ge=1, le=100)],
     "direction": Vector,
     "directions": Annotated[list[Vector], pydantic.Field(min_length=2, max_length=2)],
     "ends": Ends,

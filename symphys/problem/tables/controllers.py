@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from symphys.archives import ArchiveError, OtherShape, read_array
 from symphys.expression import Formula, FormulaError, parse
 from symphys.files import check_regular
-from symphys.model.controllers import ControlLaw, Custom, Linear, Net, Periodic
+from symphys.model.controllers import CONTROLLERS, ControlLaw, Custom, Net
 from symphys.problem.checks.memory import check_net
 from symphys.problem.feedback import FeedbackController, Sensor
 from symphys.problem.quantities import Quantity, SlotError, read_slot
@@ -22,8 +23,7 @@ from symphys.suggest import hint, quote
 from symphys.types import Array
 
 KINDS = {
-    "linear": "linear = {}",
-    "periodic": "periodic = { frequency = 1.5 }",
+    **{word: f"{word} = {law.example}" for word, law in CONTROLLERS.items()},
     "net": "net = { hidden = [32, 32] }",
     "function": "function = {}",
 }
@@ -154,15 +154,16 @@ class ControllerReader:
         table = self.table
         if kind == "function":
             return self.function(senses, outputs)
-        if table.periodic is not None:
-            if senses:
-                self.add("senses", "a periodic controller senses nothing; leave this out, or add another controller")
-            return Periodic(outputs, table.periodic.harmonics)
-        if not senses:
+        blind = kind in CONTROLLERS and CONTROLLERS[kind].blind
+        if blind and senses:
+            self.add("senses", f"a {kind} controller senses nothing; leave this out, or add another controller")
+        if not blind and not senses:
             self.add("senses", f"a {kind} controller needs what it senses: names of sensors")
             return None
         if table.net is None:
-            return Linear(senses, outputs)
+            declared, given = CONTROLLERS[kind], getattr(table, kind)
+            keys = {each.name: getattr(given, each.name) for each in fields(declared) if "value" in each.metadata}
+            return declared(**keys, outputs=outputs, senses=0 if blind else senses)
         net = table.net
         law = Net(senses, outputs, tuple(net.hidden), net.activation, net.output, net.biases, net.skip)
         fits = check_net((*self.place, "net", "hidden"), law.sizes["weights"], self.varied, self.faults)
