@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -19,10 +19,12 @@ from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import BuildReport
 from symphys.codegen.runtime.library import loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
+from symphys.codegen.slopes.kept import KeptSlopes
 from symphys.codegen.slopes.plan import SlopePlan, slope_plan
-from symphys.codegen.toolchain.build import shared_library
+from symphys.codegen.toolchain.build import Built, kept_library, shared_library, texts_of
 from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.compiler import processor, processors
+from symphys.codegen.toolchain.warm_start import ProgramSource, found, keep
 from symphys.types import Array
 
 WORD = ctypes.c_int64
@@ -126,7 +128,7 @@ class SlopeKernel:
         for block, plan in zip(blocks, planned.blocks, strict=False):
             numbers = [*plan.rows, *[-1] * (lanes - len(plan.rows))]
             block.taken, block.rows = self._put(plan.taken), self._words(numbers)
-            block.left, block.words = len(plan.left), self._flat(plan.left)
+            block.left, block.words = len(plan.left), self._words(plan.left)
         self._kept.append(blocks)
         program, back = self.program, planned.backward
         z, parameters, height = program.z, program.parameters, program.outputs[self.output].size
@@ -139,20 +141,18 @@ class SlopeKernel:
             len(back.calls) - 1,
             len(back.calls) + len(back.copies) + len(back.uses),
             self._words(back.entries),
-            *map(self._flat, (back.calls, back.copies, back.uses, back.cells)),
+            *map(self._words, (back.calls, back.copies, back.uses, back.cells)),
             len(back.cells),
             len(planned.blocks),
             ctypes.addressof(blocks),
-            sum(count for _, count, *_ in planned.read),
+            int(planned.read[:, 1].sum()),
             len(planned.read),
-            self._flat(planned.read),
+            self._words(planned.read),
         )
 
-    def _flat(self, entries: Sequence[Sequence[int]]) -> int:
-        return self._words([x for row in entries for x in row])
-
-    def _words(self, values: list[int]) -> int:
-        return self._put(np.array(values or [0], np.int64))
+    def _words(self, values: ArrayLike) -> int:
+        words = np.ascontiguousarray(values, np.int64).ravel()
+        return self._put(words if words.size else np.zeros(1, np.int64))
 
     def _put(self, values: NDArray[Any]) -> int:
         self._kept.append(values)
@@ -160,12 +160,12 @@ class SlopeKernel:
 
 
 def compile_slopes(
-    program: Program, output: str, cache: Cache | None = None, threads: int | None = None
+    program: Program | ProgramSource, output: str, cache: Cache | None = None, threads: int | None = None
 ) -> SlopeKernel:
     """Build the Jacobian of an output of a program by z, in double precision, or take it from the cache.
 
     Args:
-        program: of one step.
+        program: of one step. A source is not asked for its program where the Jacobian is kept.
         output: which of its outputs.
         cache: where kernels are kept; None: the user's.
         threads: how many blocks of points are computed at once; None: one for each processor.
@@ -173,20 +173,39 @@ def compile_slopes(
     Raises:
         KernelUnavailable: with one line that says why; the caller falls back.
     """
-    started = time.perf_counter()
-    lanes = processor().lanes(False)
-    planned = slope_plan(program, output, lanes)
-    if program.zeroed or program.constants:
+    started, lanes, cache = time.perf_counter(), processor().lanes(False), cache or default_cache()
+    source = program if isinstance(program, ProgramSource) else ProgramSource(lambda: program)
+    key = source.key(lanes, "slopes", output)
+    kept = None if key is None else found(key, lambda path: KeptSlopes.read(path, source.make), cache)
+    built = None if kept is None else kept_library(kept.texts, cache)
+    if kept is not None and built is not None:
+        return _kernel(kept, built, loaded(built.path), output, lanes, started, threads)
+    whole = source.make()
+    planned = slope_plan(whole, output, lanes)
+    if whole.zeroed or whole.constants:
         raise ProgramError("slopes are of programs without constants")
-    with shared_library(_sources(planned, lanes), cache or default_cache()) as built:
+    parts = _sources(planned, lanes)
+    operations = sum(len(graph.nodes) for graph, _ in planned.functions)
+    kept = KeptSlopes(whole, planned, texts_of(parts), len(planned.functions), operations)
+    with shared_library(parts, cache, kept.texts) as built:
         library = loaded(built.path)
+    if key is not None:
+        keep(key, kept.write, cache)
+    return _kernel(kept, built, library, output, lanes, started, threads)
+
+
+def _kernel(
+    kept: KeptSlopes, built: Built, library: Any, output: str, lanes: int, started: float, threads: int | None
+) -> SlopeKernel:
+    """Make the kernel of a library and its plan."""
+    program, planned = kept.program, kept.plan
     report = BuildReport(
         compiler=built.compiler.version,
         flags=built.flags,
         lanes=lanes,
         precision="double",
-        functions=len(planned.functions),
-        operations=sum(len(graph.nodes) for graph, _ in planned.functions),
+        functions=kept.functions,
+        operations=kept.operations,
         bytes_per_lane=8 * (program.size + planned.tape + planned.adjoints),
         cached=built.cached,
         seconds=time.perf_counter() - started,

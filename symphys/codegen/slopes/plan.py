@@ -28,7 +28,7 @@ from symphys.codegen.graph.graph import Graph
 from symphys.codegen.program.program import Function, FunctionCall, Place, Program
 from symphys.codegen.slopes.places import AdjointPlaces, PointPlaces
 from symphys.codegen.slopes.pulls import Pull, Pulls, sparsity
-from symphys.types import Bools
+from symphys.types import Bools, Ints
 
 AT_ONCE = 4
 SMALLEST = 400
@@ -107,13 +107,13 @@ class RowBlock:
     Attributes:
         rows: their numbers.
         taken: (adjoints,) which of all adjoints they take.
-        left: words of the adjoint memory, as (first, count), that these adjoints write and none of them reads. They are
-            0 where the values are finite, since nothing that a row depends on is left out.
+        left: (k, 2) words of the adjoint memory, as (first, count), that these adjoints write and none of them reads.
+            They are 0 where the values are finite, since nothing that a row depends on is left out.
     """
 
     rows: list[int]
     taken: Bools
-    left: list[tuple[int, int]]
+    left: Ints
 
 
 @dataclass(frozen=True)
@@ -130,11 +130,11 @@ class Adjoints:
         cells: (cells, 3) the two places, their size.
     """
 
-    entries: list[int]
-    calls: list[list[int]]
-    copies: list[list[int]]
-    uses: list[list[int]]
-    cells: list[list[int]]
+    entries: Ints
+    calls: Ints
+    copies: Ints
+    uses: Ints
+    cells: Ints
 
 
 @dataclass(frozen=True)
@@ -147,21 +147,21 @@ class SlopePlan:
         backward: all adjoints.
         blocks: of rows.
         tape: words after the program's own.
-        read: what adjoints read of all these, one after the other in the memory of one point: first, count, and the
-            words of a section and a guard, since that is not read where one of these is 0; -1: none.
+        read: (k, 4) what adjoints read of all these, one after the other in the memory of one point: first, count, and
+            the words of a section and a guard, since that is not read where one of these is 0; -1: none.
         adjoints: words of the adjoint memory.
         seeds: (rows,) the word of the adjoint memory of each row.
         result: where the adjoint of z begins.
     """
 
     functions: tuple[tuple[Graph, Form], ...]
-    forward: list[int]
+    forward: Ints
     backward: Adjoints
     blocks: list[RowBlock]
     tape: int
-    read: list[tuple[int, int, int, int]]
+    read: Ints
     adjoints: int
-    seeds: list[int]
+    seeds: Ints
     result: int
 
 
@@ -185,16 +185,17 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
     adjoints = _adjoints(backward, places, values, functions)
     for rows, taken in row_blocks(program, target, backward, lanes, functions):
         left = _left(program, [pull for pull, on in zip(backward, taken, strict=True) if on])
-        blocks.append(RowBlock(rows, taken, sorted({each for place in left for each in places.ranges(place)})))
+        ranges = sorted({each for place in left for each in places.ranges(place)})
+        blocks.append(RowBlock(rows, taken, table(ranges, 2)))
     return SlopePlan(
         tuple(functions.listed),
-        entries_of(forward),
+        np.array(entries_of(forward), np.int64),
         adjoints,
         blocks,
         pulls.end - program.size,
-        values.read(),
+        table(values.read(), 4),
         places.size,
-        [places.of(target.offset + row, 1) for row in range(target.size)],
+        np.array([places.of(target.offset + row, 1) for row in range(target.size)], np.int64),
         places.of(program.z.offset, program.z.size),
     )
 
@@ -209,23 +210,29 @@ def _after_guards(calls: Sequence[FunctionCall]) -> int:
 def _adjoints(
     backward: Sequence[Pull], places: AdjointPlaces, values: PointPlaces, functions: DistinctFunctions
 ) -> Adjoints:
-    found = Adjoints([], [], [], [], [[cell.first, cell.second, cell.members[0][1]] for cell in places.cells])
+    entries, calls, copies, uses = list[int](), list[list[int]](), list[list[int]](), list[list[int]]()
     for pull in backward:
-        begin = len(found.entries)
-        found.entries.extend(_entry(pull, places, values, functions))
+        begin = len(entries)
+        entries.extend(_entry(pull, places, values, functions))
         starts = list[int]()
         for alternative in pull.alternatives:
-            starts.append(len(found.copies))
+            starts.append(len(copies))
             for copy in alternative.copies if alternative else ():
                 cell, _ = places.cell(copy.offset, copy.size)
                 to = NONE if copy.source == NONE else places.of(copy.source, copy.size)
                 if cell == NONE or cell != places.cell(copy.source, copy.size)[0]:
-                    found.copies.append([cell, places.of(copy.offset, copy.size), to, copy.size])
-        found.calls.append([begin, *map(word_of, pull.alternatives), *starts, len(found.uses)])
+                    copies.append([cell, places.of(copy.offset, copy.size), to, copy.size])
+        calls.append([begin, *map(word_of, pull.alternatives), *starts, len(uses)])
         cells = [places.cell(place.offset, place.size) for place in pull.marked("outputs")]
-        found.uses.extend([number, parity] for number, parity in cells if number != NONE)
-    found.calls.append([len(found.entries), NONE, NONE, len(found.copies), len(found.copies), len(found.uses)])
-    return found
+        uses.extend([number, parity] for number, parity in cells if number != NONE)
+    calls.append([len(entries), NONE, NONE, len(copies), len(copies), len(uses)])
+    cells_of = [[cell.first, cell.second, cell.members[0][1]] for cell in places.cells]
+    return Adjoints(np.array(entries, np.int64), table(calls, 6), table(copies, 4), table(uses, 2), table(cells_of, 3))
+
+
+def table(rows: Sequence[Sequence[int]], columns: int) -> Ints:
+    """Return rows of numbers (k, columns), none too."""
+    return np.array(rows, np.int64).reshape(-1, columns)
 
 
 def _left(program: Program, pulls: Sequence[Pull]) -> list[Place]:

@@ -297,6 +297,14 @@ def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None 
         yield Built(path, compiler, flags, found is not None, note)
 
 
+def kept_library(texts: str, cache: Cache) -> Built | None:
+    """Return the library of C files with that checksum, if it is kept."""
+    compiler = find_compiler()
+    flags = compiler.flags(processor())
+    path = cache.find(library_key(texts, compiler, flags))
+    return None if path is None else Built(path, compiler, flags, cached=True)
+
+
 def compile_for(given: IO[bytes]) -> None:
     """Keep the library that a ``Background`` asks for, and print its path, or why there is none."""
     from symphys.codegen.emit.source import SourceFile

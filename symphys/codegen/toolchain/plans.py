@@ -74,13 +74,13 @@ class KeptPlan:
         discounted = program.discounted
         head = {
             "size": program.size,
-            "z": _listed(program.z),
-            "parameters": _listed(program.parameters),
+            "z": listed(program.z),
+            "parameters": listed(program.parameters),
             "steps": program.steps,
-            "outputs": {name: _listed(place) for name, place in program.outputs.items()},
-            "zeroed": list(map(_listed, program.zeroed)),
-            "constants": [_listed(place) for place, _ in program.constants],
-            "discounted": discounted and [_listed(discounted.state), discounted.kept and _listed(discounted.kept)],
+            "outputs": {name: listed(place) for name, place in program.outputs.items()},
+            "zeroed": list(map(listed, program.zeroed)),
+            "constants": [listed(place) for place, _ in program.constants],
+            "discounted": discounted and [listed(discounted.state), discounted.kept and listed(discounted.kept)],
             "tape": plan.tape,
             "counts": {name: count for name, (count, _) in plan.tables.items()},
             "guarding": plan.guarding and [plan.guarding.first, plan.guarding.arena],
@@ -137,5 +137,6 @@ class KeptPlan:
         return cls(program, plan, tuple(head["names"]), head["texts"], head["functions"], head["operations"], alone)
 
 
-def _listed(place: Place) -> list[int]:
+def listed(place: Place) -> list[int]:
+    """Return a place as numbers."""
     return [place.offset, place.size, place.stride]

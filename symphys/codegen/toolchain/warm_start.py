@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import ProcessorKernel
@@ -36,6 +36,11 @@ class ProgramSource:
     make: Callable[[], Program]
     identity: str | None = None
 
+    def key(self, *how: object) -> str | None:
+        """Return the key of what is built of it in some way by this package; None where it has no identity."""
+        found = None if self.identity is None else identity_of(self.identity, package_stamp(), *how)
+        return None if found is None else found[:32]
+
 
 def compile_source(
     source: ProgramSource,
@@ -51,10 +56,8 @@ def compile_source(
     """
     started, single = time.perf_counter(), precision == "single"
     cache, width = cache or default_cache(), BlockWidth(width_of("auto", single), single)
-    key = None
-    if source.identity is not None:
-        key = identity_of(source.identity, package_stamp(), width.lanes, precision, tuple(seeded))
-    if key is not None and (kept := _found(key[:32], source, cache)) is not None:
+    key = source.key(width.lanes, precision, tuple(seeded))
+    if key is not None and (kept := found(key, lambda path: KeptPlan.read(path, source.make), cache)) is not None:
         libraries = KeptLibraries(kept, width, cache)
         if (loaded := libraries.find(width.lanes)) is not None:
             return kernel_of((width.lanes, loaded), libraries, threads, started)
@@ -62,24 +65,27 @@ def compile_source(
     names = tuple(name for name in seeded if name in program.outputs)
     kernel, plan = compiled(program, names, width, cache, threads, wait=wait)
     if key is not None:
-        _keep(key[:32], plan, cache)
+        keep(key, plan.write, cache)
     return kernel
 
 
-def _found(key: str, source: ProgramSource, cache: Cache) -> KeptPlan | None:
-    """Return the kept plan; None if there is none."""
+Kept = TypeVar("Kept")
+
+
+def found(key: str, read: Callable[[Path], Kept], cache: Cache) -> Kept | None:
+    """Return what is kept under a key, by what reads its file; None if there is nothing."""
     path = replace(cache, suffix=PLANS).find(key)
     if path is None:
         return None
     try:
-        return KeptPlan.read(path, source.make)
+        return read(path)
     except (OSError, ValueError, KeyError):  # taken away meanwhile
         return None
 
 
-def _keep(key: str, plan: KeptPlan, cache: Cache) -> None:
-    """Store a plan, if that is possible."""
+def keep(key: str, write: Callable[[Path], None], cache: Cache) -> None:
+    """Store the file that ``write`` writes, if that is possible."""
     with contextlib.suppress(OSError), temporary_folder("symphys-plan-") as folder:
         path = Path(folder) / "plan.npz"
-        plan.write(path)
+        write(path)
         replace(cache, suffix=PLANS).store(key, path)

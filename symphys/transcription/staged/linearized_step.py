@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from symphys.codegen import FixedBatch, Kernel, KernelUnavailable, ProcessorKernel, Program, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
 from symphys.codegen.slopes import SlopeKernel, compile_slopes
+from symphys.codegen.toolchain.identity import identity_of
+from symphys.codegen.toolchain.warm_start import ProgramSource
+from symphys.transcription.program import program_identity
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.step_program import (
     StepArguments,
@@ -175,7 +178,7 @@ class LinearizedStep:
     def _step(self) -> _ByKernel | _ByCasadi:
         """Return the evaluator of next states."""
         try:
-            return _ByKernel(self._kernel(step_program(self.arguments, self.exact, False)))
+            return _ByKernel(self._kernel(self.source("step", lambda: step_program(self.arguments, self.exact, False))))
         except (KernelUnavailable, ProgramError):
             return _ByCasadi(step_functions(self.arguments)[0])
 
@@ -184,7 +187,8 @@ class LinearizedStep:
         """Return the evaluator of slopes."""
         try:
             self._refuse()
-            return _BySlopes(compile_slopes(step_program(self.arguments, self.exact, True), "off", threads=self._count))
+            source = self.source("slopes", lambda: step_program(self.arguments, self.exact, True))
+            return _BySlopes(compile_slopes(source, "off", threads=self._count))
         except (KernelUnavailable, ProgramError) as error:
             self._note = f"; {error}" if self.backend in PRECISIONS else ""
             return _ByCasadi(step_functions(self.arguments)[1])
@@ -193,13 +197,22 @@ class LinearizedStep:
     def _apart(self) -> _ByKernel | None:
         """Return the kernel for differences of states; None without one."""
         try:
-            return _ByKernel(self._kernel(difference_program(self.tangent)))
+            return _ByKernel(self._kernel(self.source("difference", lambda: difference_program(self.tangent))))
         except (KernelUnavailable, ProgramError):
             return None
 
-    def _kernel(self, program: Program) -> Kernel:
+    def source(self, what: str, make: Callable[[], Program], *how: object) -> ProgramSource:
+        """Return a program of this step, which need not be made where what is built of it is kept.
+
+        ``how``: all that the program depends on besides the problem and what the step is built for.
+        """
+        problem = program_identity(self.rollout.problem, self.exact)
+        identity = None if problem is None else identity_of(problem, what, self.parameters, *how)
+        return ProgramSource(make, identity)
+
+    def _kernel(self, source: ProgramSource) -> Kernel:
         self._refuse()
-        return build_kernel(self.backend, program, [], self._count)
+        return build_kernel(self.backend, source, [], self._count, wait=True)
 
     def _refuse(self) -> None:
         """KernelUnavailable where the backend is no kernel."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -26,9 +26,9 @@ from symphys.codegen import (
     ProcessorKernel,
     Program,
     ProgramError,
-    compile_program,
 )
 from symphys.codegen.backends import PRECISIONS
+from symphys.codegen.toolchain.warm_start import compile_source
 from symphys.shooting import AffinePolicy
 from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout
@@ -115,7 +115,8 @@ class PolicyRollout:
         if self.step.backend not in PRECISIONS:
             return None
         try:
-            return compile_program(policy_program(self.step, self.sizes, self.costs), threads=self.threads)
+            make = partial(policy_program, self.step, self.sizes, self.costs)
+            return compile_source(self.step.source("policy", make, *self.sizes, self.costs is None), (), self.threads)
         except (KernelUnavailable, ProgramError):
             return None
 
