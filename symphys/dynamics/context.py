@@ -13,11 +13,11 @@ from symphys.model.state_layout import input_columns
 from symphys.model.world import Pair, Scheme, World
 from symphys.types import Expr
 
-SHORTEST_KICK = 1 / 8
+MIN_KICK_SHARE = 1 / 8
 """Of dt; see ``StepContext.shortest_kick``."""
-NEAR = 0.1
+MAX_REST_GAP = 0.1
 """Of the distance a_ref dt^2: surfaces that carried load and are that near to each other go on touching."""
-SLOWEST = 1.0
+MIN_REFERENCE_ACCELERATION = 1.0
 """[m/s^2] least reference acceleration: what counts as fast when there is no gravity."""
 
 
@@ -77,7 +77,7 @@ class StepContext:
     @property
     def shortest_kick(self) -> Expr:
         """[s]: impulses of a shorter substep are stored as forces over this time; what an impact adds is no force."""
-        return SHORTEST_KICK * self.settings.scheme.dt
+        return MIN_KICK_SHARE * self.settings.scheme.dt
 
 
 def make_context(world: World, scheme: Scheme | None, inputs: tuple[str, ...], u: Expr, smoothing: Expr) -> StepContext:
@@ -90,4 +90,4 @@ def make_context(world: World, scheme: Scheme | None, inputs: tuple[str, ...], u
 @traced
 def reference(gravity: Expr) -> Expr:
     """|gravity|, or 1 m/s^2 if that is more."""
-    return ca.fmax(ca.sqrt(ca.dot(gravity, gravity) + TINY_SQUARE), SLOWEST)
+    return ca.fmax(ca.sqrt(ca.dot(gravity, gravity) + TINY_SQUARE), MIN_REFERENCE_ACCELERATION)

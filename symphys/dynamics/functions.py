@@ -27,7 +27,7 @@ from symphys.model.state_layout import Layout
 from symphys.model.world import Pair, Scheme, World
 from symphys.types import Expr
 
-ACROSS = 1e-3
+MAX_ORTHOGONAL_COSINE = 1e-3
 """Cosine of normals up to which two impacts of a body do not act on each other."""
 
 
@@ -58,7 +58,7 @@ def report(context: StepContext, substeps: list[Substep]) -> StepReport:
     residual, crowded, ambiguous, paradox = ca.SX(0), ca.SX(0), ca.SX(0), ca.SX(0)
     for substep in substeps:
         given = zip(forces, substep.constraints, substep.impulses, strict=True)
-        forces = tuple(_added(force, each.constraint, impulse, dt) for force, each, impulse in given)
+        forces = tuple(_subtract_force(force, each.constraint, impulse, dt) for force, each, impulse in given)
         if substep.ahead:
             forces = tuple(force + ahead / dt for force, ahead in zip(forces, substep.ahead, strict=True))
         for new, old in substep.changes:
@@ -68,7 +68,7 @@ def report(context: StepContext, substeps: list[Substep]) -> StepReport:
         for contacts in _simultaneous(context.world, substep):
             ambiguous = _ambiguous(ambiguous, contacts)
         for each, impulse in zip(substep.constraints, substep.impulses, strict=True):
-            paradox = _pulls(paradox, each.constraint.paradox, impulse.normal)
+            paradox = _any_paradox(paradox, each.constraint.paradox, impulse.normal)
     gaps = tuple(contact.gap for contact in substeps[0].contacts)
     return StepReport(_stack(forces), _stack(gaps), residual, crowded, ambiguous, paradox)
 
@@ -104,16 +104,16 @@ def _ambiguous(before: Expr, met: tuple[Met, Met]) -> Expr:
     """1 if both give an impulse at one instant, one of them as an impact, and neither leaves the other as it is."""
     (n, press, struck), (other, also, hit) = met
     both = ca.logic_and(ca.logic_and(press > 0, also > 0), ca.logic_or(struck, hit))
-    return ca.fmax(before, ca.logic_and(both, ca.fabs(ca.dot(n, other)) > ACROSS))
+    return ca.fmax(before, ca.logic_and(both, ca.fabs(ca.dot(n, other)) > MAX_ORTHOGONAL_COSINE))
 
 
 @traced
-def _pulls(before: Expr, paradox: Expr, press: Expr) -> Expr:
+def _any_paradox(before: Expr, paradox: Expr, press: Expr) -> Expr:
     return ca.fmax(before, ca.logic_and(paradox, press > 0))
 
 
 @traced
-def _added(force: Expr, constraint: ContactConstraint, impulse: ContactImpulse, dt: Expr) -> Expr:
+def _subtract_force(force: Expr, constraint: ContactConstraint, impulse: ContactImpulse, dt: Expr) -> Expr:
     return force + impulse.linear(constraint.impulse_normal) / dt
 
 
@@ -148,11 +148,11 @@ def _crowded(before: Expr, constraints: tuple[tuple[tuple[int, ...], Expr, Expr]
     return result
 
 
-MOST_INSTRUCTIONS = 105_000
+MAX_REDUCED_INSTRUCTIONS = 105_000
 """Of a step in which what several parts compute alike is looked for: that saves a tenth, but takes its time."""
 
 
-PAIRS_TOGETHER = 32
+PAIRS_PER_CALL = 32
 """Pairs whose forces one call hands on to the next state, in worlds of many pairs: most are 0."""
 
 
@@ -186,7 +186,7 @@ def step_function(
         after, _ = take_step(context_of(world, scheme, inputs, arguments), parts_of(layout, arguments[0]))
     packed = _packed(layout, tracer, after)
     step = ca.Function("step", arguments, [packed], ["x", "u", "p", "smoothing"], ["x_next"])
-    if step.n_instructions() > MOST_INSTRUCTIONS:
+    if step.n_instructions() > MAX_REDUCED_INSTRUCTIONS:
         return step
     with verbatim():
         packed = ca.cse(packed)
@@ -259,7 +259,7 @@ def _together(world: World, owners: Mapping[str, list[str]], many: bool) -> list
             found[-1] += names
         else:
             found.append(list(names))
-            room = PAIRS_TOGETHER if owner in pairs else 0
+            room = PAIRS_PER_CALL if owner in pairs else 0
         room = max(room - 1, 0)
     return found
 

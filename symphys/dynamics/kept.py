@@ -10,18 +10,18 @@ from typing import Any, TypeVar
 
 import casadi as ca
 
-from symphys.dynamics.tracing.pytree import dismantle
+from symphys.dynamics.tracing.pytree import flatten
 from symphys.model.world import Scheme, World
 
 T = TypeVar("T")
-MOST_KEPT = 6
+MAX_KEPT = 6
 KEPT: dict[Hashable, Any] = {}
 
 
 def structure(world: World, parameters: Sequence[Any]) -> Hashable:
     """Equal for worlds that are equal as functions of these symbols (SX) and of their phases, numbers included."""
     leaves: list[Any] = []
-    shape = dismantle(world, leaves)
+    shape = flatten(world, leaves)
     column = ca.vertcat(ca.SX(0, 1), *(ca.vec(ca.densify(leaf)) for leaf in leaves))
     symbols = [*parameters, *(symbol for _, symbol in world.scheduled)]
     return shape, ca.Function("world", [ca.vertcat(ca.SX(0, 1), *symbols)], [column]).serialize()
@@ -38,7 +38,7 @@ def kept(
     """``make(world, scheme, inputs, parameters, *more)``, or what it gave for an equal world; functions of casadi."""
     key = (make, structure(world, parameters), scheme, tuple(inputs), more)
     if key not in KEPT:
-        while len(KEPT) >= MOST_KEPT:
+        while len(KEPT) >= MAX_KEPT:
             del KEPT[next(iter(KEPT))]
         KEPT[key] = make(world, scheme, inputs, parameters, *more)
     found: T = KEPT[key]

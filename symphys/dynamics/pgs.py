@@ -19,11 +19,15 @@ from itertools import pairwise, takewhile
 
 import casadi as ca
 
-from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse, known_before
+from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse, precompute
 from symphys.dynamics.contact.newton_start import contact_softness, open_groups, solve_together
 from symphys.dynamics.context import StepContext
 from symphys.dynamics.joints.assembly import KinematicTrees
-from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint, project_in_turn, pushed_by
+from symphys.dynamics.joints.coordinate_constraint import (
+    CoordinateConstraint,
+    coupling_to_previous,
+    project_sequentially,
+)
 from symphys.dynamics.motion import PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import repeat, traced
 from symphys.dynamics.unknowns import (
@@ -39,13 +43,13 @@ from symphys.dynamics.unknowns import (
 from symphys.model.world import UNEQUAL, World
 from symphys.types import Expr
 
-EVERY = 4
+SWEEPS_PER_EXTRAPOLATION = 4
 """Sweeps between two longer steps."""
-LONGEST = 1e4
+MAX_EXTRAPOLATION = 1e4
 """Times the last change."""
-TINY = 1e-100
+MIN_IMPULSE = 1e-100
 """[N s] whose inverse square is still a number: slopes are finite where nothing falls."""
-SETTLED = 1e-10
+MIN_VELOCITY_CHANGE = 1e-10
 """[m/s] changes of velocity below which nothing is repeated."""
 
 
@@ -91,7 +95,7 @@ def _unequal(world: World, group: set[int]) -> bool:
     return max(map(float, masses)) > UNEQUAL * min(map(float, masses)) if len(group) > 1 else False
 
 
-def lengthened(
+def extrapolate(
     cluster: Cluster,
     constraints: Sequence[PlacedConstraint],
     motions: Sequence[PredictedMotion],
@@ -100,22 +104,22 @@ def lengthened(
 ) -> Iterate:
     """The solution after the change of the last sweep, from ``before`` to ``now``, is repeated in part."""
     sums: tuple[Expr, Expr] = (ca.SX(0), ca.SX(0))
-    longest: Expr = ca.SX(LONGEST)
+    longest: Expr = ca.SX(MAX_EXTRAPOLATION)
     for k in cluster.bodies:
-        sums = _of_body(sums, motions[k], now.momenta[k], before.momenta[k])
+        sums = _add_body_terms(sums, motions[k], now.momenta[k], before.momenta[k])
     for k in cluster.constraints:
-        sums, longest = _of_constraint(sums, longest, constraints[k].constraint, now.impulses[k], now.last[k])
-    share = _share(sums, longest)
+        sums, longest = _add_constraint_terms(sums, longest, constraints[k].constraint, now.impulses[k], now.last[k])
+    share = _extrapolation_factor(sums, longest)
     momenta, impulses = list(now.momenta), list(now.impulses)
     for k in cluster.bodies:
-        momenta[k] = _repeated(share, now.momenta[k], before.momenta[k])
+        momenta[k] = _extrapolate_momentum(share, now.momenta[k], before.momenta[k])
     for k in cluster.constraints:
-        impulses[k] = _given_again(share, now.impulses[k], now.last[k])
+        impulses[k] = _extrapolate_impulse(share, now.impulses[k], now.last[k])
     return replace(now, momenta=tuple(momenta), impulses=tuple(impulses))
 
 
 @traced
-def _of_body(
+def _add_body_terms(
     sums: tuple[Expr, Expr], motion: PredictedMotion, now: Velocities, before: Velocities
 ) -> tuple[Expr, Expr]:
     """(what the energy responses along the change, its curvature), with a body's share."""
@@ -123,29 +127,29 @@ def _of_body(
     moved, turned = now.velocity - before.velocity, now.angular - before.angular
     spun = apply(motion.inverse_mid, turned)
     slope = motion.mass * ca.dot(now.velocity, moved) + ca.dot(now.angular, spun)
-    settled = motion.mass * SETTLED**2
+    settled = motion.mass * MIN_VELOCITY_CHANGE**2
     return sums[0] + slope, sums[1] + motion.mass * ca.dot(moved, moved) + ca.dot(turned, spun) + settled
 
 
 @traced
-def _of_constraint(
+def _add_constraint_terms(
     sums: tuple[Expr, Expr], longest: Expr, constraint: ContactConstraint, now: ContactImpulse, before: ContactImpulse
 ) -> tuple[tuple[Expr, Expr], Expr]:
     """Return the slip less the targets, and how often the change can be repeated."""
     press = now.normal - before.normal
-    asked = constraint.target * press + ca.dot(constraint.slip_target, now.tangent - before.tangent)
-    slope = sums[0] - asked + constraint.softness * now.normal * press
-    falls = ca.if_else(press < 0, now.normal / ca.fmax(-press, TINY), LONGEST)
+    target_work = constraint.target * press + ca.dot(constraint.slip_target, now.tangent - before.tangent)
+    slope = sums[0] - target_work + constraint.softness * now.normal * press
+    falls = ca.if_else(press < 0, now.normal / ca.fmax(-press, MIN_IMPULSE), MAX_EXTRAPOLATION)
     return (slope, sums[1] + constraint.softness * press * press), ca.fmin(longest, falls)
 
 
 @traced
-def _share(sums: tuple[Expr, Expr], longest: Expr) -> Expr:
+def _extrapolation_factor(sums: tuple[Expr, Expr], longest: Expr) -> Expr:
     return ca.fmin(ca.fmax(-sums[0] / sums[1], 0), longest)
 
 
 @traced
-def _repeated(share: Expr, now: Velocities, before: Velocities) -> Momentum:
+def _extrapolate_momentum(share: Expr, now: Velocities, before: Velocities) -> Momentum:
     assert isinstance(now, Momentum) and isinstance(before, Momentum)
     return Momentum(
         now.velocity + share * (now.velocity - before.velocity), now.angular + share * (now.angular - before.angular)
@@ -153,12 +157,12 @@ def _repeated(share: Expr, now: Velocities, before: Velocities) -> Momentum:
 
 
 @traced
-def _given_again(share: Expr, now: ContactImpulse, before: ContactImpulse) -> ContactImpulse:
+def _extrapolate_impulse(share: Expr, now: ContactImpulse, before: ContactImpulse) -> ContactImpulse:
     return now.plus(now.minus(before).times(share))
 
 
 @dataclass(frozen=True)
-class Acceleration:
+class ExtrapolationContext:
     """Constraints, the clusters of bodies that they connect, and the motions of bodies; see ``line_search``."""
 
     constraints: tuple[PlacedConstraint, ...]
@@ -176,21 +180,21 @@ def iterate(
     world, sweeps, motions = context.world, context.settings.scheme.sweeps, trees.motions
     for group in open_groups(context, constraints, start.momenta):
         start = solve_together(group, constraints, start, trees, contact_softness(group, constraints, trees))
-    constraints = _coupled(constraints, start.momenta)
+    constraints = _with_known_terms(constraints, start.momenta)
     found = tuple(clusters(world, constraints))
     if not found:
         return repeat(sweeps, sweep, constraints, start)
-    rounds = max((sweeps - 1) // EVERY, 0)
-    moved = repeat(rounds, _round, Acceleration(constraints, found, tuple(motions)), start)
-    return repeat(sweeps - rounds * EVERY, sweep, constraints, moved)
+    rounds = max((sweeps - 1) // SWEEPS_PER_EXTRAPOLATION, 0)
+    moved = repeat(rounds, _accelerated_sweeps, ExtrapolationContext(constraints, found, tuple(motions)), start)
+    return repeat(sweeps - rounds * SWEEPS_PER_EXTRAPOLATION, sweep, constraints, moved)
 
 
-def _round(fixed: Acceleration, state: Iterate) -> Iterate:
+def _accelerated_sweeps(fixed: ExtrapolationContext, state: Iterate) -> Iterate:
     """Some sweeps, then a longer step along the last."""
-    before = repeat(EVERY - 1, sweep, fixed.constraints, state)
+    before = repeat(SWEEPS_PER_EXTRAPOLATION - 1, sweep, fixed.constraints, state)
     now = sweep(fixed.constraints, before)
     for cluster in fixed.clusters:
-        now = lengthened(cluster, fixed.constraints, fixed.motions, before, now)
+        now = extrapolate(cluster, fixed.constraints, fixed.motions, before, now)
     return now
 
 
@@ -255,14 +259,18 @@ def apply_start(
     return Iterate(tuple(started), tuple(impulses), tuple(impulses))
 
 
-def _coupled(constraints: tuple[PlacedConstraint, ...], momenta: Sequence[Velocities]) -> tuple[PlacedConstraint, ...]:
+def _with_known_terms(
+    constraints: tuple[PlacedConstraint, ...], momenta: Sequence[Velocities]
+) -> tuple[PlacedConstraint, ...]:
     """Attach what is known before the sweeps: of contacts of one tree, and ``pushed`` where coordinates are coupled."""
-    found = [_readied(each) if _of_one_tree(each, momenta) else each for each in constraints]
+    found = [_with_precomputed(each) if _of_one_tree(each, momenta) else each for each in constraints]
     for run in runs(constraints, momenta):
         for k, then in pairwise(run):
             first, second = constraints[k].constraint, constraints[then].constraint
-            if _of_tree(first) and _of_tree(second):
-                found[then] = replace(found[then], constraint=replace(second, pushed=pushed_by(first, second)))
+            if _on_tree_coordinate(first) and _on_tree_coordinate(second):
+                found[then] = replace(
+                    found[then], constraint=replace(second, pushed=coupling_to_previous(first, second))
+                )
     return tuple(found)
 
 
@@ -270,14 +278,14 @@ def _of_one_tree(placed: PlacedConstraint, momenta: Sequence[Velocities]) -> boo
     return len(set(placed.carriers)) == 1 and isinstance(momenta[placed.carriers[0]], GeneralizedVelocities)
 
 
-def _readied(placed: PlacedConstraint) -> PlacedConstraint:
+def _with_precomputed(placed: PlacedConstraint) -> PlacedConstraint:
     contact = placed.constraint
     if not isinstance(contact, ContactConstraint) or contact.coupling is not None:
         return placed
-    return replace(placed, constraint=replace(contact, before=known_before(contact)))
+    return replace(placed, constraint=replace(contact, precomputed=precompute(contact)))
 
 
-def _of_tree(constraint: VelocityConstraint) -> bool:
+def _on_tree_coordinate(constraint: VelocityConstraint) -> bool:
     return isinstance(constraint, CoordinateConstraint) and constraint.of_tree is not None
 
 
@@ -289,11 +297,13 @@ def _project_run(
     momenta, given = list(states), list[AnyImpulse]()
     while len(given) < len(projections):
         first, after = len(given), projections[len(given) + 1 :]
-        turn = [each for each, _ in (projections[first], *takewhile(lambda each: _pushed(each[0]), after))]
+        turn = [
+            each for each, _ in (projections[first], *takewhile(lambda each: _uses_previous_change(each[0]), after))
+        ]
         velocities = momenta[0]
         if len(turn) > 1 and isinstance(velocities, GeneralizedVelocities):  # all on one tree
             coordinates = [each for each in turn if isinstance(each, CoordinateConstraint)]
-            momenta[0], news = project_in_turn(coordinates, velocities, old[first : first + len(turn)])
+            momenta[0], news = project_sequentially(coordinates, velocities, old[first : first + len(turn)])
             given += news
             continue
         constraint, places = projections[first]
@@ -304,7 +314,7 @@ def _project_run(
     return tuple(momenta), given
 
 
-def _pushed(constraint: VelocityConstraint) -> bool:
+def _uses_previous_change(constraint: VelocityConstraint) -> bool:
     return isinstance(constraint, CoordinateConstraint) and constraint.pushed is not None
 
 

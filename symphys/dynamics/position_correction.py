@@ -10,7 +10,7 @@ import casadi as ca
 
 from symphys.dynamics.articulated.configuration_update import JointCorrection, RotorCorrection, update_configuration
 from symphys.dynamics.articulated.forward_kinematics import FinalPose
-from symphys.dynamics.collision.contact_geometry import UNMOVED, Contact, Displacement
+from symphys.dynamics.collision.contact_geometry import ZERO_DISPLACEMENT, Contact, Displacement
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
 from symphys.dynamics.contact.newton_start import contact_softness, open_groups, solve_together
@@ -20,7 +20,7 @@ from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
 from symphys.dynamics.joints.joint_impulse import JointImpulse
 from symphys.dynamics.joints.loop_closure import Displacements, TreeDisplacement, close_loops, displaced
 from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
-from symphys.dynamics.tracing.decorator import gathered, repeat, traced
+from symphys.dynamics.tracing.decorator import contiguous, repeat, traced
 from symphys.dynamics.unknowns import (
     AllVelocities,
     GeneralizedVelocities,
@@ -33,7 +33,7 @@ from symphys.maths.smoothing import either
 from symphys.model.joints import kinematic_trees
 from symphys.types import Expr
 
-TOGETHER = 0, 0
+CENTRE_SCHEDULE = 0, 0
 """Steps of Newton's method on the gaps of contacts that share bodies."""
 
 
@@ -53,7 +53,9 @@ def displacements(
     for each, *impulses in zip(constraints, started, given, strict=True):
         turning = tuple(trees.motions[body].inverse_mid for body in each.bodies)
         own = tuple(late[carrier] for carrier in each.carriers)
-        for carrier, moved in zip(each.carriers, _delayed(own, each.constraint, impulses, turning), strict=True):
+        for carrier, moved in zip(
+            each.carriers, _remove_early_motions(own, each.constraint, impulses, turning), strict=True
+        ):
             late[carrier] = moved
     return late
 
@@ -68,7 +70,7 @@ def _drift(motion: PredictedMotion, state: Velocities, duration: Expr) -> TreeDi
 
 
 @traced
-def _delayed(
+def _remove_early_motions(
     late: tuple[TreeDisplacement, ...],
     constraint: ContactConstraint,
     impulses: list[ContactImpulse],
@@ -83,11 +85,11 @@ def _delayed(
     found = list[TreeDisplacement]()
     for term, own, inverse in zip(constraint.terms, late, turning, strict=True):
         before = found[0] if constraint.same and found else own
-        found.append(_earlier(before, term, constraint.delay * term.sign, (force, twist), inverse))
+        found.append(_remove_early_motion(before, term, constraint.delay * term.sign, (force, twist), inverse))
     return tuple(found[-1] for _ in found) if constraint.same else tuple(found)
 
 
-def _earlier(
+def _remove_early_motion(
     late: TreeDisplacement, term: BodyTerm, early: Expr, impulse: tuple[Expr, Expr], turning: Expr
 ) -> TreeDisplacement:
     force, twist = impulse
@@ -103,7 +105,7 @@ def _earlier(
 
 
 @dataclass(frozen=True)
-class Corrected:
+class CorrectedConfiguration:
     """What the pass comes to.
 
     Attributes:
@@ -129,7 +131,7 @@ def close_gaps(
     constraints: Sequence[tuple[PlacedConstraint, Contact, ContactImpulse]],
     joints: Sequence[PlacedConstraint],
     moved: Sequence[TreeDisplacement],
-) -> Corrected:
+) -> CorrectedConfiguration:
     """Gauss-Seidel on the displacements until no rigid contact overlaps, and those that last do not gape; then joints.
 
     What is on a tree is pushed along the tree's coordinates. Joints that close loops push along them too.
@@ -140,14 +142,14 @@ def close_gaps(
         for each, contact, impulse in constraints
         if not each.constraint.law.soft
     )
-    limits = tuple(each for each in joints if _of_tree(each))
+    limits = tuple(each for each in joints if _on_tree_coordinate(each))
     fixed = PositionPass(trees.motions, rigid, limits, scheme.push_out)
-    along = gathered(tuple(moved)) if context.near else tuple(moved)
+    along = contiguous(tuple(moved)) if context.near else tuple(moved)
     before = _start(context, trees, fixed, along)
     pushed, _ = repeat(scheme.position_sweeps, _push_all, fixed, before)
-    others = tuple(each for each in joints if not _of_tree(each))
+    others = tuple(each for each in joints if not _on_tree_coordinate(each))
     along, by_loops = close_loops(scheme.position_sweeps, trees.motions, others, pushed)
-    return _closed(context, trees, along, by_loops)
+    return _corrected_configuration(context, trees, along, by_loops)
 
 
 def _start(
@@ -163,7 +165,7 @@ def _start(
     start: Any = along
     found = Iterate(start, none, none)
     for group in open_groups(context, contacts, along):
-        found = solve_together(group, pushes, found, trees, contact_softness(group, contacts, trees), TOGETHER)
+        found = solve_together(group, pushes, found, trees, contact_softness(group, contacts, trees), CENTRE_SCHEDULE)
     ended: Any = found.momenta
     return ended, tuple(each.numbers for each in found.impulses)
 
@@ -172,12 +174,12 @@ def _jacobians(fixed: PositionPass, each: PlacedConstraint) -> tuple[BodyJacobia
     return tuple(fixed.motions[i].jacobian for i in each.bodies)
 
 
-def _closed(
+def _corrected_configuration(
     context: StepContext,
     trees: KinematicTrees,
     along: Sequence[TreeDisplacement],
     by_loops: Sequence[GeneralizedVelocities | None],
-) -> Corrected:
+) -> CorrectedConfiguration:
     shifts = {i: each for i, each in enumerate(along) if isinstance(each, Displacement)}
     arrived, made, joints = dict[int, FinalPose](), dict[int, JointCorrection](), context.world.joints
     turned, moved = dict[int, RotorCorrection](), dict[int, Expr]()
@@ -193,7 +195,7 @@ def _closed(
         made |= zip(tree.bodies, gained, strict=True)
     loose = {i for k, joint in enumerate(joints) if k not in moved for i in joint.bodies}
     turning = {i: displaced(trees.motions[i].jacobian, along[trees.carriers[i]]).angular for i in sorted(loose)}
-    return Corrected(shifts, arrived, made, turned, moved, turning)
+    return CorrectedConfiguration(shifts, arrived, made, turned, moved, turning)
 
 
 Pushed = tuple[tuple[TreeDisplacement, ...], tuple[Expr, ...]]
@@ -217,7 +219,7 @@ class PositionPass:
     share: float
 
 
-def _of_tree(each: PlacedConstraint) -> bool:
+def _on_tree_coordinate(each: PlacedConstraint) -> bool:
     return isinstance(each.constraint, CoordinateConstraint) and each.constraint.of_tree is not None
 
 
@@ -237,7 +239,7 @@ def _push_all(fixed: PositionPass, state: Pushed) -> Pushed:
         for i, own_after in zip(each.carriers, after, strict=True):
             along[i] = own_after
     for each in fixed.limits:
-        along[each.carriers[0]] = _back(each.constraint, along[each.carriers[0]])
+        along[each.carriers[0]] = _enforce_limit(each.constraint, along[each.carriers[0]])
     return tuple(along), tuple(pushes)
 
 
@@ -251,31 +253,31 @@ def _push(
     old: Expr,
     share: float,
 ) -> tuple[tuple[TreeDisplacement, ...], Expr]:
-    free, _ = _free(constraint, contact, moved, old, share)
+    free, _ = _unbounded_push(constraint, contact, moved, old, share)
     # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
     new = constraint.near * ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
-    return _given(constraint, along, (new - old) * constraint.normal), new
+    return _displace_pair(constraint, along, (new - old) * constraint.normal), new
 
 
-def _free(
+def _unbounded_push(
     constraint: ContactConstraint, contact: Contact, moved: Displacements, old: Expr, share: float
 ) -> tuple[Expr, Expr]:
     """The push that closes the gap, of either sign, and the effective mass."""
-    gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else UNMOVED) + constraint.slack
+    gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else ZERO_DISPLACEMENT) + constraint.slack
     mass = constraint.normal_mass * constraint.separates
     return old - share * gap * mass, mass
 
 
-def _given(
+def _displace_pair(
     constraint: ContactConstraint, along: tuple[TreeDisplacement, ...], step: Expr
 ) -> tuple[TreeDisplacement, ...]:
     """The displacements after a push (3,) of the first body."""
     if constraint.same:
         after = along[0]
         for term in constraint.terms:
-            after = _pushed(term, after, step)
+            after = _displace(term, after, step)
         return tuple(after for _ in constraint.terms)
-    return tuple(_pushed(term, each, step) for term, each in zip(constraint.terms, along, strict=True))
+    return tuple(_displace(term, each, step) for term, each in zip(constraint.terms, along, strict=True))
 
 
 @dataclass(frozen=True)
@@ -305,7 +307,7 @@ class Push:
 
     def apply(self, along: tuple[TreeDisplacement, ...], impulse: JointImpulse) -> tuple[TreeDisplacement, ...]:
         """The displacements after a push."""
-        return _given(self.constraint, along, impulse.numbers * self.constraint.normal)
+        return _displace_pair(self.constraint, along, impulse.numbers * self.constraint.normal)
 
     def project(
         self, along: tuple[TreeDisplacement, ...], old: JointImpulse
@@ -320,7 +322,7 @@ class Push:
         self, along: tuple[TreeDisplacement, ...], old: JointImpulse, by: Linearisation
     ) -> tuple[Expr, Expr]:
         """(a (1,), B (1, 1)); see ``newton_start``."""
-        free, mass = _free(self.constraint, self.contact, self._moved(along), old.numbers, self.share)
+        free, mass = _unbounded_push(self.constraint, self.contact, self._moved(along), old.numbers, self.share)
         acts = self.constraint.near * self.constraint.separates * either(self.lasts, by.within(free, mass))
         pushed = self.constraint.near * ca.if_else(ca.logic_or(self.lasts, free >= 0), free, 0)
         gives = 1 - acts + acts * mass * by.softness
@@ -330,7 +332,7 @@ class Push:
         return tuple(displaced(jacobian, own) for jacobian, own in zip(self.jacobians, along, strict=True))
 
 
-def _pushed(term: BodyTerm, along: TreeDisplacement, step: Expr) -> TreeDisplacement:
+def _displace(term: BodyTerm, along: TreeDisplacement, step: Expr) -> TreeDisplacement:
     if isinstance(along, GeneralizedVelocities) and term.jacobian is not None:
         return GeneralizedVelocities(along.numbers + term.sign * apply(term.jacobian.impulse_response, step))
     assert isinstance(along, Displacement)
@@ -339,8 +341,10 @@ def _pushed(term: BodyTerm, along: TreeDisplacement, step: Expr) -> TreeDisplace
 
 
 @traced
-def _back(constraint: CoordinateConstraint, along: TreeDisplacement) -> GeneralizedVelocities:
+def _enforce_limit(constraint: CoordinateConstraint, along: TreeDisplacement) -> GeneralizedVelocities:
     """The displacement along a tree's coordinates that takes a limit of one back to where it is kept."""
     assert isinstance(along, GeneralizedVelocities) and constraint.of_tree is not None
     moved = ca.mtimes(constraint.of_tree.jacobian, along.numbers)
-    return GeneralizedVelocities(along.numbers + ca.mtimes(constraint.of_tree.response, constraint.fitting(moved)))
+    return GeneralizedVelocities(
+        along.numbers + ca.mtimes(constraint.of_tree.response, constraint.position_impulse(moved))
+    )

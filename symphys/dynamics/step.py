@@ -24,7 +24,7 @@ from symphys.maths import rotation
 from symphys.model.world import Scheme, World
 from symphys.types import Expr
 
-SPLITS_OFF_CENTRE = 2
+MAX_SPLITS_OFF_CENTRE = 2
 """Of a step where bodies may be hit off their centres: a box seldom lands on one corner alone."""
 
 
@@ -33,7 +33,7 @@ def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
     left: Expr = ca.SX(context.settings.scheme.dt)
     x = _with_unit_orientations(context, x)
     context = replace(context, near=near_pairs(context, x))
-    count = splits_of(context.world, context.settings.scheme)
+    count = max_splits(context.world, context.settings.scheme)
     substeps, splits = list[Substep](), list[StepSplit]()
 
     for k in range(count):
@@ -70,11 +70,11 @@ def _normalised(orientation: Expr) -> Expr:
     return rotation.normalised(orientation)
 
 
-def splits_of(world: World, scheme: Scheme) -> int:
+def max_splits(world: World, scheme: Scheme) -> int:
     """Return how often a step is split: 0 if all contacts are central and no body has two pairs."""
     sides = Counter(i for pair in world.pairs for i in {pair.first.body, pair.second.body} if i is not None)
     if not scheme.time_of_impact or not (eccentric_bodies(world) & set(sides) or max(sides.values(), default=0) > 1):
         return 0
     if scheme.cuts is not None:
         return scheme.cuts
-    return SPLITS_OFF_CENTRE if eccentric_bodies(world) else 1
+    return MAX_SPLITS_OFF_CENTRE if eccentric_bodies(world) else 1

@@ -11,10 +11,10 @@ import casadi as ca
 from symphys.dynamics.articulated.forward_kinematics import FinalPose
 from symphys.dynamics.collision import Contact
 from symphys.dynamics.collision.contact_geometry import Displacement
-from symphys.dynamics.contact.constraint import ZERO, ContactConstraint, ContactImpulse
-from symphys.dynamics.contact.coupling import which_couple
+from symphys.dynamics.contact.constraint import ZERO_IMPULSE, ContactConstraint, ContactImpulse
+from symphys.dynamics.contact.coupling import coupled_pairs
 from symphys.dynamics.contact.load_distribution import distribute_loads
-from symphys.dynamics.contact.preparation import Conditions, prepare
+from symphys.dynamics.contact.preparation import SubstepFlags, prepare
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.free_rotation import turned
 from symphys.dynamics.joints.assembly import (
@@ -37,17 +37,17 @@ from symphys.dynamics.joints.warm_start import (
 )
 from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply, isotropic
 from symphys.dynamics.pgs import apply_start, iterate
-from symphys.dynamics.position_correction import Corrected, close_gaps, displacements
+from symphys.dynamics.position_correction import CorrectedConfiguration, close_gaps, displacements
 from symphys.dynamics.prediction import bodies_of, detect_contacts, free_motions, jointed_bodies, predicted_motions
-from symphys.dynamics.tracing.decorator import gathered, traced
+from symphys.dynamics.tracing.decorator import contiguous, traced
 from symphys.dynamics.unknowns import AllVelocities, Momenta, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.state_layout import BODY_FIELDS
 from symphys.types import Expr
 
-NONE = ca.SX(0)
-SLIDES = 0.999
+ZERO = ca.SX(0)
+SLIDING_SHARE = 0.999
 """Surfaces count as sliding from this share of the largest friction on."""
 ZERO_MOMENTUM = Momentum(ca.SX.zeros(3), ca.SX.zeros(3))
 
@@ -72,11 +72,11 @@ class Substep:
     impulses: tuple[ContactImpulse, ...]
     changes: tuple[tuple[Any, Any], ...]
     ahead: tuple[Expr, ...] = ()
-    chained: Expr = NONE
+    chained: Expr = ZERO
 
 
 def advance(
-    context: StepContext, x: State, duration: Expr, suppressed: Sequence[Expr] = (), plastic: Expr = NONE
+    context: StepContext, x: State, duration: Expr, suppressed: Sequence[Expr] = (), plastic: Expr = ZERO
 ) -> Substep:
     """The state after ``duration`` [s]; numbers are those of the equations in docs/time_step.md.
 
@@ -97,12 +97,12 @@ def advance(
 
     # 4. constraints of contacts (7-13) and of joints (25, 26)
     suppressed = suppressed or [ca.SX(0)] * len(contacts)
-    constraints, couple = list[PlacedConstraint](), which_couple(world)
+    constraints, couple = list[PlacedConstraint](), coupled_pairs(world)
     for (pair, near), contact, off, coupled in zip(context.pairs_and_near(), contacts, suppressed, couple, strict=True):
         bodies = bodies_of(pair)
         moving, force = tuple(trees.motions[i] for i in bodies), x[f"{pair.name}.force"]
         same, lagging = trees.same(bodies), _lagging(context, x, bodies)
-        conditions = Conditions(off, plastic, force, same, coupled, near, lagging, x["lag"])
+        conditions = SubstepFlags(off, plastic, force, same, coupled, near, lagging, x["lag"])
         constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
         constraints.append(trees.placed(bodies, constraint))
     jointed, joints, fitted = joint_constraints(context, x, trees, paths, duration, kick)
@@ -110,7 +110,7 @@ def advance(
     # 5-6. velocities: warm start (16), then projections (14, 15, 17)
     given = distribute_loads(context, constraints, _warm_start(context, constraints, x, kick))
     every = (*(each.placed for each in joints), *constraints)
-    states = gathered(trees.states) if context.near else trees.states
+    states = contiguous(trees.states) if context.near else trees.states
     start = apply_start(every, states, (*warm_started(context, joints, x, kick), *given))
     solved = iterate(context, every, start, trees)
     by_joints, impulses = solved.impulses[: len(joints)], solved.impulses[len(joints) :]
@@ -131,7 +131,7 @@ def advance(
         add_joint_forces(context, forces | angles, poses, reactions)
         momenta = keep_momentum(context, momenta, closed.made, struck, duration)
         rotors = keep_rotors(context, trees.coordinates, solved.momenta, closed.turned, struck, duration)
-        values |= _kept(context, joints, forces) | angles
+        values |= _stored_joint_forces(context, joints, forces) | angles
     values |= _moving_bodies(context, motions, momenta, reactions, poses, rotors)
     changes = zip(solved.impulses, solved.last, strict=True)
     return Substep(values, tuple(constraints), tuple(contacts), whole, tuple(changes))
@@ -141,7 +141,7 @@ def _poses(
     context: StepContext,
     motions: Sequence[PredictedMotion],
     moved: Sequence[TreeDisplacement],
-    closed: Corrected,
+    closed: CorrectedConfiguration,
     momenta: Momenta,
 ) -> tuple[list[tuple[Expr, Expr]], Momenta]:
     """(position, orientation) of all bodies at the end of the substep, and momenta that turn with pushes."""
@@ -149,7 +149,7 @@ def _poses(
     jointed = jointed_bodies(context.world)
     for k, motion in enumerate(motions):
         if k in closed.arrived:
-            poses.append(_arrived(motion, closed.arrived[k]))
+            poses.append(_tree_pose(motion, closed.arrived[k]))
             continue
         shift = closed.shifts[k]
         if k in jointed or isotropic(context.world.bodies[k].inertia):
@@ -180,7 +180,7 @@ def _moving_bodies(
     return values
 
 
-def _kept(context: StepContext, joints: Sequence[JointConstraint], forces: State) -> State:
+def _stored_joint_forces(context: StepContext, joints: Sequence[JointConstraint], forces: State) -> State:
     """The forces of joints that are stored: all of them with a warm start, else commands alone."""
     warm = context.settings.scheme.warm_start
     kept = forces if warm else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
@@ -198,20 +198,20 @@ def _warm_start(
 ) -> list[ContactImpulse]:
     """The last step's persistent forces, over this step's kick, in this step's frames."""
     if not context.settings.scheme.warm_start:
-        return [ZERO for _ in constraints]
+        return [ZERO_IMPULSE for _ in constraints]
     impulses = []
     for pair, each in zip(context.world.pairs, constraints, strict=True):
         force = x[f"{pair.name}.force"]
         torque = x[f"{pair.name}.torque"] if pair.law.spins else None
-        impulses.append(_resumed(each.constraint, kick, force, torque))
+        impulses.append(_warm_impulse(each.constraint, kick, force, torque))
     return impulses
 
 
 @traced
-def _resumed(constraint: ContactConstraint, kick: Expr, force: Expr, torque: Expr | None) -> ContactImpulse:
+def _warm_impulse(constraint: ContactConstraint, kick: Expr, force: Expr, torque: Expr | None) -> ContactImpulse:
     n = constraint.impulse_normal
     normal, tangent = _split(kick * force, n)
-    turning = (ZERO.spin, ZERO.roll) if torque is None else _split(kick * torque, n)
+    turning = (ZERO_IMPULSE.spin, ZERO_IMPULSE.roll) if torque is None else _split(kick * torque, n)
     return ContactImpulse(ca.fmax(normal, 0), tangent, *turning).times(constraint.near * constraint.separates)
 
 
@@ -238,7 +238,7 @@ def _store_forces(
         values[f"{pair.name}.force"] = force if scheme.warm_start else ca.SX.zeros(3)
         if pair.law.spins:
             values[f"{pair.name}.torque"] = torque if scheme.warm_start else ca.SX.zeros(3)
-        sums = _summed(tuple(total[body] for body in each.bodies), each.constraint, force, torque)
+        sums = _add_wrench(tuple(total[body] for body in each.bodies), each.constraint, force, torque)
         for body, summed in zip(each.bodies, sums, strict=True):
             total[body] = summed
     return total
@@ -257,7 +257,7 @@ def _persistent(
 
 
 def _lagging(context: StepContext, x: State, bodies: Sequence[int]) -> tuple[tuple[Expr, Expr], ...]:
-    """Return the persistent impulses of ``Conditions``, under which motions with joints are predicted."""
+    """Return the persistent impulses of ``SubstepFlags``, under which motions with joints are predicted."""
     names = () if context.world.joints else tuple(context.world.bodies[i].name for i in bodies)
     return tuple((x[f"{name}.reaction_force"], x[f"{name}.reaction_torque"]) for name in names)
 
@@ -281,9 +281,9 @@ def _late(constraint: ContactConstraint, impulse: ContactImpulse, momenta: Momen
     """Impulse and momenta with the late normal impulse; friction of surfaces that slide grows in proportion."""
     assert constraint.soft is not None
     late = ca.if_else(impulse.normal > 0, constraint.soft.late, 0)
-    slides = constraint.friction.beyond(impulse.tangent, impulse.normal, SLIDES)
+    slides = constraint.friction.beyond(impulse.tangent, impulse.normal, SLIDING_SHARE)
     share = ca.if_else(slides, late / ca.fmax(impulse.normal, TINY_SQUARE), 0)
-    more, found = replace(ZERO, normal=late, tangent=share * impulse.tangent), []
+    more, found = replace(ZERO_IMPULSE, normal=late, tangent=share * impulse.tangent), []
     push = more.linear(constraint.impulse_normal)
     for term, m in zip(constraint.terms, momenta, strict=True):
         turned = m.angular + term.sign * ca.cross(term.impulse_arm, push)
@@ -292,7 +292,7 @@ def _late(constraint: ContactConstraint, impulse: ContactImpulse, momenta: Momen
 
 
 @traced
-def _summed(
+def _add_wrench(
     totals: tuple[tuple[Expr, Expr], ...], constraint: ContactConstraint, force: Expr, torque: Expr
 ) -> tuple[tuple[Expr, Expr], ...]:
     found = []
@@ -308,7 +308,7 @@ def _pose(motion: PredictedMotion, shift: Displacement) -> tuple[Expr, Expr]:
 
 
 @traced
-def _arrived(motion: PredictedMotion, arrived: FinalPose) -> tuple[Expr, Expr]:
+def _tree_pose(motion: PredictedMotion, arrived: FinalPose) -> tuple[Expr, Expr]:
     return arrived.position, rotation.unit(rotation.multiply(arrived.turn, motion.orientation))
 
 

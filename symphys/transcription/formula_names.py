@@ -87,10 +87,10 @@ def phase_numbers(problem: Problem) -> PhaseNumbers:
     setting = [phase for phase in problem.phases if phase.sets]
     if not setting:
         return PhaseNumbers()
-    from symphys.dynamics.step import splits_of  # late: the physics of a step, which few problems need here
+    from symphys.dynamics.step import max_splits  # late: the physics of a step, which few problems need here
 
     simulation, shares = problem.simulation, dict[tuple[str, bool], PhaseShare]()
-    before = 0.5 / (1 + splits_of(problem.world(), simulation.scheme()))
+    before = 0.5 / (1 + max_splits(problem.world(), simulation.scheme()))
     sets: dict[str, list[tuple[str, PhaseShare]]] = {}
     for phase in setting:
         for name in phase.sets:

@@ -55,7 +55,7 @@ class BackendSource:
     identity: str | None = None
 
 
-def nothing() -> str:
+def no_note() -> str:
     """Return an empty note."""
     return ""
 
@@ -92,10 +92,10 @@ class Description:
     cached: bool | None = None
     seconds: float = 0.0
     note: str = ""
-    later: Callable[[], str] = field(default=nothing, repr=False, compare=False)
-    doubt: Callable[[], str] = field(default=nothing, repr=False, compare=False)
+    later: Callable[[], str] = field(default=no_note, repr=False, compare=False)
+    doubt: Callable[[], str] = field(default=no_note, repr=False, compare=False)
     flags: tuple[str, ...] = ()
-    finish: Callable[[], object] = field(default=nothing, repr=False, compare=False)
+    finish: Callable[[], object] = field(default=no_note, repr=False, compare=False)
 
     def __str__(self) -> str:
         """Describe the backend in one line."""

@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Literal
 
 from symphys.codegen import Kernel, KernelUnavailable, ProcessorKernel, Program, compile_program
-from symphys.codegen.backends.interface import Description, joined, nothing
+from symphys.codegen.backends.interface import Description, joined, no_note
 from symphys.codegen.backends.precision import PrecisionCheck
 from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.toolchain.compiler import find_compiler
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from symphys.codegen.cuda import DeviceKernel
 
 
-LARGE = 512
+MIN_GPU_ROWS = 512
 """Rows below which no GPU is asked. A rollout there waits for its longest chain of calls, however few robots there are;
 16 cores with AVX-512 do 128 robots in one go."""
 Kind = tuple[bool, int]
@@ -33,7 +33,7 @@ Kind = tuple[bool, int]
 class FastestKernel(ProcessorKernel):
     """The processor, or a GPU for batches of a size for which it was faster when the first of that size came."""
 
-    def __init__(self, kernel: ProcessorKernel, build: Callable[[], DeviceKernel], large: int = LARGE) -> None:
+    def __init__(self, kernel: ProcessorKernel, build: Callable[[], DeviceKernel], large: int = MIN_GPU_ROWS) -> None:
         """``build`` makes the same for a GPU, when a batch of ``large`` rows comes, or raises KernelUnavailable."""
         super().__init__(kernel.program, kernel.widths, kernel.report, kernel.seeded, kernel.threads)
         self._build, self._large, self._sought = build, large, False
@@ -44,7 +44,7 @@ class FastestKernel(ProcessorKernel):
     @property
     def chosen(self) -> str:
         """Return the decision in one line; empty if there is none yet."""
-        parts = ", ".join(_told(*each) for each in sorted(self._gains.items()))
+        parts = ", ".join(_comparison_text(*each) for each in sorted(self._gains.items()))
         return joined(super().chosen, parts and f"{self._name} against the processor: {parts}", self._refused)
 
     def _run(self, batch: RolloutBatch) -> None:
@@ -88,7 +88,7 @@ def _seconds(call: Callable[[], None]) -> float:
     return perf_counter() - began
 
 
-def _told(kind: Kind, gain: float) -> str:
+def _comparison_text(kind: Kind, gain: float) -> str:
     gradient, power = kind
     what = "gradients" if gradient else "values"
     return f"{what} of {2**power} to {2 ** (power + 1) - 1} rollouts {gain:.2g} times as fast"
@@ -188,5 +188,5 @@ def described(kernel: Kernel, seconds: float, precision: str | None = None, note
         note=joined(report.note, note),
         later=lambda: kernel.chosen,
         doubt=lambda: kernel.doubt,
-        finish=kernel.widths.finish if isinstance(kernel, ProcessorKernel) else nothing,
+        finish=kernel.widths.finish if isinstance(kernel, ProcessorKernel) else no_note,
     )

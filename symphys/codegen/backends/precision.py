@@ -25,9 +25,9 @@ from symphys.types import Array
 
 MAX_ERROR = 0.1
 """Largest error of a gradient, as a share of its length, that is not reported."""
-ROWS = 4
+MAX_ROWS = 4
 """Largest number of rows that are compared: they fit into one block of the processor."""
-SMALL = 1e-3
+MIN_LENGTH_SHARE = 1e-3
 """Shortest length that errors are compared with, as a share of the longest gradient: a row of nearly 0 has rounding."""
 WARNING = (
     "gradients in single precision are off by {error} of their length here: use the backend simd or cuda, or a solver "
@@ -48,7 +48,7 @@ class PrecisionCheck:
 
         ``arguments``: those of ``Kernel.gradient``, by which they were computed.
         """
-        rows = min(ROWS, len(gradient))
+        rows = min(MAX_ROWS, len(gradient))
         Z, seed, parameters, discount, skipped = arguments
         program = self._program.make() if isinstance(self._program, ProgramSource) else self._program
         try:
@@ -87,7 +87,7 @@ def largest_error(found: Array, exact: Array) -> float:
     if not np.isfinite(found).all():
         return float("inf")
     lengths = np.linalg.norm(exact, axis=1)
-    least = np.maximum(lengths, SMALL * lengths.max())
+    least = np.maximum(lengths, MIN_LENGTH_SHARE * lengths.max())
     off = np.linalg.norm(found - exact, axis=1)
     return float(np.max(np.where(least > 0, off / np.where(least > 0, least, 1.0), 0.0), initial=0.0))
 

@@ -15,7 +15,7 @@ from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.build import temporary_folder
 from symphys.codegen.toolchain.cache import Cache, default_cache
 
-SPARED = 2**28
+RESERVED_BYTES = 2**28
 """[bytes] left to others, and to what a launch needs: stacks of all resident threads."""
 
 FIRST = "begin"
@@ -44,7 +44,7 @@ class Gpu:
     def free(self) -> int:
         """Implement ``Device.free``."""
         self.cupy.get_default_memory_pool().free_all_blocks()
-        return max(0, int(self.cupy.cuda.runtime.memGetInfo()[0]) - SPARED)
+        return max(0, int(self.cupy.cuda.runtime.memGetInfo()[0]) - RESERVED_BYTES)
 
     def put(self, values: NDArray[Any]) -> Any:
         """Implement ``Device.put``."""

@@ -24,7 +24,7 @@ from symphys.types import Ints
 
 LOOPED = ("body", "again", "back_body")
 """Phases of every step."""
-CALL = 40
+CALL_COST = 40
 """What a call costs besides its operations, in operations: a jump, its table entry."""
 
 
@@ -114,7 +114,7 @@ def _calls(planned: Plan, program: Program, phase: str) -> Iterator[_Call]:
         if form.backward:
             given, results = ([span._replace(offset=span.offset + far) for span in each] for each in (given, results))
         if number not in costs:
-            costs[number] = CALL + sum(graph.nodes[x].op not in ("const", "input") for x in graph.needed())
+            costs[number] = CALL_COST + sum(graph.nodes[x].op not in ("const", "input") for x in graph.needed())
         yield _Call(
             entry=table[at : at + length].tolist(),
             cost=costs[number],

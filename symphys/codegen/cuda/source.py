@@ -45,7 +45,7 @@ def _meet(a: Ints, size: int, b: Ints, other: int, steps: int) -> bool:
 
 
 ROOM = "symphys.codegen.cuda"
-FILES = 24
+MAX_FILES = 24
 SIGNATURE = "(V *m, V *b, const word *t, word k)"
 
 
@@ -66,7 +66,7 @@ def device_sources(planned: Plan, steps: int, lanes: int, warps: int, single: bo
         f"  switch (number) {{\n{cases}  }}\n}}\n"
     )
     driver = "\n".join([head, declared, call, source.resource("program.h"), resource("driver.cu")])
-    return [*("\n".join([head, *group]) for group in source.spread(texts, work, FILES)), driver]
+    return [*("\n".join([head, *group]) for group in source.spread(texts, work, MAX_FILES)), driver]
 
 
 def resource(name: str) -> str:

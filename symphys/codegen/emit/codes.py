@@ -19,12 +19,12 @@ from symphys.codegen.graph.operations import FORMS
 
 WORD_BITS = 21
 """Of an operand, for the word; the others are for the place."""
-KEPT, CONSTANTS, PLACES = 0, 1, 2
+REGISTERS, CONSTANTS, PLACES = 0, 1, 2
 """Places of an operand: values that the function keeps, constants, and from here on those of the call."""
-MOST_KEPT = 4096
+MAX_REGISTERS = 4096
 """Values that a function keeps at once: they lie on the stack of a thread."""
-OWN = ("end", "copy", "add_to", "fill")
-NUMBERS = {name: number for number, name in enumerate((*OWN, *FORMS))}
+OWN_CODES = ("end", "copy", "add_to", "fill")
+NUMBERS = {name: number for number, name in enumerate((*OWN_CODES, *FORMS))}
 MASKED = {"not": "I", "and": "II", "or": "II", "one": "I", "iez": "IV", "select": "IVV"}
 """Types of operands where one is a mask."""
 
@@ -58,7 +58,7 @@ def codes_of(plan: Plan) -> Codes:
 def interpreter(lanes: int, single: bool) -> SourceFile:
     """The C file: it depends on nothing of a program."""
     cases = "".join(f"{name}_op: {{ {_case(name)} NEXT; }}\n" for name in FORMS)
-    labels = ", ".join([*(f"&&{name}" for name in OWN), *(f"&&{name}_op" for name in FORMS)])
+    labels = ", ".join([*(f"&&{name}" for name in OWN_CODES), *(f"&&{name}_op" for name in FORMS)])
     text = resource("interpreter.c").replace("OPERATIONS", labels).replace("CASES", cases)
     start = f"{head_of(lanes, single)}#include <string.h>\n#define WORD_BITS {WORD_BITS}\n"
     return SourceFile(start + text + "".join(map(resource, (*DRIVER, "phases.c"))), straight=True)
@@ -118,7 +118,7 @@ class _Encoder:
                 if graph.sizes[a]:
                     words.extend((NUMBERS["fill"], (PLACES + a) << WORD_BITS, zero, graph.sizes[a]))
         words.append(NUMBERS["end"])
-        if self.kept > MOST_KEPT:
+        if self.kept > MAX_REGISTERS:
             raise KernelUnavailable("a function keeps too many values to be interpreted")
         words[start + 1] = max(self.kept, 1)
 

@@ -50,7 +50,7 @@ class Dialect:
 VECTORS = Dialect(FORMS)
 NUMBERS = Dialect(PLAIN, both="", fuses=False)
 ONE_LANE = Dialect(SCALAR)
-TEAM = Dialect(FORMS, reads="const R *", writes="R *restrict ", shares="R *", memory="R *")
+PACK = Dialect(FORMS, reads="const R *", writes="R *restrict ", shares="R *", memory="R *")
 """Several calls of one rollout at once: lanes are calls, and memories are those of one lane."""
 DEVICE = Dialect(
     PLAIN,

@@ -26,7 +26,7 @@ from symphys.types import Ints
 
 NONE = -1
 TABLES = ("body", "again", "back_body")
-AHEAD = 16
+LOOKAHEAD = 16
 """As in ``guards.c``."""
 WIDTHS = {"guards": 1, "groups": 1, "calls": 7, "reads": 2, "writes": 2, "chains": 2, "sections": 5, "copies": 5}
 WIDTHS |= {"late": 2, "parents": 1}
@@ -184,7 +184,7 @@ class _Rows:
         self._gather_chains(rows, word)
         calls, sections = len(self._body), len(self._sections)
         seen = (2 + self._program.steps) * len(self._guards) // 8 + 1
-        notes = calls // 64 + 1 + calls + AHEAD + 3 * (calls + sections) + 2 * len(self._chains.roots)
+        notes = calls // 64 + 1 + calls + LOOKAHEAD + 3 * (calls + sections) + 2 * len(self._chains.roots)
         arena = 1 + 64 + seen + notes + self._words
         return Guarding(
             first=first,

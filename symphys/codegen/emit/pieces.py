@@ -9,10 +9,10 @@ from itertools import groupby
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.rewrite import fused_results, with_fused_products
 
-LONGEST = 500
+MAX_STATEMENTS = 500
 """Statements in one C function, and copies of what is given: a compiler's time grows faster than its length."""
 
-MANY = 8
+MIN_RUN = 8
 """Words in a row that are one constant are written by a loop: inputs that nothing sets fill thousands of them."""
 
 
@@ -75,7 +75,7 @@ def pieces_of(graph: Graph, form: Form, fuses: bool) -> Cut:
 
 def _cut(graph: Graph, fused: set[int]) -> list[GraphPiece]:
     order = [x for x in graph.needed() if graph.nodes[x].op not in ("const", "input")]
-    runs = [order[i : i + LONGEST] for i in range(0, len(order), LONGEST)] or [[]]
+    runs = [order[i : i + MAX_STATEMENTS] for i in range(0, len(order), MAX_STATEMENTS)] or [[]]
     home = {x: i for i, run in enumerate(runs) for x in run}
     crossing = sorted({y for x in order for y in graph.nodes[x].operands if home.get(y, home[x]) != home[x]})
     slots = {x: slot for slot, x in enumerate(crossing)}
@@ -83,7 +83,7 @@ def _cut(graph: Graph, fused: set[int]) -> list[GraphPiece]:
     copied = 0
     for r, result in enumerate(graph.results):
         for x, first, count in _runs(graph, result):
-            if x not in home and (copied := copied + 1) % LONGEST == 0:
+            if x not in home and (copied := copied + 1) % MAX_STATEMENTS == 0:
                 pieces.append(GraphPiece([], slots, fused))
             pieces[home.get(x, -1)].targets.setdefault(x, []).append((r, first, count))
     return pieces
@@ -94,7 +94,7 @@ def _runs(graph: Graph, result: Sequence[int]) -> Iterator[tuple[int, int, int]]
     first = 0
     for x, words in groupby(result):
         count = len(list(words))
-        if graph.nodes[x].op == "const" and count >= MANY:
+        if graph.nodes[x].op == "const" and count >= MIN_RUN:
             yield x, first, count
         else:
             yield from ((x, word, 1) for word in range(first, first + count))

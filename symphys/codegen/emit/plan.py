@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.guarding import TABLES, guarding_of
+from symphys.codegen.emit.packs import pack_calls
 from symphys.codegen.emit.pieces import Form
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.tables import Recipe, Table, table_of
 from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
-from symphys.codegen.graph.reach import KnownCalls, Reach
+from symphys.codegen.graph.reach import AnnotatedCalls, LivenessGraph
 from symphys.codegen.graph.rewrite import Taped
 from symphys.codegen.program.phase_calls import PhaseCalls, grouped, rows_of
 from symphys.codegen.program.program import Function, Place, Program
 from symphys.codegen.program.spans import Spans
-from symphys.codegen.program.teams import teamed
 from symphys.types import Ints
 
 NONE = -1
@@ -40,7 +40,7 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
         noted: whether the driver notes which guards are 0 in a step, otherwise they are computed again backwards, and
             takes ``again`` for the body where it has all calls of the only step.
     """
-    side_by_side = teamed(program)
+    side_by_side = pack_calls(program)
     program, functions = side_by_side.program, DistinctFunctions()
     parts, reach = with_adjoints(program, seeded, functions)
     body = parts[1]
@@ -55,19 +55,21 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
     filled = {name: (len(table.calls), table.filled()) for name, table in tables.items()}
     callers = {name: tables[name].calls for name in TABLES}
     return Plan(
-        tuple(functions.listed), filled, tape, _written(program), guarding, program, side_by_side.teams, callers
+        tuple(functions.listed), filled, tape, _written(program), guarding, program, side_by_side.packs, callers
     )
 
 
 def with_adjoints(
     program: Program, seeded: Sequence[str], functions: DistinctFunctions, varying: Sequence[Place] = ()
-) -> tuple[list[PlannedPhase], Reach]:
+) -> tuple[list[PlannedPhase], LivenessGraph]:
     """The phases of a program, with the adjoints of what matters to the seeded outputs and depends on z.
 
     What is in ``varying`` counts as dependent too.
     """
     parts = [PlannedPhase(calls, steps) for calls, steps in zip(program.phases, (1, program.steps, 1), strict=True)]
-    reach = Reach(program.size, [KnownCalls(part.calls, part.steps, part.dependence(functions)) for part in parts])
+    reach = LivenessGraph(
+        program.size, [AnnotatedCalls(part.calls, part.steps, part.dependence(functions)) for part in parts]
+    )
     outputs = [_words_of(program.outputs[name]) for name in seeded]
     inputs = np.concatenate([_words_of(place) for place in (program.z, *varying)])
     active = reach.forwards(inputs) & reach.backwards(np.concatenate([np.zeros(0, np.int64), *outputs]))
@@ -201,7 +203,7 @@ def _taped_at_once(program: Program) -> bool:
 
 
 def _again(
-    program: Program, body: PlannedPhase, reach: Reach, functions: DistinctFunctions, noted: bool
+    program: Program, body: PlannedPhase, reach: LivenessGraph, functions: DistinctFunctions, noted: bool
 ) -> NDArray[np.bool_]:
     """(calls,) which must be run again before the adjoints of a step: those whose scratch is read."""
     spans = body.calls.inputs

@@ -29,7 +29,7 @@ class Plan:
         written: (places, 3) offset, size and stride of what each step of the body writes for itself.
         guarding: of calls that may be left out; None: none may.
         program: what was planned, in the order of its tables; None: as it was given.
-        teams: (first call of the body, calls) that one rollout alone may compute side by side.
+        packs: (first call of the body, number of calls) that a library of one lane may compute side by side.
         callers: for each table of ``TABLES`` the calls of the body whose entries it has.
         shapes: of the functions for one rollout alone; empty for blocks of rollouts.
         size: words before the tape; 0: the program's.
@@ -42,7 +42,7 @@ class Plan:
     written: Ints
     guarding: Guarding | None = None
     program: Program | None = None
-    teams: tuple[tuple[int, int], ...] = ()
+    packs: tuple[tuple[int, int], ...] = ()
     callers: Mapping[str, Ints] = field(default_factory=dict)
     shapes: tuple[Shape, ...] = ()
     size: int = 0

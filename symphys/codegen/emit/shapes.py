@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-ALL, BESIDE, EACH, TURNS = "all", "beside", "each", "turns"
+BROADCAST, INTERLEAVED, GATHER, GATHER_ALIASED = "all", "beside", "each", "turns"
 """One place for all lanes; places whose words are interleaved; a place for each lane; the same, where some coincide."""
 
 
@@ -61,7 +61,7 @@ class PlaceWords:
         return self.store(name, word, "S(0.0)")
 
 
-class TeamWords(PlaceWords):
+class PackWords(PlaceWords):
     """The same for one rollout alone, where words may lie apart and lanes are calls.
 
     Results that several lanes add to are added to lane by lane, in the order of the calls: with whole vectors, of which
@@ -82,7 +82,7 @@ class TeamWords(PlaceWords):
 
     def pointers(self, name: str) -> list[str]:
         """Return the C expression of a place from the pairs of an entry."""
-        if self._access[name].kind in (EACH, TURNS):
+        if self._access[name].kind in (GATHER, GATHER_ALIASED):
             return [f"{name}_{lane}" for lane in range(self._lanes)]
         return [name]
 
@@ -91,9 +91,9 @@ class TeamWords(PlaceWords):
         kind, at = self._access[name].kind, self._words(name, word)
         if self.single:
             return at[0]
-        if kind == ALL:
+        if kind == BROADCAST:
             return f"ALL({at[0]})"
-        if kind == BESIDE:
+        if kind == INTERLEAVED:
             return f"*(const U *)&{at[0]}"
         return f"((V){{{', '.join(at)}}})"
 
@@ -102,7 +102,7 @@ class TeamWords(PlaceWords):
         kind, at = self._access[name].kind, self._words(name, word)
         if self.single:
             return f"{at[0]} = {value};"
-        if kind == BESIDE:
+        if kind == INTERLEAVED:
             return f"*(U *)&{at[0]} = {value};"
         parts = " ".join(f"{at[lane]} = x[{lane}];" for lane in range(self._lanes))
         return f"{{ const V x = {value}; {parts} }}"
@@ -113,17 +113,17 @@ class TeamWords(PlaceWords):
         if self.single:
             return super().add(name, word, value)
         sum_ = value if "{}" in value else f"{{}} + {value}"
-        if kind == BESIDE:
+        if kind == INTERLEAVED:
             to = f"*(U *)&{at[0]}"
             return f"{to} = {sum_.format(to)};"
-        if kind == EACH:
+        if kind == GATHER:
             return self.store(name, word, sum_.format(self.load(name, word)))
         parts = " ".join(f"x = {sum_.format(f'ALL({at[k]})')}; {at[k]} = x[{k}];" for k in self._turn)
         return f"{{ V x; {parts} }}"
 
     def clear(self, name: str, word: str) -> str:
         """Zero a word, in all lanes."""
-        if self.single or self._access[name].kind == BESIDE:
+        if self.single or self._access[name].kind == INTERLEAVED:
             return self.store(name, word, "S(0.0)")
         return f"{{ {' '.join(f'{at} = 0;' for at in dict.fromkeys(self._words(name, word)))} }}"
 
@@ -133,4 +133,4 @@ class TeamWords(PlaceWords):
         index = [word * step if isinstance(word, int) else f"{step} * {word}" for step in steps]
         pointers = self.pointers(name)
         apart = [f"{pointers[lane % len(pointers)]}[{index[lane]}]" for lane in range(len(steps))]
-        return apart[:1] * self._lanes if kind in (ALL, BESIDE) else apart
+        return apart[:1] * self._lanes if kind in (BROADCAST, INTERLEAVED) else apart

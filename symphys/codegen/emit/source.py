@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
-from symphys.codegen.emit.dialect import ONE_LANE, TEAM, VECTORS, Dialect
+from symphys.codegen.emit.dialect import ONE_LANE, PACK, VECTORS, Dialect
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.writer import write
 
@@ -14,7 +14,7 @@ ROOM = "symphys.codegen"
 DRIVER = ("program.h", "guards.c", "driver.c")
 NUMBERS = "#define NUMBERS\n"
 UNALIGNED = "typedef V U __attribute__((aligned(sizeof(R)), may_alias));\n"
-FILES, SHARE = 4, 400
+MAX_FILES, NODES_PER_FILE = 4, 400
 """Most files of values and most of adjoints; nodes for which another file is begun."""
 
 
@@ -47,10 +47,10 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
         kinds.setdefault((form.backward, shape.lanes if shape else 1), []).append(i)
     for (_, calls), mine in sorted(kinds.items()):
         work = [len(plan.functions[i][0].nodes) for i in mine]
-        dialect = TEAM if calls > 1 else forms_of(lanes)
+        dialect = PACK if calls > 1 else forms_of(lanes)
         texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i], shapes[i]) for i in mine]
-        start = team_head(calls, single) if calls > 1 else head_of(lanes, single, dialect)
-        for group in spread(texts, work, FILES):
+        start = pack_head(calls, single) if calls > 1 else head_of(lanes, single, dialect)
+        for group in spread(texts, work, MAX_FILES):
             found.append(SourceFile("\n".join([start, *group]), narrow=narrow, straight=True))
     driver = head_of(lanes, single) + listed(len(plan.functions)) + "".join(map(resource, (*DRIVER, "phases.c")))
     return [*found, SourceFile(driver)]
@@ -70,7 +70,7 @@ def head_of(lanes: int, single: bool, dialect: Dialect = VECTORS) -> str:
     return head + (NUMBERS if dialect is ONE_LANE else "") + resource("vector.h")
 
 
-def team_head(calls: int, single: bool) -> str:
+def pack_head(calls: int, single: bool) -> str:
     """Return the head of a C file of functions for several calls at once."""
     each = ", ".join(["x_"] * calls)
     whole = f"#define ALL(x) ({{ const R x_ = (x); (V){{{each}}}; }})\n"
@@ -84,7 +84,7 @@ def forms_of(lanes: int) -> Dialect:
 
 def spread(texts: Sequence[str], work: Sequence[int], most: int) -> list[list[str]]:
     """Split items into at most ``count`` groups of similar work: the largest first, each to the least loaded group."""
-    count = max(1, min(most, len(texts), sum(work) // SHARE))
+    count = max(1, min(most, len(texts), sum(work) // NODES_PER_FILE))
     groups: list[list[str]] = [[] for _ in range(count)]
     loads = [0] * count
     for i in sorted(range(len(texts)), key=lambda i: -work[i]):

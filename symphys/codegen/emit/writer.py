@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from symphys.codegen.emit.dialect import VECTORS, Dialect
 from symphys.codegen.emit.pieces import Form, GraphPiece, pieces_of
-from symphys.codegen.emit.shapes import PlaceWords, Shape, TeamWords
+from symphys.codegen.emit.shapes import PackWords, PlaceWords, Shape
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import MASKS
 
@@ -83,7 +83,7 @@ def write(
     ``moving``: the pairs that may have a stride; None: all. ``shape``: of a function for one rollout alone. ``apart``:
     the results that meet no other in any call.
     """
-    words = PlaceWords(dialect.word) if shape is None else TeamWords(shape, len(graph.sizes), form.backward)
+    words = PlaceWords(dialect.word) if shape is None else PackWords(shape, len(graph.sizes), form.backward)
     cut = pieces_of(graph, form, dialect.fuses)
     graph, pieces = cut.graph, [_Written(piece, dialect, words, apart) for piece in cut.pieces]
     pointers = _pointers(graph, form, dialect, words)

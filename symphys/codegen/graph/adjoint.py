@@ -16,10 +16,10 @@ from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.graph.rewrite import rewritten, with_reciprocals
 from symphys.codegen.program.program import Function
 
-WAIT = {"div": 13, "sqrt": 20}
-"""Cycles until a result is there, about; of what is not listed ``SHORT``."""
-SHORT = 4
-GAIN = 2 * SHORT
+LATENCY = {"div": 13, "sqrt": 20}
+"""Cycles until a result is there, about; of what is not listed ``DEFAULT_LATENCY``."""
+DEFAULT_LATENCY = 4
+MIN_GAIN = 2 * DEFAULT_LATENCY
 """Cycles that must be gained: two sums instead of one take an operation more."""
 Term = tuple[int, int]
 """(1 or -1, node)"""
@@ -72,7 +72,7 @@ def _terms(graph: Graph, root: int, within: set[int]) -> list[Term]:
 def _times(graph: Graph, ready: list[int]) -> list[int]:
     """Return the latency of each node [cycles]; ``ready`` grows with the graph."""
     for node in graph.nodes[len(ready) :]:
-        wait = 0 if node.op in ("input", "const") else WAIT.get(node.op, SHORT)
+        wait = 0 if node.op in ("input", "const") else LATENCY.get(node.op, DEFAULT_LATENCY)
         ready.append(wait + max((ready[y] for y in node.operands), default=0))
     return ready
 
@@ -81,9 +81,9 @@ def _summed(graph: Graph, terms: Sequence[Term], ready: Sequence[int]) -> int:
     """A node for the sum: as it was, or first two sums of the terms that come early, then those that come late."""
     early = sorted(terms, key=lambda term: ready[term[1]])
     at = [ready[x] for _, x in early]
-    best, found = _chained([ready[x] for _, x in terms]) - GAIN, 0
+    best, found = _chained([ready[x] for _, x in terms]) - MIN_GAIN, 0
     for count in range(len(terms), 3, -1):
-        both = max(_chained(at[0:count:2]), _chained(at[1:count:2])) + SHORT
+        both = max(_chained(at[0:count:2]), _chained(at[1:count:2])) + DEFAULT_LATENCY
         time = _chained([both, *at[count:]])
         if time < best:
             best, found = time, count
@@ -97,7 +97,7 @@ def _chained(at: Sequence[int]) -> int:
     """Return the latency of a sum whose terms are added one after the other [cycles]."""
     time = at[0]
     for each in at[1:]:
-        time = max(time, each) + SHORT
+        time = max(time, each) + DEFAULT_LATENCY
     return time
 
 

@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 from symphys.codegen.graph.operations import MASKS
 
-SMALL = 100
+MAX_EXPONENT = 100
 """Exponents for which powers of two have reciprocals, in single precision too."""
 COMMUTE = frozenset({"add", "mul", "eq", "ne", "and", "or", "hypot"})
 
 
 def _reciprocal(x: float) -> float | None:
     """1 / x of a power of two, with which a product is the division to the last bit; None for other numbers."""
-    return 1 / x if abs(frexp(x)[0]) == 0.5 and abs(frexp(x)[1]) < SMALL else None
+    return 1 / x if abs(frexp(x)[0]) == 0.5 and abs(frexp(x)[1]) < MAX_EXPONENT else None
 
 
 def ordered(op: str, operands: tuple[int, ...]) -> tuple[int, ...]:

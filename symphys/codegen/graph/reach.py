@@ -43,7 +43,7 @@ class Lists:
 
 
 @dataclass(frozen=True)
-class KnownCalls:
+class AnnotatedCalls:
     """Calls with what is known of their functions.
 
     Attributes:
@@ -72,10 +72,10 @@ class _Places:
         return Lists(starts, stretches(first, np.repeat(self.size, self.steps)))
 
 
-class Reach:
+class LivenessGraph:
     """The calls of all phases as a graph of words, places and calls."""
 
-    def __init__(self, size: int, phases: Sequence[KnownCalls]) -> None:
+    def __init__(self, size: int, phases: Sequence[AnnotatedCalls]) -> None:
         """``size`` words of memory."""
         inputs = [(phase.calls.inputs, phase.steps) for phase in phases]
         outputs = [(phase.calls.outputs, phase.steps) for phase in phases]
@@ -84,25 +84,25 @@ class Reach:
         self._bounds = np.cumsum([0, *counts]).tolist()
         self._inputs = np.cumsum([0, *(len(spans.offset) for spans, _ in inputs)]).tolist()
         # calls: where their arguments and results begin, and where their functions have what depends on what
-        self._call = _together([spans.call for spans, _ in inputs], counts)
-        self._writer = _together([spans.call for spans, _ in outputs], counts)
-        self._first_input = _together([s.starts[:-1] for s, _ in inputs], [len(s.offset) for s, _ in inputs])
-        first_output = _together([s.starts[:-1] for s, _ in outputs], [len(s.offset) for s, _ in outputs])
-        functions = _together([phase.calls.number for phase in phases], [len(phase.dependence) for phase in phases])
+        self._call = _renumber([spans.call for spans, _ in inputs], counts)
+        self._writer = _renumber([spans.call for spans, _ in outputs], counts)
+        self._first_input = _renumber([s.starts[:-1] for s, _ in inputs], [len(s.offset) for s, _ in inputs])
+        first_output = _renumber([s.starts[:-1] for s, _ in outputs], [len(s.offset) for s, _ in outputs])
+        functions = _renumber([phase.calls.number for phase in phases], [len(phase.dependence) for phase in phases])
         stacked = [each for phase in phases for each in phase.dependence]
         self._of_argument = Lists.of([np.flatnonzero(each[:, i]) for each in stacked for i in range(each.shape[1])])
         self._of_word = Lists.of([np.flatnonzero(row) for each in stacked for row in each])
         self._argument_key = np.cumsum([0, *(each.shape[1] for each in stacked)])[functions]
         self._word_key = np.cumsum([0, *(each.shape[0] for each in stacked)])[functions]
         # arguments: places that many calls read, each once
-        self.read, self.place = _distinct(_joined(inputs))
+        self.read, self.place = _distinct(_join_places(inputs))
         self._place_words = self.read.words()
         owner = np.repeat(np.arange(len(self.read.offset)), np.diff(self._place_words.starts))
         by_word = Lists.inverse(self._place_words.items, size)
         self._places_of_word = Lists(by_word.starts, owner[by_word.items])
         self._readers = Lists.inverse(self.place, len(self.read.offset))
         # results: their words have numbers, one after the other
-        self._out = _joined(outputs)
+        self._out = _join_places(outputs)
         covered, self._end = self._out.words(), np.cumsum(self._out.size)
         self._before = self._end - self._out.size
         self._within = stretches(np.zeros(len(self._end), np.int64), self._out.size)
@@ -114,7 +114,7 @@ class Reach:
 
     def forwards(self, words: Ints) -> Bools:
         """(size,): which words depend on these, and these."""
-        seen, moving = _Seen(self._size), _Seen(len(self.read.offset))
+        seen, moving = _MarkedNumbers(self._size), _MarkedNumbers(len(self.read.offset))
         fresh = seen.fresh(words)
         while fresh.size:
             inputs = self._readers.at(moving.fresh(self._places_of_word.at(fresh)[0]))[0]
@@ -125,7 +125,7 @@ class Reach:
 
     def backwards(self, words: Ints) -> Bools:
         """(size,): which words these depend on, and these."""
-        seen, useful = _Seen(self._size), _Seen(len(self.read.offset))
+        seen, useful = _MarkedNumbers(self._size), _MarkedNumbers(len(self.read.offset))
         fresh = seen.fresh(words)
         while fresh.size:
             slots = self._writers.at(fresh)[0]
@@ -147,7 +147,11 @@ class Reach:
             phase: the number of the phase.
         """
         first, last = self._bounds[phase : phase + 2]
-        seen, taken, places = _Seen(self._size), _Seen(int(self._bounds[-1])), _Seen(len(self.read.offset))
+        seen, taken, places = (
+            _MarkedNumbers(self._size),
+            _MarkedNumbers(int(self._bounds[-1])),
+            _MarkedNumbers(len(self.read.offset)),
+        )
         fresh = np.concatenate([words, self._place_words.at(places.fresh(self.place[self._inputs[phase] + read]))[0]])
         while fresh.size:
             fresh = seen.fresh(fresh[through[fresh]])
@@ -168,7 +172,7 @@ class Reach:
         return np.repeat(first, steps) + stretches(np.zeros(len(first), np.int64), steps) * np.repeat(stride, steps)
 
 
-class _Seen:
+class _MarkedNumbers:
     """Which of some numbers have been seen."""
 
     def __init__(self, count: int) -> None:
@@ -185,13 +189,13 @@ class _Seen:
         return found
 
 
-def _together(parts: Sequence[Ints], counts: Sequence[int]) -> Ints:
+def _renumber(parts: Sequence[Ints], counts: Sequence[int]) -> Ints:
     """Numbers of things in several lists, as numbers in all of them together."""
     before = np.cumsum([0, *counts]).tolist()
     return np.concatenate([part + start for part, start in zip(parts, before[:-1], strict=True)])
 
 
-def _joined(parts: Sequence[tuple[Spans, int]]) -> _Places:
+def _join_places(parts: Sequence[tuple[Spans, int]]) -> _Places:
     """The places of all phases; those without stride, or in phases of one step, at one step."""
     offset, size = (np.concatenate([getattr(spans, name) for spans, _ in parts]) for name in ("offset", "size"))
     stride = np.concatenate([spans.stride if steps != 1 else 0 * spans.stride for spans, steps in parts])

@@ -40,7 +40,8 @@ class Program:
         zeroed: places that are 0 at the beginning.
         constants: places and their values. Programs that differ in them only share one compiled kernel.
         discounted: what adjoints may lose on their way back; None: nothing.
-        in_order: whether the body stays in its order; otherwise equal calls are put side by side, see ``teams``.
+        in_order: whether the body stays in its order; otherwise independent calls of one function are put side by side,
+            see ``packs``.
     """
 
     size: int

@@ -18,7 +18,7 @@ from symphys.codegen.program.program import Function, FunctionCall, Place, Progr
 
 TANGENT = "tangent"
 """``z.tangent``: of the output ``z`` of a tangent program."""
-TOGETHER = 64
+COPY_SIZE = 64
 """Words that one call copies."""
 Mask = tuple[bool, ...]
 
@@ -134,8 +134,8 @@ def with_derivatives(function: Function, inputs: Mask, outputs: Mask, directions
 def _copied(source: Place, target: Place) -> list[FunctionCall]:
     """Calls that copy, most of them of the same function: one for all words would be as long as they are."""
     calls = []
-    for first in range(0, source.size, TOGETHER):
-        x = ca.SX.sym("x", min(TOGETHER, source.size - first))
+    for first in range(0, source.size, COPY_SIZE):
+        x = ca.SX.sym("x", min(COPY_SIZE, source.size - first))
         places = [Place(place.offset + first, x.numel()) for place in (source, target)]
         calls.append(FunctionCall(ca.Function("copied", [x], [x]), (places[0],), (places[1],)))
     return calls

@@ -18,10 +18,10 @@ from symphys.codegen.program.phase_calls import PhaseCalls, rows_of
 from symphys.codegen.program.spans import Spans
 from symphys.types import Ints
 
-AT_ONCE = 4096
+CHUNK = 4096
 """Calls that are looked at together: more take memory and save nothing."""
 
-NEVER = np.iinfo(np.int64).max
+NEVER_WRITTEN = np.iinfo(np.int64).max
 
 
 Program = Any
@@ -34,7 +34,7 @@ class Verification:
     def __init__(self, program: Program) -> None:
         """Mark the inputs and the zeroed words as written."""
         self.program = program
-        self.written = np.full(program.size, NEVER)
+        self.written = np.full(program.size, NEVER_WRITTEN)
         self.scratch = np.zeros(program.size, dtype=bool)
         self._seen = np.zeros(program.size, np.int64)
         for name, place in (("z", program.z), ("parameters", program.parameters)):
@@ -49,7 +49,7 @@ class Verification:
     def _begin(self, name: str, place: Place) -> None:
         words = place.still().words(1)
         self.inside(name, words)
-        if np.any(self.written[words] != NEVER):
+        if np.any(self.written[words] != NEVER_WRITTEN):
             raise ProgramError(f"{name}: {span(words)} overlap another input or zeroed place")
         self.written[words] = -1
 
@@ -82,7 +82,7 @@ class Verification:
             return False
         order = np.arange(words.size)
         self._seen[words] = order
-        if np.any(self.written[words] != NEVER) or np.any(self._seen[words] != order):
+        if np.any(self.written[words] != NEVER_WRITTEN) or np.any(self._seen[words] != order):
             return False
         self.written[words] = phase.start + call + phase.period * step
         if phase.period:
@@ -91,8 +91,8 @@ class Verification:
 
     def read_all(self, phase: _Phase) -> None:
         """Refuse what the calls of a phase read before it is complete; many at a time."""
-        for first in range(0, len(phase.calls), AT_ONCE):
-            last = min(first + AT_ONCE, len(phase.calls))
+        for first in range(0, len(phase.calls), CHUNK):
+            last = min(first + CHUNK, len(phase.calls))
             if not self._read_at_once(phase, first, last):
                 for k in range(first, last):
                     self.read(phase.who(k), phase.calls[k], phase.start + k, phase.period)
@@ -123,7 +123,7 @@ class Verification:
                 continue
             if len(np.unique(words)) != words.size:
                 raise ProgramError(f"{who}: its steps overwrite each other in {span(words)}")
-            taken = self.written[words] != NEVER
+            taken = self.written[words] != NEVER_WRITTEN
             if taken.any():
                 raise ProgramError(f"{who}: {span(words[taken])} are written already")
             self.written[words] = time + period * np.arange(len(words))[:, None]
@@ -133,8 +133,10 @@ class Verification:
         if period and place.stride:
             raise ProgramError(f"{who}: adds to {span(words)} with a stride; write them instead")
         before = self.written[words]
-        if np.any(before == NEVER):
-            raise ProgramError(f"{who}: adds to {span(words[before == NEVER])}, which nobody wrote or zeroed before")
+        if np.any(before == NEVER_WRITTEN):
+            raise ProgramError(
+                f"{who}: adds to {span(words[before == NEVER_WRITTEN])}, which nobody wrote or zeroed before"
+            )
         if np.any(before == time):
             raise ProgramError(f"{who}: two of its results overlap in {span(words[before == time])}")
         last = time + period * max(self.program.steps - 1, 0)
@@ -145,7 +147,7 @@ class Verification:
         for place in call.inputs:
             words = self.cover(who, place, period)
             when = time + period * np.arange(len(words))[:, None]  # without stride: step 0, the first to read
-            self._refuse(who, words, self.written[words] == NEVER, "which nobody writes")
+            self._refuse(who, words, self.written[words] == NEVER_WRITTEN, "which nobody writes")
             scratch = self.scratch[words]
             if not period:
                 self._refuse(who, words, scratch, "which are scratch of the body")
@@ -170,7 +172,7 @@ def verify(program: Program) -> Verification:
     for name, place in program.outputs.items():
         words = place.still().words(1)
         check.inside(f"output {name}", words)
-        check._refuse(f"output {name}", words, check.written[words] == NEVER, "which nobody writes")
+        check._refuse(f"output {name}", words, check.written[words] == NEVER_WRITTEN, "which nobody writes")
         check._refuse(f"output {name}", words, check.scratch[words], "which are scratch of the body")
     for name, discounted in () if program.discounted is None else vars(program.discounted).items():
         if discounted is not None:
@@ -211,7 +213,7 @@ class _Phase:
         """(first, after the last) of calls that all write, or one that adds."""
         first = 0
         for k in [*np.flatnonzero(self.phase.accumulate).tolist(), len(self.calls)]:
-            yield from ((start, min(start + AT_ONCE, k)) for start in range(first, k, AT_ONCE))
+            yield from ((start, min(start + CHUNK, k)) for start in range(first, k, CHUNK))
             if k < len(self.calls):
                 yield k, k + 1
             first = k + 1

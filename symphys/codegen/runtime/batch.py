@@ -12,7 +12,7 @@ from symphys.codegen.program.program import Place
 from symphys.codegen.runtime.library import INPUTS, RESULTS, BatchData, RowSource
 from symphys.types import Array
 
-CHUNKS = 4
+PARTS_PER_THREAD = 4
 """Parts for each thread: small enough that one slow processor does not keep the others waiting."""
 
 
@@ -62,7 +62,7 @@ class RolloutBatch:
     def parts(self, lanes: int, threads: int) -> list[BatchData]:
         """Cut the batch into parts of whole blocks, a few for each thread."""
         blocks = -(-self.rows // lanes)
-        count = 1 if threads == 1 else min(blocks, CHUNKS * threads)
+        count = 1 if threads == 1 else min(blocks, PARTS_PER_THREAD * threads)
         ends = [lanes * (blocks * i // count) for i in range(count)] if count else []
         return [self.part(a, min(b, self.rows)) for a, b in zip(ends, [*ends[1:], self.rows], strict=True)]
 

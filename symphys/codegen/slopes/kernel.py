@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.codegen.emit.source import FILES, SourceFile, listed, resource, spread
+from symphys.codegen.emit.source import MAX_FILES, SourceFile, listed, resource, spread
 from symphys.codegen.emit.writer import write
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.program import Program
@@ -31,9 +31,9 @@ WORD = ctypes.c_int64
 POINTER = ctypes.c_void_p
 SHARED = "#define ALL(x) ((R)(x) - (V){0})\n"
 """A number of the memory in all lanes: unlike the S of a constant it needs no sum."""
-ITEM = 40
+ITEM_BYTES = 40
 """Bytes of what is done for a block of rows: the driver's ``item``."""
-PARTS = 4
+PARTS_PER_THREAD = 4
 """Of a batch for each thread; see ``RolloutBatch``."""
 
 
@@ -80,7 +80,7 @@ class SlopeKernel:
         self._evaluate.argtypes, self._evaluate.restype = (POINTER, POINTER, POINTER), None
         self._kept: list[Any] = []
         self._data = self._slopes(planned, report.lanes)
-        listed = (ITEM * self._data.items + self._data.cell_count) // (8 * report.lanes) + 1
+        listed = (ITEM_BYTES * self._data.items + self._data.cell_count) // (8 * report.lanes) + 1
         words = program.size + planned.tape + self._data.kept + planned.adjoints + listed
         self._pool = MemoryPool(words, report.lanes, np.float64)
 
@@ -89,7 +89,7 @@ class SlopeKernel:
         z, given, found = self._arguments(Z, parameters, columns)
         lanes = self.report.lanes
         blocks = -(-len(z) // lanes)
-        parts = 1 if self.threads == 1 else min(blocks, PARTS * self.threads)
+        parts = 1 if self.threads == 1 else min(blocks, PARTS_PER_THREAD * self.threads)
         ends = [min(lanes * (blocks * i // parts), len(z)) for i in range(parts + 1)] if parts else []
         tasks = [partial(self._run, z, given, found, a, b) for a, b in pairwise(ends)]
         self._pool.run(tasks, self.threads)
@@ -222,6 +222,6 @@ def _sources(planned: SlopePlan, lanes: int) -> list[SourceFile]:
     for backward in (False, True):
         mine = [i for i, (_, form) in enumerate(planned.functions) if form.backward == backward]
         work = [len(planned.functions[i][0].nodes) for i in mine]
-        for group in spread([texts[i] for i in mine], work, FILES):
+        for group in spread([texts[i] for i in mine], work, MAX_FILES):
             found.append(SourceFile("\n".join([head, *group]), straight=True))
     return [*found, SourceFile(head + listed(len(planned.functions)) + resource("slopes.c"))]

@@ -30,8 +30,8 @@ from symphys.codegen.slopes.places import AdjointPlaces, PointPlaces
 from symphys.codegen.slopes.pulls import Pull, Pulls, sparsity
 from symphys.types import Bools, Ints
 
-AT_ONCE = 4
-SMALLEST = 400
+MAX_MERGED_CALLS = 4
+MIN_INSTRUCTIONS = 400
 """Instructions of a function below which its calls are left as they are."""
 Key = tuple[int, int]
 
@@ -47,11 +47,11 @@ def merged(program: Program) -> list[FunctionCall]:
     for _, group in groupby(calls, key=lambda call: call.function.__hash__()):
         same = list(group)
         left_out = any(call.guard or call.section for call in same)
-        if left_out or same[0].function.n_instructions() < SMALLEST or not _chained(same):
+        if left_out or same[0].function.n_instructions() < MIN_INSTRUCTIONS or not _chained(same):
             found += same
             continue
-        for first in range(0, len(same), AT_ONCE):
-            found.append(_together(same[first : first + AT_ONCE], reads, known))
+        for first in range(0, len(same), MAX_MERGED_CALLS):
+            found.append(_together(same[first : first + MAX_MERGED_CALLS], reads, known))
     return found
 
 

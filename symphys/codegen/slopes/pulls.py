@@ -16,13 +16,13 @@ from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.rewrite import Taped
 from symphys.codegen.program.program import Function, Place
 
-TABLED = 1.5
+TABLE_COST = 1.5
 """Operations of products with slopes on the tape that take as long as one of other adjoints, which store more."""
-SOON_MADE = 100
+ALWAYS_TRIED = 100
 """Slopes of a call: so many are tried."""
-AS_COUNTED = 0.95
+COUNT_CORRECTION = 0.95
 """Of the operations that a slope is counted with: products with 1 are none. Measured in large calls: 0.99."""
-LARGEST = 6000
+MAX_SLOPES = 6000
 """Slopes of a call beyond which it is not asked whether a table of them is less."""
 
 
@@ -118,8 +118,8 @@ def _cheaper(
     forward = functions.forward(function)
     graph = functions.adjoint(function, inputs, outputs)
     taped = functions.taped(forward, graph)
-    most, slopes = TABLED * _operations(graph, taped), sparsity(forward)
-    if slopes.sum() > LARGEST or _products(forward, slopes, inputs, outputs) > most:
+    most, slopes = TABLE_COST * _operations(graph, taped), sparsity(forward)
+    if slopes.sum() > MAX_SLOPES or _products(forward, slopes, inputs, outputs) > most:
         return graph, taped
     table = functions.adjoint(function, inputs, outputs, tabled=True)
     other = functions.taped(forward, table)
@@ -131,4 +131,4 @@ def _products(forward: Graph, slopes: NDArray[np.float32], inputs: Mask, outputs
     by = np.repeat(inputs, forward.sizes)
     of = np.repeat(outputs, [len(result) for result in forward.results])
     counts = slopes[of][:, by].sum(axis=0)
-    return float(AS_COUNTED * (counts + np.maximum(counts - 1, 0)).sum()) if counts.sum() > SOON_MADE else 0.0
+    return float(COUNT_CORRECTION * (counts + np.maximum(counts - 1, 0)).sum()) if counts.sum() > ALWAYS_TRIED else 0.0

@@ -32,9 +32,9 @@ if TYPE_CHECKING:  # what writes C is imported where it is called: a second star
     from symphys.codegen.emit.planned import Plan
     from symphys.codegen.emit.source import SourceFile
 
-LONG_COMPILATION = 20_000
+MIN_LONG_OPERATIONS = 20_000
 """Operations from which a kernel takes some seconds to compile, and begins with an interpreter."""
-ANNOUNCED = 30.0
+MIN_ANNOUNCED_TIME = 30.0
 """[s] Estimated time of compiling from which it is announced."""
 
 
@@ -99,10 +99,10 @@ def compiled(
 ) -> tuple[ProcessorKernel, KeptPlan]:
     """Build the kernel of a program, or take it from the cache; return also its plan, to be kept.
 
-    ``wait``: for the compiler; else a kernel of ``LONG_COMPILATION`` operations begins with an interpreter, and changes
-    over once it is compiled. With $SYMPHYS_WAIT all wait.
+    ``wait``: for the compiler; else a kernel of at least ``MIN_LONG_OPERATIONS`` operations begins with an interpreter,
+    and changes over once it is compiled. With $SYMPHYS_WAIT all wait.
     """
-    from symphys.codegen.emit.alone import alone
+    from symphys.codegen.emit.packs import single_lane_plan
     from symphys.codegen.emit.plan import plan
     from symphys.codegen.emit.source import sources
 
@@ -110,14 +110,14 @@ def compiled(
     with uncollected():
         planned = plan(program, names, width.lanes * width.real)
         parts = sources(planned, width.lanes, width.single)
-        own = alone(planned) if width.several and width.lanes > 1 else None
+        own = single_lane_plan(planned) if width.several and width.lanes > 1 else None
     operations = sum(len(graph.nodes) for graph, _ in planned.functions)
     kept = KeptPlan(program, planned, names, texts_of(parts), len(planned.functions), operations, own)
     libraries = KeptLibraries(kept, width, cache)
     lanes = suited(rows, width.lanes) if rows is not None and width.several else width.lanes
     if lanes != width.lanes:
         parts = sources(own if lanes == 1 and own else planned, lanes, width.single, narrow=True)
-    waits = wait or operations < LONG_COMPILATION or lanes != width.lanes or bool(os.environ.get("SYMPHYS_WAIT"))
+    waits = wait or operations < MIN_LONG_OPERATIONS or lanes != width.lanes or bool(os.environ.get("SYMPHYS_WAIT"))
     if not waits and libraries.find(lanes) is None:
         with suppress(KernelUnavailable):
             first = lanes, libraries.interpreter(planned)
@@ -142,7 +142,7 @@ def double_reference(program: Program, names: tuple[str, ...]) -> ProcessorKerne
     with uncollected():
         planned = plan(program, names, width.lanes * width.real)
     operations = sum(len(graph.nodes) for graph, _ in planned.functions)
-    if operations < LONG_COMPILATION:
+    if operations < MIN_LONG_OPERATIONS:
         return compiled(program, names, width, cache, 1)[0]
     kept = KeptPlan(program, planned, names, "", len(planned.functions), operations, None)
     libraries = KeptLibraries(kept, width, cache)
@@ -152,7 +152,7 @@ def double_reference(program: Program, names: tuple[str, ...]) -> ProcessorKerne
 def announce(operations: int, kept: bool) -> None:
     """Log a warning before a long compilation, unless the library is kept."""
     seconds = COMPILE_TIME[0] + COMPILE_TIME[1] * operations
-    if seconds >= ANNOUNCED and not kept:
+    if seconds >= MIN_ANNOUNCED_TIME and not kept:
         text = "compiling %s operations takes about %.0f s of a processor; it is done once, and kept"
         logging.getLogger("symphys").warning(text, f"{operations:,}", seconds)
 
@@ -207,14 +207,14 @@ class KeptLibraries:
 
     def build(self, lanes: int) -> Loaded:
         """Build the library of ``lanes``; see ``widths.Libraries``."""
-        from symphys.codegen.emit.alone import alone
+        from symphys.codegen.emit.packs import single_lane_plan
         from symphys.codegen.emit.plan import plan
         from symphys.codegen.emit.source import sources
 
         kept, width = self.kept, self.width
         with uncollected():
             planned = plan(kept.program, kept.names, width.lanes * width.real)
-            planned = (alone(planned) if lanes == 1 and kept.alone else None) or planned
+            planned = (single_lane_plan(planned) if lanes == 1 and kept.single_lane else None) or planned
             parts = sources(planned, lanes, width.single, lanes != width.lanes)
         with self.built(lanes, parts) as built:
             return self.load(built.path, lanes)
@@ -239,7 +239,7 @@ class KeptLibraries:
         return Loaded(path, self.kept.program, self._plan(lanes), self.kept.names)
 
     def _plan(self, lanes: int) -> Plan:
-        return self.kept.alone if lanes == 1 and self.kept.alone else self.kept.plan
+        return self.kept.single_lane if lanes == 1 and self.kept.single_lane else self.kept.plan
 
     def _texts(self, lanes: int) -> str:
         """Return the identity of the C files, which differ by lanes, dialect and packing."""

@@ -33,17 +33,17 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-LIMIT = 512 * 2**20
+MAX_CACHE_BYTES = 512 * 2**20
 """[bytes] Total size of the kernels; those not used for longest go first."""
 KINDS = (".so", ".cubin")
 """Suffixes of kernels for processors and for devices."""
-PLANS = ".plan"
+PLAN_SUFFIX = ".plan"
 """Suffix of plans beside kernels, with which a second start need not plan them; see ``warm_start``."""
-LEFT = 3600.0
+MAX_UNFINISHED_AGE = 3600.0
 """[s] Age at which an unfinished file, or a free lock, counts as left by a killed process."""
-LOCK_TIMEOUT, TICK = 900.0, 0.05
+LOCK_TIMEOUT, LOCK_INTERVAL = 900.0, 0.05
 """[s] to wait for another process, which may be stopped as by Ctrl-Z; [s] between two attempts."""
-AHEAD = 60.0
+MAX_CLOCK_SKEW = 60.0
 """[s] Largest difference between the clocks of two machines."""
 
 
@@ -62,7 +62,7 @@ class Cache:
     """A folder of kernels, of at most ``limit`` bytes; finds and stores files of one kind, its ``suffix``."""
 
     folder: Path
-    limit: int = LIMIT
+    limit: int = MAX_CACHE_BYTES
     suffix: str = KINDS[0]
 
     def distrust(self) -> str:
@@ -174,17 +174,17 @@ class Cache:
     def _entries(self) -> list[tuple[float, int, Path]]:
         """Return (time of last use, bytes, path) of each file, oldest first."""
         found = []
-        for path in (path for kind in (*KINDS, PLANS) for path in self._files(f"*{kind}")):
+        for path in (path for kind in (*KINDS, PLAN_SUFFIX) for path in self._files(f"*{kind}")):
             with contextlib.suppress(OSError):
                 status = path.stat()
                 found.append((status.st_mtime, status.st_size, path))
         return sorted(found)
 
     def _shrink(self, keep: Path) -> None:
-        self._sweep(LEFT)
+        self._sweep(MAX_UNFINISHED_AGE)
         now = time.time()
         for used, _, path in self._entries():
-            if used > now + AHEAD:  # it would be the last to go for as long as that time is still to come
+            if used > now + MAX_CLOCK_SKEW:  # it would be the last to go for as long as that time is still to come
                 with contextlib.suppress(OSError):
                     os.utime(path, (now, now))
         entries = self._entries()
@@ -217,7 +217,7 @@ def _wait_for(lock: IO[str]) -> None:
         except BlockingIOError:
             if time.monotonic() >= end:
                 return
-            time.sleep(TICK)
+            time.sleep(LOCK_INTERVAL)
         except OSError:
             return
         else:

@@ -47,9 +47,9 @@ GATHERS = ("-fdisable-rtl-combine",)
 """More flags of gcc where vectors are put together word by word: the combiner takes seven eighths of its time there."""
 NARROW = ("-fno-tree-vectorize", "-fno-tree-slp-vectorize")
 """More flags where a lane is a number, or a vector is short: packing several into one takes longer."""
-LIMIT = 600.0
+COMPILE_TIMEOUT = 600.0
 """[s] Timeout of a compiler for one file, far above what any kernel needs."""
-ANSWER = 60.0
+VERSION_TIMEOUT = 60.0
 """[s] Timeout for its version; ziglang unpacks itself on its first call."""
 
 
@@ -130,9 +130,9 @@ class Compiler:
             straight, gathers = (STRAIGHT if source.straight else ()), (GATHERS if source.gathers else ())
             extra = (*(NARROW if source.narrow else ()), *((*straight, *gathers) if self.gnu else ()))
             commands.append([*self.command, *flags, *extra, "-c", str(file), "-o", str(target)])
-        run_all(commands, LIMIT, processors(), folder)
+        run_all(commands, COMPILE_TIMEOUT, processors(), folder)
         library = folder / "kernel.so"
-        run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"], LIMIT, folder)
+        run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"], COMPILE_TIMEOUT, folder)
         return library
 
 
@@ -147,23 +147,23 @@ def find_compiler() -> Compiler:
     """Find the compiler of $CC, else gcc, clang, cc or the ziglang package; KernelUnavailable if there is none."""
     wanted = os.environ.get("CC", "").strip()
     if wanted:
-        return _asked(tuple(shlex.split(wanted)), named=True)
+        return _compiler_of(tuple(shlex.split(wanted)), named=True)
     for name in ("gcc", "clang", "cc"):
         path = shutil.which(name)
         if path:
-            return _asked((path,), named=False)
+            return _compiler_of((path,), named=False)
     if importlib.util.find_spec("ziglang"):
-        return _asked((sys.executable, "-m", "ziglang", "cc"), named=False)
+        return _compiler_of((sys.executable, "-m", "ziglang", "cc"), named=False)
     raise KernelUnavailable(f"no C compiler was found: {ADVICE}")
 
 
 @cache
-def _asked(command: tuple[str, ...], named: bool) -> Compiler:
+def _compiler_of(command: tuple[str, ...], named: bool) -> Compiler:
     path = shutil.which(command[0])
     if path is None:
         raise KernelUnavailable(f"the compiler {command[0]!r} that CC names was not found: {ADVICE}")
     command = (path, *command[1:])
-    said = run([*command, "--version"], ANSWER)
+    said = run([*command, "--version"], VERSION_TIMEOUT)
     version = said.partition("\n")[0] or "unknown version"
     return Compiler(command, version, gnu="Free Software Foundation" in said)
 

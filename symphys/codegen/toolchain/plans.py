@@ -66,7 +66,7 @@ class KeptPlan:
     texts: str
     functions: int
     operations: int
-    alone: Plan | None = None
+    single_lane: Plan | None = None
 
     def write(self, path: Path) -> None:
         """Write the plan to a file."""
@@ -90,10 +90,14 @@ class KeptPlan:
             "operations": self.operations,
         }
         arrays: dict[str, Any] = {f"table_{name}": table for name, (_, table) in plan.tables.items()}
-        if (alone := self.alone) is not None:
-            head["alone"] = [{name: count for name, (count, _) in alone.tables.items()}, alone.size, alone.tape]
-            head["signature"] = alone.signature
-            arrays |= {f"alone_{name}": table for name, (_, table) in alone.tables.items()}
+        if (single_lane := self.single_lane) is not None:
+            head["alone"] = [
+                {name: count for name, (count, _) in single_lane.tables.items()},
+                single_lane.size,
+                single_lane.tape,
+            ]
+            head["signature"] = single_lane.signature
+            arrays |= {f"alone_{name}": table for name, (_, table) in single_lane.tables.items()}
         if plan.guarding is not None:
             arrays |= {f"guarding_{name}": rows for name, rows in plan.guarding.rows.items()}
         values = np.array([x for _, row in program.constants for x in row], np.float64)
@@ -128,13 +132,15 @@ class KeptPlan:
         if head["guarding"]:
             rows = {name.partition("_")[2]: each for name, each in arrays.items() if name.startswith("guarding_")}
             guarding = Guarding(head["guarding"][0], rows, head["guarding"][1])
-        plan, alone = Plan((), tables, head["tape"], arrays["written"], guarding), None
+        plan, single_lane = Plan((), tables, head["tape"], arrays["written"], guarding), None
         if "alone" in head:
             counts, size, tape = head["alone"]
             tables = {name: (count, arrays[f"alone_{name}"]) for name, count in counts.items()}
-            alone = replace(plan, tables=tables, tape=tape, size=size, signature=head["signature"])
+            single_lane = replace(plan, tables=tables, tape=tape, size=size, signature=head["signature"])
         program = KeptProgram(fields, make)
-        return cls(program, plan, tuple(head["names"]), head["texts"], head["functions"], head["operations"], alone)
+        return cls(
+            program, plan, tuple(head["names"]), head["texts"], head["functions"], head["operations"], single_lane
+        )
 
 
 def listed(place: Place) -> list[int]:

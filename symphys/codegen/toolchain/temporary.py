@@ -22,7 +22,7 @@ KINDS = ("symphys-kernel-", "symphys-external-", "symphys-cuda-")
 """Prefixes of the names of folders."""
 LOCK = ".in-use"
 """The file that is locked."""
-YOUNG, OLD = 60.0, 86400.0
+MIN_UNLOCKED_AGE, MAX_UNLOCKED_AGE = 60.0, 86400.0
 """[s] A younger folder may not be locked yet; an older one without a lock has no process any more."""
 
 
@@ -56,10 +56,14 @@ def is_left(folder: Path) -> bool:
     """Whether no process uses the folder any more; False if unknown. OSError if it disappears meanwhile."""
     status = folder.lstat()
     age = abs(time.time() - status.st_mtime)  # a clock that was set back makes times that are still to come
-    if not stat.S_ISDIR(status.st_mode) or age < YOUNG or (hasattr(os, "geteuid") and status.st_uid != os.geteuid()):
+    if (
+        not stat.S_ISDIR(status.st_mode)
+        or age < MIN_UNLOCKED_AGE
+        or (hasattr(os, "geteuid") and status.st_uid != os.geteuid())
+    ):
         return False
     if fcntl is None or not (folder / LOCK).exists():
-        return age > OLD
+        return age > MAX_UNLOCKED_AGE
     handle = lock(folder / LOCK)
     if handle is None:
         return False

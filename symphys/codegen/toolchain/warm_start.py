@@ -17,7 +17,7 @@ from typing import Literal, TypeVar
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import ProcessorKernel
 from symphys.codegen.toolchain.build import BlockWidth, KeptLibraries, compiled, kernel_of, temporary_folder, width_of
-from symphys.codegen.toolchain.cache import PLANS, Cache, default_cache
+from symphys.codegen.toolchain.cache import PLAN_SUFFIX, Cache, default_cache
 from symphys.codegen.toolchain.identity import identity_of, package_stamp
 from symphys.codegen.toolchain.plans import KeptPlan
 
@@ -74,7 +74,7 @@ Kept = TypeVar("Kept")
 
 def found(key: str, read: Callable[[Path], Kept], cache: Cache) -> Kept | None:
     """Return what is kept under a key, by what reads its file; None if there is nothing."""
-    path = replace(cache, suffix=PLANS).find(key)
+    path = replace(cache, suffix=PLAN_SUFFIX).find(key)
     if path is None:
         return None
     try:
@@ -88,4 +88,4 @@ def keep(key: str, write: Callable[[Path], None], cache: Cache) -> None:
     with contextlib.suppress(OSError), temporary_folder("symphys-plan-") as folder:
         path = Path(folder) / "plan.npz"
         write(path)
-        replace(cache, suffix=PLANS).store(key, path)
+        replace(cache, suffix=PLAN_SUFFIX).store(key, path)

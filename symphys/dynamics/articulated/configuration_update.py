@@ -16,9 +16,9 @@ import casadi as ca
 from symphys.dynamics.articulated import spatial
 from symphys.dynamics.articulated.branches import TreeRates, solve, tree_motion
 from symphys.dynamics.articulated.forward_kinematics import FinalPose, final_poses, joint_starts
-from symphys.dynamics.articulated.generalized_coordinates import GeneralizedCoordinates, apart
+from symphys.dynamics.articulated.generalized_coordinates import GeneralizedCoordinates, split_rates
 from symphys.dynamics.articulated.impulse_response import BodyPlace, numbering
-from symphys.dynamics.articulated.rotors import Rates, chosen
+from symphys.dynamics.articulated.rotors import Rates, select_rotors
 from symphys.dynamics.articulated.schur_complement import Columns, SpatialVector
 from symphys.dynamics.motion import PredictedMotion
 from symphys.dynamics.tracing.decorator import traced
@@ -27,7 +27,7 @@ from symphys.maths import rotation
 from symphys.model.joints import KinematicTree
 from symphys.types import Expr
 
-CORRECTIONS = 2
+CORRECTION_STEPS = 2
 """Each leaves an error smaller by the angle of a step."""
 
 
@@ -57,7 +57,7 @@ class Deviation:
     screw: SpatialVector
 
 
-STILL = Deviation(Momentum(ca.SX.zeros(3), ca.SX.zeros(3)), SpatialVector(ca.SX(6, 1)))
+NO_DEVIATION = Deviation(Momentum(ca.SX.zeros(3), ca.SX.zeros(3)), SpatialVector(ca.SX(6, 1)))
 """Of a frame."""
 
 
@@ -99,43 +99,43 @@ def update_configuration(
     """
     places, tree, matrix = [motion.position for motion in motions], coordinates.tree, coordinates.matrix
     starts = joint_starts(kinematic_tree, joints, [motion.predicted_path() for motion in motions])
-    numbers = apart(numbering(tree), along.numbers)
+    numbers = split_rates(numbering(tree), along.numbers)
     moved = tree_motion(tree, matrix, numbers)
-    aims = [_aim(*each) for each in zip(moved.screws, coordinates.bodies, places, strict=True)]
+    aims = [_target_pose(*each) for each in zip(moved.screws, coordinates.bodies, places, strict=True)]
     bodies = [(motion.counted_mass, motion.position - places[0]) for motion in motions]
     frames = [motion.massless for motion in motions]
-    wanted = turned = chosen(tree, moved.rates)
-    for k in range(CORRECTIONS + 1):
+    wanted = turned = select_rotors(tree, moved.rates)
+    for k in range(CORRECTION_STEPS + 1):
         arrived = final_poses(kinematic_tree, joints, starts, places, moved.rates)
         beside = tuple(
-            STILL if frame else _beside(*body, placed, aim, at)
+            NO_DEVIATION if frame else _deviation(*body, placed, aim, at)
             for frame, body, placed, aim, at in zip(frames, bodies, coordinates.bodies, aims, arrived, strict=True)
         )
-        turned = _differences(chosen(tree, moved.rates), wanted)
-        if k < CORRECTIONS:
-            numbers = _less(numbers, solve(tree, matrix, [each.screw for each in beside], turned))
+        turned = _rate_differences(select_rotors(tree, moved.rates), wanted)
+        if k < CORRECTION_STEPS:
+            numbers = _subtract_rates(numbers, solve(tree, matrix, [each.screw for each in beside], turned))
             moved = tree_motion(tree, matrix, numbers)
-    arrived, beside = _kept(coordinates, joints[0] is None, bodies, arrived, beside, turned[0])
+    arrived, beside = _conserve_momentum(coordinates, joints[0] is None, bodies, arrived, beside, turned[0])
     if by_loops is None:
         return arrived, tuple(JointCorrection(each.made) for each in beside), RotorCorrection(turned), moved.rates
-    loops = tree_motion(tree, matrix, apart(numbering(tree), by_loops.numbers))
+    loops = tree_motion(tree, matrix, split_rates(numbering(tree), by_loops.numbers))
     made = tuple(
-        JointCorrection(each.made, STILL.made) if frame else _made(each, placed, screw)
+        JointCorrection(each.made, NO_DEVIATION.made) if frame else _joint_correction(each, placed, screw)
         for frame, each, placed, screw in zip(frames, beside, coordinates.bodies, loops.screws, strict=True)
     )
-    return arrived, made, RotorCorrection(turned, chosen(tree, loops.rates)), moved.rates
+    return arrived, made, RotorCorrection(turned, select_rotors(tree, loops.rates)), moved.rates
 
 
-def _differences(after: Rates, before: Rates) -> Rates:
+def _rate_differences(after: Rates, before: Rates) -> Rates:
     return tuple(None if a is None or b is None else a - b for a, b in zip(after, before, strict=True))
 
 
 @traced
-def _less(numbers: TreeRates, by: TreeRates) -> TreeRates:
+def _subtract_rates(numbers: TreeRates, by: TreeRates) -> TreeRates:
     return TreeRates(numbers.r - by.r, tuple(a - b for a, b in zip(numbers.z, by.z, strict=True)))
 
 
-def _kept(
+def _conserve_momentum(
     coordinates: GeneralizedCoordinates,
     floats: bool,
     bodies: Sequence[tuple[Expr, Expr]],
@@ -148,26 +148,29 @@ def _kept(
     A tree that floats is shifted; else, and for spin, the root's share of momenta changes: of momenta only those along
     free motions count in the end (``forward_dynamics.consistent``), so it does not matter whose they are.
     """
-    total, mass = _total(tuple(each.screw for each in beside), tuple(mass for mass, _ in bodies))
+    total, mass = _total_momentum(tuple(each.screw for each in beside), tuple(mass for mass, _ in bodies))
     if floats:
-        moved = [_shifted(*each, total, mass) for each in zip(bodies, arrived, beside, strict=True)]
+        moved = [_shift_body(*each, total, mass) for each in zip(bodies, arrived, beside, strict=True)]
         # what has no mass moves along, and has no momentum
-        moved = [(pose, STILL if was is STILL else more) for (pose, more), was in zip(moved, beside, strict=True)]
+        moved = [
+            (pose, NO_DEVIATION if was is NO_DEVIATION else more)
+            for (pose, more), was in zip(moved, beside, strict=True)
+        ]
         arrived, beside = (tuple(each) for each in zip(*moved, strict=True))
-        total = _total(tuple(each.screw for each in beside), ())[0]
+        total = _total_momentum(tuple(each.screw for each in beside), ())[0]
     rotor = None if rotor is None else coordinates.tree.armature[0] * rotor
-    mass_of_root = ca.SX(1) if beside[0] is STILL else bodies[0][0]
-    root = _without(beside[0], coordinates.tree.impulses[0], total, mass_of_root, floats, rotor)
+    mass_of_root = ca.SX(1) if beside[0] is NO_DEVIATION else bodies[0][0]
+    root = _remove_root_momentum(beside[0], coordinates.tree.impulses[0], total, mass_of_root, floats, rotor)
     return tuple(arrived), (root, *beside[1:])
 
 
 @traced
-def _total(screws: tuple[SpatialVector, ...], masses: tuple[Expr, ...]) -> tuple[SpatialVector, Expr]:
+def _total_momentum(screws: tuple[SpatialVector, ...], masses: tuple[Expr, ...]) -> tuple[SpatialVector, Expr]:
     return SpatialVector(sum(each.parts for each in screws)), sum(masses)
 
 
 @traced
-def _shifted(
+def _shift_body(
     body: tuple[Expr, Expr], arrived: FinalPose, beside: Deviation, total: SpatialVector, mass: Expr
 ) -> tuple[FinalPose, Deviation]:
     by = total.parts[3:] / mass
@@ -177,7 +180,7 @@ def _shifted(
 
 
 @traced
-def _without(
+def _remove_root_momentum(
     beside: Deviation, axes: Expr, total: SpatialVector, mass: Expr, floats: bool, rotor: Expr | None
 ) -> Deviation:
     """Return orthogonal directions of conserved momentum, about turning and along sliding axes."""
@@ -193,19 +196,19 @@ def _without(
 
 
 @traced
-def _made(beside: Deviation, placed: BodyPlace, loops: SpatialVector) -> JointCorrection:
+def _joint_correction(beside: Deviation, placed: BodyPlace, loops: SpatialVector) -> JointCorrection:
     linear, angular = spatial.at_place(loops.parts, placed.place)
     return JointCorrection(beside.made, Momentum(linear, ca.mtimes(placed.inertia, angular)))
 
 
 @traced
-def _aim(screw: SpatialVector, placed: BodyPlace, position: Expr) -> TargetPose:
+def _target_pose(screw: SpatialVector, placed: BodyPlace, position: Expr) -> TargetPose:
     linear, angular = spatial.at_place(screw.parts, placed.place)
     return TargetPose(position + linear, angular, rotation.exponential(-angular))
 
 
 @traced
-def _beside(mass: Expr, counted: Expr, placed: BodyPlace, aim: TargetPose, arrived: FinalPose) -> Deviation:
+def _deviation(mass: Expr, counted: Expr, placed: BodyPlace, aim: TargetPose, arrived: FinalPose) -> Deviation:
     linear = arrived.position - aim.position
     more = rotation.multiply(arrived.turn, aim.back)
     small = 2 * ca.if_else(more[0] < 0, -more[1:4], more[1:4])

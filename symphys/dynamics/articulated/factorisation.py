@@ -11,9 +11,9 @@ from symphys.types import Expr
 
 Sparse = dict[int, Expr]
 """Entries of a vector by index; what is not there is zero."""
-ROUNDING = 1e-15
+MIN_PIVOT_SHARE = 1e-15
 """Smallest pivot as a share of its entry on the diagonal: a smaller one is rounding, as of joints far apart."""
-TINY = 1e-60
+MIN_PIVOT = 1e-60
 """[kg m^2] or [kg] Smallest pivot where that entry is 0."""
 
 
@@ -64,7 +64,7 @@ def factorise(rows: Sequence[Mapping[int, Expr]], symmetric: bool = False) -> Fa
     left, n = [dict(row) for row in rows], len(rows)
     lower, upper, pivots = ca.SX(n, n), ca.SX(n, n), ca.SX(n, 1)
     for k in reversed(range(n)):
-        least = ROUNDING * ca.fabs(rows[k][k]) + TINY
+        least = MIN_PIVOT_SHARE * ca.fabs(rows[k][k]) + MIN_PIVOT
         pivots[k] = reciprocal(ca.if_else(ca.fabs(left[k][k]) < least, least, left[k][k]))
         above = [j for j in left[k] if j < k]
         for j in above:

@@ -13,7 +13,7 @@ import casadi as ca
 from symphys.dynamics.articulated import spatial
 from symphys.dynamics.articulated.branches import Tree, TreeMotion, axes_at, solve, tree_matrix, tree_motion
 from symphys.dynamics.articulated.rotors import armatures, joint_rates
-from symphys.dynamics.articulated.schur_complement import SpatialInertia, SpatialVector, mirrored
+from symphys.dynamics.articulated.schur_complement import SpatialInertia, SpatialVector, symmetric_copy
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.motion import PredictedMotion, in_world, inertia_matrix
 from symphys.dynamics.tracing.decorator import traced
@@ -25,8 +25,8 @@ from symphys.types import Expr
 
 Wrench = tuple[Expr, Expr]
 """Force [N] and torque [N m] about the centre of mass; also linear and angular acceleration."""
-NOW = ca.SX(0)
-NOTHING = ca.SX(3, 3)
+START = ca.SX(0)
+ZERO_INERTIA = ca.SX(3, 3)
 """The inertia of a frame."""
 _rotation = traced(rotation.matrix)
 
@@ -39,16 +39,16 @@ def accelerations(
 ) -> tuple[Wrench, ...]:
     """Return the accelerations of a tree's bodies from poses, velocities and all forces but those of joints."""
     origin = motions[0].position
-    axes = axes_at(kinematic_tree, joints, [m.predicted_path() for m in motions], NOW, origin)
+    axes = axes_at(kinematic_tree, joints, [m.predicted_path() for m in motions], START, origin)
     tree = Tree(kinematic_tree, axes, armature=armatures(kinematic_tree, joints))
-    tensors = [NOTHING if m.massless else world_inertia(m.inertia, m.rotation) for m in motions]
+    tensors = [ZERO_INERTIA if m.massless else world_inertia(m.inertia, m.rotation) for m in motions]
     bodies = [(m.counted_mass, tensor, m.position, origin) for m, tensor in zip(motions, tensors, strict=True)]
     matrix = tree_matrix(tree, [_inertia(*body) for body in bodies])
     momenta = [_momentum(*body, m.velocity, m.angular_velocity) for body, m in zip(bodies, motions, strict=True)]
     now = tree_motion(tree, matrix, solve(tree, matrix, momenta, joint_rates(tree, joints, motions)))
     biases = _biases(tree, joints, now)
     lacking = [
-        _lacking(*body, screw, bias, wrench)
+        _missing_force(*body, screw, bias, wrench)
         for body, screw, bias, wrench in zip(bodies, now.screws, biases, wrenches, strict=True)
     ]
     changes = tree_motion(tree, matrix, solve(tree, matrix, lacking)).screws
@@ -73,15 +73,15 @@ def consistent(
     """
     zero, origin = ca.SX.zeros(3), poses[0][0]
     turned = [_rotation(q) for _, q in poses]
-    still = (zero, zero, zero, zero, NOW, None, None)
+    still = (zero, zero, zero, zero, START, None, None)
     body_paths = [PredictedPath(p, r, *still) for (p, _), r in zip(poses, turned, strict=True)]
-    axes = axes_at(kinematic_tree, joints, body_paths, NOW, origin)
+    axes = axes_at(kinematic_tree, joints, body_paths, START, origin)
     tree = Tree(kinematic_tree, axes, armature=armatures(kinematic_tree, joints))
     parts = list(zip(inertials, poses, turned, momenta, strict=True))
     tensors = (world_inertia(inertia, r) for (_, inertia), _, r, _ in parts)
     inertias = [_inertia(mass, t, p, origin) for ((mass, _), (p, _), *_), t in zip(parts, tensors, strict=True)]
     # what acts on a frame counts, though its mass does not
-    counted = [_counted(ca.SX(1) if is_zero(mass) else mass, p, origin, m) for (mass, _), (p, _), _, m in parts]
+    counted = [_body_momentum(ca.SX(1) if is_zero(mass) else mass, p, origin, m) for (mass, _), (p, _), _, m in parts]
     matrix = tree_matrix(tree, inertias)
     moved = tree_motion(tree, matrix, solve(tree, matrix, counted, rates)).screws
     return tuple(_at_place(screw, p, origin) for screw, (p, _) in zip(moved, poses, strict=True))
@@ -90,7 +90,7 @@ def consistent(
 @traced
 def _inertia(mass: Expr, tensor: Expr, position: Expr, origin: Expr) -> SpatialInertia:
     place = position - origin
-    return SpatialInertia(mirrored(spatial.inertia_of(mass, tensor, place, place)))
+    return SpatialInertia(symmetric_copy(spatial.inertia_of(mass, tensor, place, place)))
 
 
 @traced
@@ -99,12 +99,12 @@ def _momentum(mass: Expr, tensor: Expr, position: Expr, origin: Expr, velocity: 
 
 
 @traced
-def _counted(mass: Expr, position: Expr, origin: Expr, momentum: Momentum) -> SpatialVector:
+def _body_momentum(mass: Expr, position: Expr, origin: Expr, momentum: Momentum) -> SpatialVector:
     return SpatialVector(spatial.about_origin(position - origin, mass * momentum.velocity, momentum.angular))
 
 
 @traced
-def _lacking(
+def _missing_force(
     mass: Expr, tensor: Expr, position: Expr, origin: Expr, screw: SpatialVector, bias: SpatialVector, wrench: Wrench
 ) -> SpatialVector:
     """Return the forces less those that the motion as it is needs."""
@@ -136,7 +136,7 @@ def _biases(tree: Tree, joints: spatial.Joints, now: TreeMotion) -> list[Spatial
             continue
         parent = None if link.parent is None else place[link.parent]
         above, moved = (None, None) if parent is None else (found[parent], now.screws[parent])
-        carriers = tuple(_carried_by_child(link, joint, j) for j in range(link.count))
+        carriers = tuple(_axis_moves_with_child(link, joint, j) for j in range(link.count))
         found.append(_bias(carriers, tree.seen[k], now.rates[k], now.screws[k], moved, above))
     return found
 
@@ -161,17 +161,17 @@ def _bias(
     for j, by_child in enumerate(carriers):
         carrier = own if by_child else parent
         if carrier is not None:
-            total = total + rates[j] * _carried(carrier.parts, axes[:, j])
+            total = total + rates[j] * _axis_rate(carrier.parts, axes[:, j])
     return SpatialVector(total)
 
 
-def _carried_by_child(link: Link, joint: Joint, coordinate: int) -> bool:
+def _axis_moves_with_child(link: Link, joint: Joint, coordinate: int) -> bool:
     """Whether the axis of a coordinate is fixed in the link's body; else it is in the parent, or the world."""
     first = bool(joint.kind.coordinates) and joint.kind.coordinates[coordinate].fixed_in_first
     return first == (link.sign > 0)
 
 
-def _carried(carrier: Expr, screw: Expr) -> Expr:
+def _axis_rate(carrier: Expr, screw: Expr) -> Expr:
     """(6,): how a spatial vector fixed in a body changes as the body moves."""
     w, v = carrier[:3], carrier[3:]
     return ca.vertcat(ca.cross(w, screw[:3]), ca.cross(w, screw[3:]) + ca.cross(v, screw[:3]))

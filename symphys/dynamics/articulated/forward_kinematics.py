@@ -44,7 +44,7 @@ class JointStart:
     righting: Expr
 
 
-HERE = FinalPose(ca.SX.zeros(3), ca.SX([1, 0, 0, 0]))
+WORLD_POSE = FinalPose(ca.SX.zeros(3), ca.SX([1, 0, 0, 0]))
 """The world."""
 
 
@@ -70,10 +70,10 @@ def final_poses(
     place, found = {link.body: k for k, link in enumerate(kinematic_tree.links)}, list[FinalPose]()
     for link, joint, start, position, moved in zip(kinematic_tree.links, joints, starts, positions, along, strict=True):
         if joint is None or start is None:
-            found.append(_floated(position, moved))
+            found.append(_free_pose(position, moved))
         else:
-            parent = HERE if link.parent is None else found[place[link.parent]]
-            found.append(_carried(joint, link.sign, start, parent, moved))
+            parent = WORLD_POSE if link.parent is None else found[place[link.parent]]
+            found.append(_pose_along_joint(joint, link.sign, start, parent, moved))
     return tuple(found)
 
 
@@ -85,17 +85,17 @@ def _joint_start(joint: Joint, sign: int, body_paths: tuple[PredictedPath, ...])
     wrong: Expr = joint.kind.errors(placed)
     back = -ca.mtimes(directions.turns.T, wrong[held:, 0]) if joint.kind.turns else ca.SX(3, 1)
     apart = ca.SX(3, 1) if directions.slides is None else placed.apart - ca.mtimes(directions.slides.T, wrong[:held, 0])
-    first = rotation.unit(ca.vertcat(1, back / 2)) if joint.kind.turns else HERE.turn
+    first = rotation.unit(ca.vertcat(1, back / 2)) if joint.kind.turns else WORLD_POSE.turn
     return JointStart((arms[1], arms[0]) if sign > 0 else (arms[0], arms[1]), apart, joint.kind.axes(placed), first)
 
 
 @traced
-def _floated(position: Expr, moved: Expr) -> FinalPose:
+def _free_pose(position: Expr, moved: Expr) -> FinalPose:
     return FinalPose(position + moved[:3], rotation.exponential(moved[3:]))
 
 
 @traced
-def _carried(joint: Joint, sign: int, start: JointStart, parent: FinalPose, moved: Expr) -> FinalPose:
+def _pose_along_joint(joint: Joint, sign: int, start: JointStart, parent: FinalPose, moved: Expr) -> FinalPose:
     turned, shift = joint.kind.transform(start.axes, moved)
     apart, turned = start.apart + shift, rotation.multiply(turned, start.righting)
     relative = turned if sign > 0 else ca.vertcat(turned[0], -turned[1:])

@@ -24,9 +24,9 @@ from symphys.dynamics.articulated.impulse_response import (
     body_jacobians,
     coordinate_responses,
     numbering,
-    spread,
+    scatter,
 )
-from symphys.dynamics.articulated.rotors import Rates, armatures, chosen, joint_rates
+from symphys.dynamics.articulated.rotors import Rates, armatures, joint_rates, select_rotors
 from symphys.dynamics.articulated.schur_complement import SpatialInertia, SpatialVector
 from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import traced
@@ -82,10 +82,12 @@ def generalized_coordinates(
     body_paths = [motion.predicted_path() for motion in motions]
     seen, given = (axes_at(kinematic_tree, joints, body_paths, t, origin) for t in (middle, ca.SX(0)))
     tree = Tree(kinematic_tree, seen, given, armatures(kinematic_tree, joints))
-    parts = [_counted(motion, momentum, origin, middle) for motion, momentum in zip(motions, free, strict=True)]
+    parts = [
+        _body_at_mid_step(motion, momentum, origin, middle) for motion, momentum in zip(motions, free, strict=True)
+    ]
     bodies, inertias, momenta = zip(*parts, strict=True)
     matrix = tree_matrix(tree, inertias)
-    rates = _joined(numbering(tree), solve(tree, matrix, momenta, joint_rates(tree, joints, motions)))
+    rates = _join_rates(numbering(tree), solve(tree, matrix, momenta, joint_rates(tree, joints, motions)))
     places = [
         (motion.position - origin, body) if on else None
         for motion, body, on in zip(motions, bodies, reached, strict=True)
@@ -97,17 +99,19 @@ def generalized_coordinates(
 
 def body_momenta(coordinates: GeneralizedCoordinates, rates: Any) -> tuple[Momentum, ...]:
     """Return the momenta of the bodies of a tree from its generalized velocities."""
-    return tuple(_momentum(*each) for each in zip(_moving(coordinates, rates), coordinates.bodies, strict=True))
+    return tuple(_momentum(*each) for each in zip(_tree_motion(coordinates, rates), coordinates.bodies, strict=True))
 
 
 def rotor_rates(coordinates: GeneralizedCoordinates, rates: Any) -> Rates:
     """Return the rates of the links with rotors from the tree's generalized velocities."""
-    numbers = apart(numbering(coordinates.tree), rates.numbers)
-    return chosen(coordinates.tree, tree_motion(coordinates.tree, coordinates.matrix, numbers).rates)
+    numbers = split_rates(numbering(coordinates.tree), rates.numbers)
+    return select_rotors(coordinates.tree, tree_motion(coordinates.tree, coordinates.matrix, numbers).rates)
 
 
-def _moving(coordinates: GeneralizedCoordinates, rates: Any) -> tuple[SpatialVector, ...]:
-    return tree_motion(coordinates.tree, coordinates.matrix, apart(numbering(coordinates.tree), rates.numbers)).screws
+def _tree_motion(coordinates: GeneralizedCoordinates, rates: Any) -> tuple[SpatialVector, ...]:
+    return tree_motion(
+        coordinates.tree, coordinates.matrix, split_rates(numbering(coordinates.tree), rates.numbers)
+    ).screws
 
 
 @traced
@@ -117,7 +121,7 @@ def _momentum(screw: SpatialVector, body: BodyPlace) -> Momentum:
 
 
 @traced
-def _counted(
+def _body_at_mid_step(
     motion: PredictedMotion, free: Momentum, origin: Expr, middle: Expr
 ) -> tuple[BodyPlace, SpatialInertia, SpatialVector]:
     """A body at mid-step, its inertia from velocities at mid-step to momenta at the start, and its free momentum.
@@ -149,13 +153,13 @@ def mass_matrix(coordinates: GeneralizedCoordinates) -> Expr:
 
 
 @traced
-def _joined(numbering: Numbering, rates: TreeRates) -> Expr:
-    return spread(numbering, (rates.r, *rates.z))
+def _join_rates(numbering: Numbering, rates: TreeRates) -> Expr:
+    return scatter(numbering, (rates.r, *rates.z))
 
 
 @traced
 @traced
-def apart(numbering: Numbering, numbers: Expr) -> TreeRates:
+def split_rates(numbering: Numbering, numbers: Expr) -> TreeRates:
     """Generalized velocities of a tree, by its root and branches."""
     r, *z = (numbers[list(each), 0] for each in numbering)
     return TreeRates(r, tuple(z))

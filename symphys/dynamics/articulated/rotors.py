@@ -63,6 +63,6 @@ def _rate(turning: bool, axes: Expr, own: tuple[Expr, Expr, Expr], parent: tuple
     return ca.mtimes(axes[:3, :].T, spin) if turning else ca.mtimes(axes[3:, :].T, velocity)
 
 
-def chosen(tree: Tree, rates: Columns) -> Rates:
+def select_rotors(tree: Tree, rates: Columns) -> Rates:
     """Select the rates of links that have rotors."""
     return tuple(None if armature is None else rate for armature, rate in zip(tree.armature, rates, strict=True))

@@ -114,7 +114,7 @@ def branch_matrix(
         for k, value in block.solve({k: -pulls[k, j] for k in range(n)}).items():
             follows[k, j] = value
     at_root = ca.mtimes(root_given.T, ca.mtimes(base, axes.root_seen)) + ca.mtimes(pushes, follows)
-    return BranchMatrix(block, follows, pushes, mirrored(at_root) if symmetric else at_root)
+    return BranchMatrix(block, follows, pushes, symmetric_copy(at_root) if symmetric else at_root)
 
 
 @traced
@@ -162,10 +162,10 @@ def root_rates(
     right = ca.mtimes(given.T, momentum.parts) + (0 if rotor is None else rotor)
     for each in branches:
         right += each
-    return solved(matrix, right)
+    return solve_factored(matrix, right)
 
 
-def solved(matrix: Factorisation, right: Expr) -> Expr:
+def solve_factored(matrix: Factorisation, right: Expr) -> Expr:
     """(n,) for a right hand side (n,)."""
     n = right.size1()
     return dense(matrix.solve({k: right[k] for k in range(n) if right.has_nz(k, 0)}), n)
@@ -196,7 +196,7 @@ def summed_down(above: Parents, axes: Columns, rates: Expr, root: Expr) -> list[
     return found
 
 
-def mirrored(matrix: Expr) -> Expr:
+def symmetric_copy(matrix: Expr) -> Expr:
     """A symmetric matrix whose halves are the same expressions."""
     return ca.triu2symm(ca.triu(ca.densify(matrix)))
 

@@ -69,14 +69,14 @@ RULES: dict[tuple[type, type], Rule] = {
 """Which rule covers which surfaces; ``shapes.POINTS`` says how many points each returns."""
 
 
-APART = frozenset({(Capsule, Plane), (Box, Plane), (Capsule, Capsule)})
+SEPARATE_POINTS = frozenset({(Capsule, Plane), (Box, Plane), (Capsule, Capsule)})
 """Pairs whose points have little in common: each is computed by itself, so that it may be far by itself."""
 
 
 def collide(first: Surface, second: Surface, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """The contacts of two surfaces, carried along a and b, in this step: one for each point."""
     kinds = type(first), type(second)
-    if kinds in APART:
+    if kinds in SEPARATE_POINTS:
         return [_point(k, first, second, a, b) for k in range(points_of_kinds(*kinds))]
     return _points(first, second, a, b)
 

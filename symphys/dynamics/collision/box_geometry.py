@@ -16,17 +16,17 @@ from symphys.types import Expr
 
 PARALLEL = 1e-6
 """Square of the sine of the angle below which edges count as parallel."""
-FACES_FIRST = 1e-6
+EDGE_MARGIN = 1e-6
 """Of the boxes' size: how much farther apart than faces edges must be for a contact of edges."""
 TINY_CHANGE = 1e-15
 """[m] a distance that changes less than this over the step does not change."""
-STEP_UP = 0.0015
+MAX_STEP_UP = 0.0015
 """[m] the highest step onto which a box slides: less of an overlap with a top does not count as one with its side."""
-THIN = 0.1
+MAX_STEP_UP_SHARE = 0.1
 """That step is at most this share of the shortest edge of both boxes."""
-FLUSH = 1e-6
+MIN_OVERLAP = 1e-6
 """[m] Smallest overlap that counts in directions that are not upright; less is within the tolerance of a contact."""
-UPRIGHT = 0.7
+MIN_VERTICAL_COSINE = 0.7
 """Cosine of the angle from the vertical within which a direction of separation belongs to a top."""
 
 
@@ -84,7 +84,7 @@ def moving_box(shape: Box | Capsule, body_path: PredictedPath) -> MovingBox:
     return MovingBox(body_path.path(shape.centre), axes(body_path, shape), halves, velocity, body_path.gravity)
 
 
-def facing(box: MovingBox, direction: Expr, t: Expr) -> Face:
+def nearest_face(box: MovingBox, direction: Expr, t: Expr) -> Face:
     """The face whose outward normal is nearest to ``direction`` at time t."""
     along = [ca.dot(axis.at(t), direction) for axis in box.axes]
     first = ca.logic_and(ca.fabs(along[0]) >= ca.fabs(along[1]), ca.fabs(along[0]) >= ca.fabs(along[2]))
@@ -115,7 +115,7 @@ def faces_and_edges(a: MovingBox, b: MovingBox) -> tuple[list[Parabola], list[Pa
 
 
 @dataclass(frozen=True)
-class Nearing:
+class BoxOverlap:
     """How two boxes come to overlap, along the direction along which they do so last.
 
     Attributes:
@@ -132,20 +132,20 @@ class Nearing:
     apart: Expr
 
 
-def nearing(
+def first_overlap(
     a: MovingBox, b: MovingBox, faces: list[Parabola], edges: list[Parabola], dt: Expr, radius: Expr = 0.0
-) -> Nearing:
+) -> BoxOverlap:
     """Find when and along which direction two boxes come to overlap, the first of them grown by ``radius``.
 
     The direction is the one along which they overlap last, the first of equals. It is found on the straight paths along
     the true velocities, without weight, since the support of a box cancels its weight. An overlap that is smaller than
     a tolerance does not count. So a box that slides on a top meets no
-    side of a block whose top is as high, lower, or higher by up to ``STEP_UP``: there it comes onto the top.
+    side of a block whose top is as high, lower, or higher by up to ``MAX_STEP_UP``: there it comes onto the top.
     """
     directions, still = [*faces, *edges], (a.centre - b.centre).start
-    starts = places(a, b, faces, edges, ca.SX(0), still, radius)
-    ends = places(a, b, faces, edges, dt, (a.centre - b.centre).at(dt), radius)
-    ways = places(a, b, faces, edges, dt, still + dt * (a.velocity - b.velocity), radius)
+    starts = overlap_places(a, b, faces, edges, ca.SX(0), still, radius)
+    ends = overlap_places(a, b, faces, edges, dt, (a.centre - b.centre).at(dt), radius)
+    ways = overlap_places(a, b, faces, edges, dt, still + dt * (a.velocity - b.velocity), radius)
     allowed = tolerances(a, b, directions)
     best, last, largest, first_exit, met = directions[0], ca.SX(-1), ca.SX(0), ca.SX(1), ca.SX(0)
     for direction, tolerance, (before, reach), (after, reach_after), (led, _) in zip(
@@ -162,22 +162,24 @@ def nearing(
         best, last = chosen(later, side * direction, best), ca.if_else(later, enters, last)
         largest = ca.if_else(later, start, largest)
     apart = ca.logic_or(met > first_exit, met >= 1)
-    return Nearing(steady(best, met * dt, dt), met * dt, largest, apart)
+    return BoxOverlap(steady(best, met * dt, dt), met * dt, largest, apart)
 
 
 def tolerances(a: MovingBox, b: MovingBox, directions: list[Parabola]) -> list[Expr]:
     """Return for each direction the overlap [m] that is tolerated along it."""
     gravity = a.gravity if a.gravity is not None else b.gravity
     if gravity is None:
-        return [ca.SX(FLUSH)] * len(directions)
-    step = ca.fmin(STEP_UP, THIN * 2 * shortest([*a.halves, *b.halves]))
-    return [ca.if_else(leans_little(direction.start, gravity), step, FLUSH) for direction in directions]
+        return [ca.SX(MIN_OVERLAP)] * len(directions)
+    step = ca.fmin(MAX_STEP_UP, MAX_STEP_UP_SHARE * 2 * shortest([*a.halves, *b.halves]))
+    return [ca.if_else(is_nearly_vertical(direction.start, gravity), step, MIN_OVERLAP) for direction in directions]
 
 
-def leans_little(direction: Expr, gravity: Expr) -> Expr:
+def is_nearly_vertical(direction: Expr, gravity: Expr) -> Expr:
     """1 if a direction (3,) is near the vertical, which there is only with gravity."""
     lean = ca.dot(direction, gravity)
-    return lean * lean > UPRIGHT * UPRIGHT * ca.dot(direction, direction) * ca.dot(gravity, gravity)
+    return lean * lean > MIN_VERTICAL_COSINE * MIN_VERTICAL_COSINE * ca.dot(direction, direction) * ca.dot(
+        gravity, gravity
+    )
 
 
 def shortest(halves: list[Expr]) -> Expr:
@@ -197,7 +199,7 @@ def crossed(start: Expr, end: Expr) -> Expr:
     return ca.if_else(crosses, start / ca.if_else(crosses, start - end, 1), 1)
 
 
-def places(
+def overlap_places(
     a: MovingBox,
     b: MovingBox,
     faces: list[Parabola],
@@ -220,6 +222,6 @@ def places(
             found.append((place / ca.sqrt(square), reach / ca.sqrt(square) + radius))
             continue
         parallel, scale = square < PARALLEL, ca.sqrt(ca.fmax(square, PARALLEL))
-        across = ca.if_else(parallel, 2 * size, reach / scale + FACES_FIRST * size)
+        across = ca.if_else(parallel, 2 * size, reach / scale + EDGE_MARGIN * size)
         found.append((ca.if_else(parallel, 0, place / scale), across + radius))
     return found

@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics.collision.near_points import Sight, Travel, can_measure, measured, near_points
+from symphys.dynamics.collision.near_points import MotionBound, SweptBound, can_measure, measured, near_points
 from symphys.dynamics.context import State, StepContext, StepSettings
 from symphys.dynamics.motion import inertia_matrix
 from symphys.dynamics.tracing.decorator import guard, traced
@@ -28,7 +28,7 @@ from symphys.model.shapes.shape import SolidShape
 from symphys.model.world import Side, World
 from symphys.types import Expr
 
-FEWEST = 12
+MIN_PAIRS = 12
 """Pairs of surfaces from which on looking for those that are far costs less than it saves."""
 
 
@@ -39,12 +39,12 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
     """
     world, settings = context.world, context.settings
     points = Counter((pair.first, pair.second) for pair in world.pairs)
-    if len(points) < FEWEST:
+    if len(points) < MIN_PAIRS:
         return ()
     held = {index for joint in world.joints for index in joint.bodies}
-    bodies, fastest = _sights(context, x)
+    bodies, fastest = _motion_bounds(context, x)
     dt = settings.scheme.dt
-    reach, found = Travel(dt, fastest), dict[tuple[Side, Side], list[Expr]]()
+    reach, found = SweptBound(dt, fastest), dict[tuple[Side, Side], list[Expr]]()
     for (first, second), count in points.items():
         radii = _radius(world, first, held), _radius(world, second, held)
         if first.body is None or radii[0] is None or radii[1] is None:
@@ -58,7 +58,7 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
                 near = guard(_near_plane(a, (plane.normal, plane.offset), radii[0], reach, settings))
         else:
             b = bodies[second.body]
-            near = guard(_near(a, b, radii[0] + radii[1], reach, settings))
+            near = guard(_near_pair(a, b, radii[0] + radii[1], reach, settings))
         if measured(shapes, (a, b)):
             words = near_points(shapes, (a, b), near, reach, settings.smoothing)
             found[first, second] = [guard(word) for (word,) in words]
@@ -68,17 +68,17 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
     return tuple(next(lists[pair.first, pair.second]) for pair in world.pairs)
 
 
-def _sights(context: StepContext, x: State) -> tuple[list[Sight], Expr]:
+def _motion_bounds(context: StepContext, x: State) -> tuple[list[MotionBound], Expr]:
     """Return the bounds of all bodies, and the greatest speed of a point of any [m/s]."""
     world = context.world
-    bodies = [_sight(x, body, context, can_measure(body)) for body in world.bodies]
+    bodies = [_motion_bound(x, body, context, can_measure(body)) for body in world.bodies]
     fastest: Expr = ca.SX(0)
-    for sight, body in zip(bodies, world.bodies, strict=True):
-        fastest = _faster(fastest, sight, _arm(body))
+    for bound, body in zip(bodies, world.bodies, strict=True):
+        fastest = _max_speed(fastest, bound, _body_arm(body))
     return bodies, fastest
 
 
-def _sight(x: State, body: Body, context: StepContext, turned: bool) -> Sight:
+def _motion_bound(x: State, body: Body, context: StepContext, turned: bool) -> MotionBound:
     """Bound the motion of a body; a frame without mass counts as 1 kg, as in ``PredictedMotion``."""
     position, velocity = x[f"{body.name}.position"], x[f"{body.name}.velocity"]
     forces, torques = (
@@ -88,26 +88,28 @@ def _sight(x: State, body: Body, context: StepContext, turned: bool) -> Sight:
     )
     mass = 1.0 if body.massless else body.mass
     settings = context.settings
-    seen = _seen(position, velocity, forces, mass, settings.gravity, settings.scheme.dt)
+    seen = _linear_bound(position, velocity, forces, mass, settings.gravity, settings.scheme.dt)
     if not turned:
         return seen
     least = float(np.linalg.eigvalsh(np.array(ca.DM(inertia_matrix(body.inertia))))[0])
     turning = x[f"{body.name}.orientation"], x[f"{body.name}.angular_velocity"]
-    return _turned(seen, turning, torques, least, settings.scheme.dt)
+    return _angular_bound(seen, turning, torques, least, settings.scheme.dt)
 
 
 @traced
-def _seen(position: Expr, velocity: Expr, forces: tuple[Expr, Expr], mass: Expr, gravity: Expr, dt: Expr) -> Sight:
-    gained = dt * (length(forces[0]) + length(forces[1])) / mass
-    return Sight(position, velocity, gained, length(velocity) + gained + dt * length(gravity))
+def _linear_bound(
+    position: Expr, velocity: Expr, forces: tuple[Expr, Expr], mass: Expr, gravity: Expr, dt: Expr
+) -> MotionBound:
+    speed_gain = dt * (length(forces[0]) + length(forces[1])) / mass
+    return MotionBound(position, velocity, speed_gain, length(velocity) + speed_gain + dt * length(gravity))
 
 
 @traced
-def _turned(
-    seen: Sight, turning: tuple[Expr, Expr], torques: tuple[Expr, Expr], least_inertia: float, dt: Expr
-) -> Sight:
+def _angular_bound(
+    seen: MotionBound, turning: tuple[Expr, Expr], torques: tuple[Expr, Expr], least_inertia: float, dt: Expr
+) -> MotionBound:
     spin = length(turning[1]) + dt * (length(torques[0]) + length(torques[1])) / least_inertia
-    return Sight(seen.position, seen.velocity, seen.gained, seen.speed, rotation.matrix(turning[0]), spin)
+    return MotionBound(seen.position, seen.velocity, seen.speed_gain, seen.speed, rotation.matrix(turning[0]), spin)
 
 
 def _radius(world: World, side: Side, held: set[int]) -> float | None:
@@ -121,26 +123,28 @@ def _radius(world: World, side: Side, held: set[int]) -> float | None:
     return hypot(*surface.centre) + surface.extent
 
 
-def _arm(body: Body) -> float:
+def _body_arm(body: Body) -> float:
     """Return the distance from a body's centre of mass to the farthest point of its shapes [m]."""
     sizes = [(shape.centre, shape.sizes) for shape in body.shapes]
     return max((hypot(*shape.centre) + shape.extent for shape in body.shapes), default=0.0) if is_number(sizes) else 0.0
 
 
 @traced
-def _faster(fastest: Expr, sight: Sight, arm: float) -> Expr:
+def _max_speed(fastest: Expr, bound: MotionBound, arm: float) -> Expr:
     """The greatest speed of a point of any body so far [m/s]."""
-    return ca.fmax(fastest, sight.speed + sight.swing(arm))
+    return ca.fmax(fastest, bound.speed + bound.swing_speed(arm))
 
 
 @traced
-def _near(a: Sight, b: Sight, radii: float, reach: Travel, settings: StepSettings) -> Expr:
+def _near_pair(a: MotionBound, b: MotionBound, radii: float, reach: SweptBound, settings: StepSettings) -> Expr:
     ahead = reach.of_centres(a, b)
     return ca.logic_or(length(a.position - b.position) < radii + ahead, settings.smoothing > 0)
 
 
 @traced
-def _near_plane(a: Sight, plane: tuple[Any, Any], radius: float, reach: Travel, settings: StepSettings) -> Expr:
+def _near_plane(
+    a: MotionBound, plane: tuple[Any, Any], radius: float, reach: SweptBound, settings: StepSettings
+) -> Expr:
     normal, offset = plane
     height = ca.dot(ca.vertcat(*normal), a.position) - offset
     return ca.logic_or(height < radius + reach.of_centres(a, None), settings.smoothing > 0)

@@ -39,7 +39,7 @@ class Displacement:
         return point + self.linear + ca.cross(self.angular, arm)
 
 
-UNMOVED = Displacement(ca.SX.zeros(3), ca.SX.zeros(3))
+ZERO_DISPLACEMENT = Displacement(ca.SX.zeros(3), ca.SX.zeros(3))
 """The displacement of what is static."""
 
 

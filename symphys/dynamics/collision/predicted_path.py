@@ -58,7 +58,7 @@ def _parabola(start: Expr, velocity: Expr, acceleration: Expr, t: Expr) -> Expr:
     return start + t * velocity + t * t / 2 * acceleration
 
 
-STAYS = Parabola(ca.SX.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3))
+ZERO_PATH = Parabola(ca.SX.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3))
 """The path of a vector that is zero."""
 
 
@@ -99,7 +99,7 @@ class PredictedPath:
     def arm(self, offset: Sequence[Any]) -> Parabola:
         """The path of the body-frame vector ``offset``, in world coordinates."""
         if all(is_zero(c) for c in offset):
-            return STAYS
+            return ZERO_PATH
         arm = ca.mtimes(self.rotation, ca.vertcat(*offset))
         swing = ca.cross(self.angular_velocity, arm)
         bend = ca.cross(self.angular_velocity, swing) + ca.cross(self.angular_acceleration, arm)
@@ -124,8 +124,8 @@ class StillPath(PredictedPath):
     def arm(self, offset: Sequence[Any]) -> Parabola:
         """Implement ``PredictedPath.arm`` without products with zero."""
         if all(is_zero(c) for c in offset):
-            return STAYS
-        return Parabola(ca.mtimes(self.rotation, ca.vertcat(*offset)), STAYS.velocity, STAYS.acceleration)
+            return ZERO_PATH
+        return Parabola(ca.mtimes(self.rotation, ca.vertcat(*offset)), ZERO_PATH.velocity, ZERO_PATH.acceleration)
 
 
 def at_rest(dt: Expr) -> PredictedPath:

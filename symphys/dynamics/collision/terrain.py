@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact
-from symphys.dynamics.collision.predicted_path import STAYS, PredictedPath, at_rest
+from symphys.dynamics.collision.predicted_path import ZERO_PATH, PredictedPath, at_rest
 from symphys.dynamics.collision.signed_distance import InField
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.model.shapes import Terrain
@@ -23,15 +23,15 @@ from symphys.types import Expr
 
 FOOT_STEPS = 3
 """Newton steps towards the foot of a perpendicular."""
-CONVEX = 0.1
+MIN_DETERMINANT = 0.1
 """Least determinant of the squared distance's Hessian for Newton's method; else Gauss-Newton."""
-FOUND = 0.1
+MAX_FOOT_ERROR = 0.1
 """How far from perpendicular a line to the surface may be, as a share of its length, and count as a distance."""
-LONGEST = 10.0
+MAX_STEP_RATIO = 10.0
 """Longest step of that search, as a multiple of the height over the surface."""
-SHORT = 0.1
+FREE_STEP = 0.1
 """[m] A step of this length is always allowed, since points near the surface need no bound."""
-TINY_AREA = 1e-12
+MIN_AREA = 1e-12
 """[m^2] below which squares of lengths count as zero there."""
 Surface = Callable[[Expr], tuple[Expr, Expr, Expr]]
 """Of (2,) x, y: the height, its gradient (2,) and its Hessian (2, 2)."""
@@ -75,11 +75,11 @@ def foot(surface: Surface, point: Expr) -> Expr:
     for _ in range(FOOT_STEPS):
         height, slope, bend = surface(xy)
         over = point[2] - height
-        longest = LONGEST * ca.fabs(over) + SHORT if longest is None else longest
+        longest = MAX_STEP_RATIO * ca.fabs(over) + FREE_STEP if longest is None else longest
         residual = xy - point[:2] - over * slope
         rough = ca.SX.eye(2) + ca.mtimes(slope, slope.T)
         exact = rough - over * bend
-        convex = ca.logic_and(exact[0, 0] > CONVEX, determinant(exact) > CONVEX)
+        convex = ca.logic_and(exact[0, 0] > MIN_DETERMINANT, determinant(exact) > MIN_DETERMINANT)
         step = solved(ca.if_else(convex, exact, rough), residual)
         xy = xy - ca.fmin(ca.fmax(step, -longest), longest)
     return xy
@@ -92,8 +92,8 @@ def nearest(surface: Surface, point: Expr) -> Expr:
     line, normal = point - ca.vertcat(xy, height), upwards(slope)
     along = ca.dot(line, normal)
     aside = line - along * normal
-    perpendicular = ca.dot(aside, aside) <= FOUND**2 * ca.dot(line, line) + TINY_AREA
-    same_side = along * (point[2] - surface(point[:2])[0]) >= -TINY_AREA
+    perpendicular = ca.dot(aside, aside) <= MAX_FOOT_ERROR**2 * ca.dot(line, line) + MIN_AREA
+    same_side = along * (point[2] - surface(point[:2])[0]) >= -MIN_AREA
     return ca.if_else(ca.logic_and(perpendicular, same_side), xy, point[:2])
 
 
@@ -103,9 +103,9 @@ def determinant(m: Expr) -> Expr:
 
 
 def solved(m: Expr, b: Expr) -> Expr:
-    """(2,): m^-1 b of a matrix with a determinant of at least ``CONVEX``, whatever rounding leaves of it."""
+    """(2,): m^-1 b of a matrix with a determinant of at least ``MIN_DETERMINANT``, whatever rounding leaves of it."""
     found = ca.vertcat(m[1, 1] * b[0] - m[0, 1] * b[1], m[0, 0] * b[1] - m[1, 0] * b[0])
-    return found / ca.fmax(determinant(m), CONVEX)
+    return found / ca.fmax(determinant(m), MIN_DETERMINANT)
 
 
 def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: PredictedPath) -> Contact:
@@ -117,7 +117,7 @@ def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: Pr
     for _ in range(2):
         xy = nearest(surface, centre)
         geometry = InField(
-            Paraboloid(xy, *surface(xy)), radius, path, (a.arm(offset), STAYS), (path.start, STAYS.start), axes
+            Paraboloid(xy, *surface(xy)), radius, path, (a.arm(offset), ZERO_PATH), (path.start, ZERO_PATH.start), axes
         )
         contact = contact_along(geometry, a.dt)
         centre = path.at(contact.time)

@@ -12,45 +12,45 @@ from symphys.dynamics.collision.contact_geometry import Contact, ContactGeometry
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.types import Expr
 
-TOUCH = 1e-12
+MAX_TOUCH_GAP = 1e-12
 """[m] gap up to which surfaces count as touching."""
-STILL = 1e-6
+MAX_REST_SPEED = 1e-6
 """[m/s] approach below which touching surfaces count as resting on each other."""
-TINY_RATE = 1e-12
+MIN_CLOSING_SPEED = 1e-12
 """[m/s] below which surfaces count as not closing."""
 NEWTON_STEPS = 3
 """Corrections of the first estimate of the instant."""
-FOUND = 1e-9
+MAX_ROOT_GAP = 1e-9
 """[m] gap at which an instant counts as one of touch."""
-ROUNDING = 1e-9
+END_TOLERANCE = 1e-9
 """Of dt: an instant so little beyond the end of a step keeps its slope, since rounding may have put it there."""
 
 
-def falls(gap: Expr, rate: Expr) -> Expr:
+def approaches(gap: Expr, rate: Expr) -> Expr:
     """1 where surfaces have yet to meet: apart, or touching at speed; 0 where they rest on each other or overlap.
 
     From rest a gap g closes after sqrt(2 g / a), with an infinite slope at g = 0, which a body placed exactly on the
     ground would inherit: there the instant of touch is 0 with slope 0. An impact that falls on the boundary of two
     steps keeps its slope 1 / speed, on whichever side of 0 rounding has put the gap.
     """
-    return ca.fmax(gap > TOUCH, ca.logic_and(gap >= -TOUCH, rate < -STILL))
+    return ca.fmax(gap > MAX_TOUCH_GAP, ca.logic_and(gap >= -MAX_TOUCH_GAP, rate < -MAX_REST_SPEED))
 
 
 def first_root(gap: Expr, rate: Expr, bend: Expr, dt: Expr) -> Expr:
     """The first t in [0, dt] with gap + rate t + bend t^2/2 = 0; 0 when overlapping, dt when there is none."""
     discriminant = ca.fmax(rate * rate - 2 * bend * gap, 0)
-    closing = ca.fmax(ca.sqrt(discriminant + TINY_SQUARE) - rate, TINY_RATE)
-    return no_later(ca.if_else(falls(gap, rate), 2 * gap, 0) / closing, dt)
+    closing = ca.fmax(ca.sqrt(discriminant + TINY_SQUARE) - rate, MIN_CLOSING_SPEED)
+    return clip_to_end(ca.if_else(approaches(gap, rate), 2 * gap, 0) / closing, dt)
 
 
-def no_later(t: Expr, dt: Expr) -> Expr:
+def clip_to_end(t: Expr, dt: Expr) -> Expr:
     """min(t, dt) with the slope of t where rounding decides: an impact may fall exactly on the end of a step."""
-    return ca.if_else(t > (1 + ROUNDING) * dt, dt, t)
+    return ca.if_else(t > (1 + END_TOLERANCE) * dt, dt, t)
 
 
-def within(t: Expr, dt: Expr) -> Expr:
-    """The instant t held in [0, dt], with the slope of t at both ends; see ``no_later``."""
-    return no_later(ca.if_else(t < -ROUNDING * dt, 0, t), dt)
+def clip_to_step(t: Expr, dt: Expr) -> Expr:
+    """The instant t held in [0, dt], with the slope of t at both ends; see ``clip_to_end``."""
+    return clip_to_end(ca.if_else(t < -END_TOLERANCE * dt, 0, t), dt)
 
 
 class Timed(ContactGeometry, Protocol):
@@ -71,14 +71,14 @@ def contact_along(geometry: Timed, dt: Expr, newton_steps: int = NEWTON_STEPS) -
     """
     at = gap_rate_bend(geometry)
     start, pace, curve = at(ca.SX(0))
-    time, straight = first_root(start, pace, curve, dt), start / ca.fmax(-pace, TINY_RATE)
+    time, straight = first_root(start, pace, curve, dt), start / ca.fmax(-pace, MIN_CLOSING_SPEED)
     for _ in range(newton_steps):
         here, slope, _ = at(time)
-        better = ca.if_else(slope < 0, time - here / ca.fmin(slope, -TINY_RATE), straight)
-        time = within(better, dt)
-    time = ca.if_else(falls(start, pace), time, 0)
+        better = ca.if_else(slope < 0, time - here / ca.fmin(slope, -MIN_CLOSING_SPEED), straight)
+        time = clip_to_step(better, dt)
+    time = ca.if_else(approaches(start, pace), time, 0)
     here, slope, _ = at(time)
-    through = ca.logic_and(ca.logic_and(time > 0, time < dt), ca.logic_and(ca.fabs(here) < FOUND, slope < 0))
+    through = ca.logic_and(ca.logic_and(time > 0, time < dt), ca.logic_and(ca.fabs(here) < MAX_ROOT_GAP, slope < 0))
     end = at(dt)[0]
     return Contact(start, pace, ca.fmax(end < 0, through), time, end, geometry)
 

@@ -30,13 +30,13 @@ from symphys.model.world import Law
 from symphys.types import Expr
 
 NEVER, ALWAYS = ca.SX(0), ca.SX(1)
-UNREACHED = -1e6
+INACTIVE_NORMAL_SPEED = -1e6
 """[m/s] a normal velocity that no constraint reaches: it gives no impulse."""
-LEAST = 0.01
+MIN_SLIDING_SHARE = 0.01
 """Of W_nn: the least effective inverse mass of a sliding contact."""
-FLAT = 1e-12
+MIN_HEADING_SLOPE = 1e-12
 """[m/s] below which the slope of the search for a direction says nothing."""
-FAR = 0.5
+MAX_ANGLE_STEP = 0.5
 """[rad] longest step of that search."""
 
 
@@ -90,22 +90,22 @@ class ContactImpulse:
         )
 
 
-ZERO = ContactImpulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3))
+ZERO_IMPULSE = ContactImpulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3))
 
 
 @dataclass(frozen=True)
-class KnownBefore:
+class Precomputed:
     """What projections need each time and is known before the sweeps.
 
     Attributes:
-        asked: normal impulse for the velocity that is aimed at [N s].
-        slip_asked: (3,) the same of friction [N s].
-        against: (3,) friction that a unit of normal impulse takes off, by the slip that it makes.
+        normal_target: normal impulse for the velocity that is aimed at [N s].
+        tangent_target: (3,) the same of friction [N s].
+        friction_coupling: (3,) friction that a unit of normal impulse takes off, by the slip that it makes.
     """
 
-    asked: Expr
-    slip_asked: Expr
-    against: Expr
+    normal_target: Expr
+    tangent_target: Expr
+    friction_coupling: Expr
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class ContactConstraint:
         coupling: where friction may act strongly on the normal velocity.
         paradox: 1 if the friction of the free slip would pull the surfaces together.
         near: 0 if the surfaces are too far apart to act: no impulse is given.
-        before: where both impulses are found in turn: shortens what a projection waits for.
+        precomputed: where both impulses are found in turn: shortens what a projection waits for.
         soft: of a soft contact.
     """
 
@@ -168,7 +168,7 @@ class ContactConstraint:
     coupling: Coupling | None = None
     paradox: Expr = NEVER
     near: Expr = ALWAYS
-    before: KnownBefore | None = None
+    precomputed: Precomputed | None = None
     soft: SoftImpulse | None = None
 
     def slip(self, momenta: tuple[Any, ...]) -> Expr:
@@ -201,31 +201,33 @@ class ContactConstraint:
 def _forces(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> tuple[Expr, Expr]:
     """The normal impulse and that of friction."""
     if contact.coupling is not None:
-        exact = _solve(contact, contact.coupling, slip, old)
-        smoothed = _solve_smoothed(contact, contact.coupling, slip, old)
+        exact = _solve_coupled(contact, contact.coupling, slip, old)
+        smoothed = _solve_coupled_smoothed(contact, contact.coupling, slip, old)
         smooth = contact.smoothing > 0
         return ca.if_else(smooth, smoothed[0], exact[0]), ca.if_else(smooth, smoothed[1], exact[1])
-    if contact.before is not None:
-        return _in_turn(contact, contact.before, slip, old)
+    if contact.precomputed is not None:
+        return _project_sequentially(contact, contact.precomputed, slip, old)
     normal = _normal(contact, slip, old)
     return normal, _tangent(contact, slip + contact.delassus_column * (normal - old.normal), old, normal)
 
 
 @traced
-def known_before(contact: ContactConstraint) -> KnownBefore:
+def precompute(contact: ContactConstraint) -> Precomputed:
     """Return what a contact's projections need and is known before the sweeps."""
     n, mass = contact.normal, contact.tangent_mass
     friction = (mass * _across(each, n) for each in (contact.slip_target, contact.delassus_column))
-    return KnownBefore(contact.normal_mass * contact.target, *friction)
+    return Precomputed(contact.normal_mass * contact.target, *friction)
 
 
-def _in_turn(contact: ContactConstraint, before: KnownBefore, slip: Expr, old: ContactImpulse) -> tuple[Expr, Expr]:
+def _project_sequentially(
+    contact: ContactConstraint, precomputed: Precomputed, slip: Expr, old: ContactImpulse
+) -> tuple[Expr, Expr]:
     """The normal impulse and that of friction; what is known last, the change of the first, comes in last."""
     n, given = contact.normal, contact.normal_mass * contact.softness * old.normal
-    kept = old.normal + before.asked - given - contact.normal_mass * ca.dot(n, slip)
+    kept = old.normal + precomputed.normal_target - given - contact.normal_mass * ca.dot(n, slip)
     normal = positive(kept, contact.normal_mass * contact.width)
-    wanted = old.tangent + before.slip_asked - contact.tangent_mass * _across(slip, n)
-    wanted = wanted - before.against * (normal - old.normal)
+    wanted = old.tangent + precomputed.tangent_target - contact.tangent_mass * _across(slip, n)
+    wanted = wanted - precomputed.friction_coupling * (normal - old.normal)
     width = contact.tangent_mass * contact.smoothing
     return normal, contact.friction.nearest(wanted, normal, width, contact.smoothing)
 
@@ -304,7 +306,9 @@ def _torques(
     return spin, roll
 
 
-def _solve(contact: ContactConstraint, coupling: Coupling, slip: Expr, old: ContactImpulse) -> tuple[Expr, Expr]:
+def _solve_coupled(
+    contact: ContactConstraint, coupling: Coupling, slip: Expr, old: ContactImpulse
+) -> tuple[Expr, Expr]:
     """(normal impulse, friction impulse (3,)) after which the contact obeys its law, all else as it is.
 
     Args:
@@ -324,35 +328,35 @@ def _solve(contact: ContactConstraint, coupling: Coupling, slip: Expr, old: Cont
     sticks = ca.logic_and(ca.logic_and(closes, press > 0), friction.admits(hold, press))
 
     wanted = old.tangent - contact.tangent_mass * _across(error, n)
-    heading = _turned(friction.heading(wanted, old.normal), free, w, n, friction)
-    load, _ = _load(heading, free, w, n, friction)
+    heading = _newton_heading(friction.heading(wanted, old.normal), free, w, n, friction)
+    load, _ = _sliding_load(heading, free, w, n, friction)
     slides = friction.largest * load * friction.shaped(heading)
     return ca.if_else(sticks, press, load), ca.if_else(sticks, hold, slides)
 
 
-def _load(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Friction) -> tuple[Expr, Expr]:
+def _sliding_load(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Friction) -> tuple[Expr, Expr]:
     """The normal impulse of a contact that slides against ``heading``, and the velocity (3,) for a unit of it."""
     response = ca.mtimes(w, n + friction.largest * friction.shaped(heading))
-    least = LEAST * ca.dot(n, ca.mtimes(w, n))
+    least = MIN_SLIDING_SHARE * ca.dot(n, ca.mtimes(w, n))
     return ca.fmax(-ca.dot(n, free), 0) / ca.fmax(ca.dot(n, response), least), response
 
 
-def _turned(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Friction) -> Expr:
+def _newton_heading(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Friction) -> Expr:
     """The heading after a step of Newton's method towards one that is opposite to the slip, as friction sees it."""
-    load, response = _load(heading, free, w, n, friction)
+    load, response = _sliding_load(heading, free, w, n, friction)
     aside, slip = ca.cross(n, heading), free + load * response
     seen = friction.shaped(aside)
     turning = ca.mtimes(w, seen)
-    lost = ca.dot(n, turning) / ca.fmax(ca.dot(n, response), LEAST * ca.dot(n, ca.mtimes(w, n)))
+    lost = ca.dot(n, turning) / ca.fmax(ca.dot(n, response), MIN_SLIDING_SHARE * ca.dot(n, ca.mtimes(w, n)))
     slope = friction.largest * load * (ca.dot(seen, turning) - lost * ca.dot(seen, response))
     slope = slope - ca.dot(friction.shaped(heading), slip)
-    step = ca.if_else(slope > FLAT, -ca.dot(seen, slip) / ca.fmax(slope, FLAT), 0)
-    step = ca.fmin(ca.fmax(step, -FAR), FAR)
+    step = ca.if_else(slope > MIN_HEADING_SLOPE, -ca.dot(seen, slip) / ca.fmax(slope, MIN_HEADING_SLOPE), 0)
+    step = ca.fmin(ca.fmax(step, -MAX_ANGLE_STEP), MAX_ANGLE_STEP)
     found = heading + step * aside
     return found / ca.sqrt(1 + step * step)
 
 
-def _solve_smoothed(
+def _solve_coupled_smoothed(
     contact: ContactConstraint, coupling: Coupling, slip: Expr, old: ContactImpulse
 ) -> tuple[Expr, Expr]:
     """Solve under the smoothed law: projections in turn, the normal one damped against cycling.

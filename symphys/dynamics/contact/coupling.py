@@ -15,7 +15,7 @@ from symphys.model.body import Body
 from symphys.model.world import Pair, World
 from symphys.types import Expr
 
-STRONG = 2.0
+MAX_SEQUENTIAL_COUPLING = 2.0
 """Bound of mu W_nt / W_nn, which few contacts of a body reach, up to which projections in turn are taken.
 
 The corners of a box at rest converge sooner by those: a block pushed at mu = 1 is off by 1e-6 m, not 3e-5."""
@@ -53,7 +53,7 @@ def _across(a: Expr, n: Expr) -> Expr:
     return a - n * ca.dot(n, a)
 
 
-def which_couple(world: World) -> list[bool]:
+def coupled_pairs(world: World) -> list[bool]:
     """``may_couple`` of all pairs; equal ones are looked at once."""
     known: dict[Any, bool] = {}
     found = []
@@ -79,7 +79,10 @@ def may_couple(world: World, pair: Pair) -> bool:
     held = {index for joint in world.joints for index in joint.bodies}
     if not pair.law.rubs or pair.law.soft or any(body in held for body, _ in sides):
         return False
-    return max(_ratio(world.bodies[body], shape, pair.law.largest_friction) for body, shape in sides) > STRONG
+    return (
+        max(_ratio(world.bodies[body], shape, pair.law.largest_friction) for body, shape in sides)
+        > MAX_SEQUENTIAL_COUPLING
+    )
 
 
 def _ratio(body: Body, shape: int, friction: Any) -> float:

@@ -12,16 +12,16 @@ from symphys.maths.rotation import cross_matrix
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.types import Expr
 
-HELD = 1e-9
+LOCKED_MOBILITY_SHARE = 1e-9
 """Of a body's own mobility: what it keeps in directions in which joints do not let it move.
 
 Impulses act at another instant than that at which velocities are asked for: a rod on a hinge that passes the upright
 between the two has a mobility below 0 along it.
 """
 
-LEAST_SHARE = 0.5
+MIN_POINT_MOBILITY = 0.5
 """Least mobility of free bodies at a point, as a share of the sum of their inverse masses, which bounds it by 1."""
-LEAST_TURN = 1e-6
+MIN_TURN_MOBILITY = 1e-6
 """Least mobility of free bodies against torques, as a share of the trace of their inverse inertia."""
 
 
@@ -35,8 +35,8 @@ def mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, Expr]:
             push += term.inverse_mass * ca.SX.eye(3) - ca.mtimes(arm, ca.mtimes(inverse, arm))
             twist += inverse
             continue
-        push += HELD * term.inverse_mass * ca.SX.eye(3)
-        twist += HELD * inverse
+        push += LOCKED_MOBILITY_SHARE * term.inverse_mass * ca.SX.eye(3)
+        twist += LOCKED_MOBILITY_SHARE * inverse
         for j, other in enumerate(terms):
             if other.jacobian is not None and (same or i == j):
                 sign = term.sign * other.sign
@@ -58,7 +58,7 @@ def separates(terms: Sequence[BodyTerm], n: Expr, column: Expr) -> Expr:
     """
     if all(term.jacobian is None for term in terms):
         return ca.SX(1)
-    return ca.dot(n, column) > HELD * sum(term.inverse_mass for term in terms)
+    return ca.dot(n, column) > LOCKED_MOBILITY_SHARE * sum(term.inverse_mass for term in terms)
 
 
 def no_less_than_response(terms: Sequence[BodyTerm], n: Expr, column: Expr, normal: Expr) -> Expr:
@@ -84,8 +84,10 @@ def inverse_masses(terms: Sequence[BodyTerm], n: Expr, push: Expr, twist: Expr) 
     of the step is extrapolated, which at a spin of about a radian a step need not leave it positive definite.
     """
     jointed = any(term.jacobian is not None for term in terms)
-    least = (HELD if jointed else LEAST_SHARE) * sum(term.inverse_mass for term in terms)
-    slow = (HELD if jointed else LEAST_TURN) * sum(_trace(term.inverse_inertia) for term in terms)
+    least = (LOCKED_MOBILITY_SHARE if jointed else MIN_POINT_MOBILITY) * sum(term.inverse_mass for term in terms)
+    slow = (LOCKED_MOBILITY_SHARE if jointed else MIN_TURN_MOBILITY) * sum(
+        _trace(term.inverse_inertia) for term in terms
+    )
     found = along(push, n), across(push, n), along(twist, n), across(twist, n)
     floors = least, least, slow, slow
     return tuple(ca.if_else(k < floor, floor, k) for k, floor in zip(found, floors, strict=True))

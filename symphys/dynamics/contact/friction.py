@@ -24,11 +24,11 @@ from symphys.maths.smoothing import TINY_SQUARE, TINY_WIDTH_SQUARE, length, onto
 from symphys.model.world import Law
 from symphys.types import Expr
 
-UPRIGHT = 0.05
+MIN_DIRECTION_ANGLE = 0.05
 """[rad] from the normal of a contact, within which a direction of friction fades out."""
 TINY_LEAN = 1e-8
 """Added to the square of a direction's part across the normal, so that its slope is finite where there is none."""
-STEPS = 5
+ELLIPSE_NEWTON_STEPS = 5
 """Of Newton's method towards the nearest impulse of an ellipse. That is then off by 1e-14 of its size at most for
 coefficients in a ratio of up to 10, by 1e-9 for 100 and by 3e-8 for 10,000."""
 TINY_LOAD = 1e-24
@@ -131,7 +131,7 @@ def friction_at(law: Law, normal: Expr, motions: Motions, t: Expr) -> Friction:
     square = ca.dot(leaning, leaning)
     along, across = law.friction
     # a direction that is nearly normal to the contact says nothing: friction is that across it
-    counts = ca.fmin(square / UPRIGHT**2, 1)
+    counts = ca.fmin(square / MIN_DIRECTION_ANGLE**2, 1)
     return Ellipse(across + (along - across) * counts, ca.SX(across), leaning / ca.sqrt(square + TINY_LEAN**2))
 
 
@@ -346,7 +346,7 @@ class Ellipse:
         t = ca.fmax(low, beside / ca.sqrt(missing) - shorter)
 
         # Newton's method for 1 / |s| = 1, with |s| p q
-        for _ in range(STEPS):
+        for _ in range(ELLIPSE_NEWTON_STEPS):
             p, q = b1 + t, b2 + t
             one, two = (c1 * q) ** 2, (c2 * p) ** 2
             size = ca.sqrt(one + two + TINY_WIDTH_SQUARE)

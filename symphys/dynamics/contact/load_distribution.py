@@ -23,9 +23,9 @@ from symphys.model.shapes import Plane, Terrain
 from symphys.model.world import Pair, World
 from symphys.types import Expr
 
-DETERMINED = 3
+MAX_DETERMINED_POINTS = 3
 """Points whose loads follow from the resultant."""
-BLUNT = 1e-12
+MIN_SPREAD_SHARE = 1e-12
 """Of the points' spread: directions in which they spread less share no torque."""
 
 
@@ -49,7 +49,7 @@ def faces(world: World) -> list[tuple[int, ...]]:
     for k, pair in enumerate(world.pairs):
         if not pair.law.soft:
             groups.setdefault(_face(world, pair), []).append(k)
-    return [tuple(group) for face, group in groups.items() if face is not None and len(group) > DETERMINED]
+    return [tuple(group) for face, group in groups.items() if face is not None and len(group) > MAX_DETERMINED_POINTS]
 
 
 def _face(world: World, pair: Pair) -> Any:
@@ -62,7 +62,7 @@ def _face(world: World, pair: Pair) -> Any:
 @traced
 def _linear(constraints: tuple[ContactConstraint, ...], loads: tuple[Expr, ...]) -> tuple[Expr, ...]:
     parts = [_share(constraint, load) for constraint, load in zip(constraints, loads, strict=True)]
-    total = sum(parts) + BLUNT
+    total = sum(parts) + MIN_SPREAD_SHARE
     arms = [ca.cross(constraint.terms[0].impulse_arm, constraint.impulse_normal) for constraint in constraints]
     middle = sum(part * arm for part, arm in zip(parts, arms, strict=True)) / total
     mean = sum(part * load for part, load in zip(parts, loads, strict=True)) / total
@@ -71,7 +71,9 @@ def _linear(constraints: tuple[ContactConstraint, ...], loads: tuple[Expr, ...])
     for part, arm, load in zip(parts, arms, loads, strict=True):
         torque += part * load * arm
         spread += part * ca.mtimes(arm, arm.T)
-    slope = ca.mtimes(ca.inv(spread + (BLUNT * ca.trace(spread) + BLUNT**2) * ca.SX.eye(3)), torque)
+    slope = ca.mtimes(
+        ca.inv(spread + (MIN_SPREAD_SHARE * ca.trace(spread) + MIN_SPREAD_SHARE**2) * ca.SX.eye(3)), torque
+    )
     return tuple(
         constraint.near * ca.fmax(load + part * (mean + ca.dot(slope, arm) - load), 0)
         for constraint, part, arm, load in zip(constraints, parts, arms, loads, strict=True)

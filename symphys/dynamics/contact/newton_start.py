@@ -57,19 +57,19 @@ State = Any
 """``Velocities`` of a carrier, or its displacement."""
 States = tuple[State, ...]
 
-CENTRES = 1, 1, 0, 0, 0
+CENTRE_SCHEDULE = 1, 1, 0, 0, 0
 """Of the steps: 1 with loads about 0, 0 about those that were found."""
-LARGEST = 40
+MAX_GROUP_SIZE = 40
 """Velocities of a group that is solved at once."""
-FAR = 100.0
+MAX_ENERGY_RATIO = 100.0
 """Of the energies from which a step may start: how large that of the step may be."""
-BLUR = 0.03
+SLOPE_BLUR = 0.03
 """Of the root of what an iterate misses: over how much of it a constraint's slope goes from one side to the other."""
-BETTER, WORSE = 0.25, 4.0
+ACCEPT_RATIO, REJECT_RATIO = 0.25, 4.0
 """What an iterate misses, of what the best so far has missed: below, it is taken whole, and above, not at all."""
-EVEN = 1e-22
+ROUNDING_SHARE = 1e-22
 """Of the energies at hand: what is missed by rounding alone."""
-TINY = 1e-30
+MIN_ENERGY = 1e-30
 """[J] the least that a step may reach, so that its slope is finite at rest."""
 
 
@@ -82,7 +82,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Lever:
+class ConstraintOperators:
     """How a constraint sees the N velocities of its bodies, and acts on them.
 
     Attributes:
@@ -103,7 +103,7 @@ class Member:
     number: int
     placed: PlacedConstraint
     own: tuple[int, ...]
-    lever: Lever
+    lever: ConstraintOperators
 
 
 def open_groups(context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State]) -> list[Group]:
@@ -119,7 +119,7 @@ def open_groups(context: StepContext, constraints: Sequence[PlacedConstraint], s
         own = tuple(k for k, each in enumerate(constraints) if each.carriers[0] in carriers)
         size = sum(_size(states[k]) for k in carriers)
         jointed = any(isinstance(states[k], GeneralizedVelocities) for k in carriers)
-        if size <= LARGEST and _is_open(context.world, [constraints[k] for k in own], jointed, size):
+        if size <= MAX_GROUP_SIZE and _is_open(context.world, [constraints[k] for k in own], jointed, size):
             found.append(Group(carriers, own))
     return found
 
@@ -143,7 +143,7 @@ def solve_together(
     start: Iterate,
     trees: KinematicTrees,
     softness: Expr,
-    centres: Sequence[int] = CENTRES,
+    centres: Sequence[int] = CENTRE_SCHEDULE,
 ) -> Iterate:
     """The start of the sweeps, with the constraints of a group solved.
 
@@ -158,14 +158,14 @@ def solve_together(
     metric = _metric(trees, group.carriers, start.momenta)
     members = [_member(group, number, constraints[number], metric, start) for number in group.constraints]
     own = tuple(start.momenta[i] for i in group.carriers)
-    after = missed = _missed(metric, members, start)
-    reach = _reach(metric, own, missed, len(members))
+    after = missed = _residual_energy(metric, members, start)
+    reach = _trust_radius(metric, own, missed, len(members))
     best = now = start
     for centre in centres:
-        now = _stepped(group, metric, members, now, Linearisation(softness, centre, _blur(after)), reach)
-        after = _missed(metric, members, now)
-        share = _taken(after, missed, reach)
-        best, missed = _between(group, share, now, best), _mean(share, after, missed)
+        now = _newton_step(group, metric, members, now, Linearisation(softness, centre, _slope_width(after)), reach)
+        after = _residual_energy(metric, members, now)
+        share = _acceptance(after, missed, reach)
+        best, missed = _blend(group, share, now, best), _mean(share, after, missed)
     return best
 
 
@@ -174,11 +174,11 @@ def _member(group: Group, number: int, placed: PlacedConstraint, metric: tuple[E
     own = tuple(group.carriers.index(i) for i in carriers)
     sides = tuple(carriers.index(i) for i in placed.carriers)
     states, masses = tuple(start.momenta[i] for i in carriers), tuple(metric[k] for k in own)
-    lever = _lever(placed.constraint, start.impulses[number], states, sides, masses)
+    lever = _operators(placed.constraint, start.impulses[number], states, sides, masses)
     return Member(number, placed, own, lever)
 
 
-def _stepped(
+def _newton_step(
     group: Group,
     metric: tuple[Expr, ...],
     members: Sequence[Member],
@@ -191,34 +191,36 @@ def _stepped(
     answers = []
     for each in members:
         states = tuple(momenta[i] for i in each.placed.carriers)
-        answers.append(_answer(each.placed.constraint, each.lever, states, impulses[each.number], by))
-    changes = _changes(metric, tuple((each.own, *part[:2]) for each, part in zip(members, answers, strict=True)))
+        answers.append(_linear_response(each.placed.constraint, each.lever, states, impulses[each.number], by))
+    changes = _velocity_changes(
+        metric, tuple((each.own, *part[:2]) for each, part in zip(members, answers, strict=True))
+    )
     given = [
-        _given(each.lever, a, b, tuple(changes[k] for k in each.own))
+        _impulse_change(each.lever, a, b, tuple(changes[k] for k in each.own))
         for each, (_, _, a, b) in zip(members, answers, strict=True)
     ]
     share = _share(tuple((each.lever, part) for each, part in zip(members, given, strict=True)), reach)
     for each, part in zip(members, given, strict=True):
         carriers = tuple(group.carriers[k] for k in each.own)
         states = tuple(momenta[i] for i in carriers)
-        moved, impulses[each.number] = _moved(each.lever, part, share, states, impulses[each.number])
+        moved, impulses[each.number] = _advance(each.lever, part, share, states, impulses[each.number])
         for i, state in zip(carriers, moved, strict=True):
             momenta[i] = state
     return Iterate(tuple(momenta), tuple(impulses), tuple(impulses))
 
 
-def _missed(metric: tuple[Expr, ...], members: Sequence[Member], now: Iterate) -> Expr:
+def _residual_energy(metric: tuple[Expr, ...], members: Sequence[Member], now: Iterate) -> Expr:
     """[J] twice the energy of what a projection of each constraint would change, all from the same velocities."""
     found = []
     for each in members:
         carriers = tuple(dict.fromkeys(each.placed.carriers))
         sides = tuple(carriers.index(i) for i in each.placed.carriers)
         states, masses = tuple(now.momenta[i] for i in carriers), tuple(metric[k] for k in each.own)
-        found.append(_miss(each.placed.constraint, states, sides, now.impulses[each.number], masses))
+        found.append(_constraint_residual(each.placed.constraint, states, sides, now.impulses[each.number], masses))
     return _sum(tuple(found))
 
 
-def _between(group: Group, share: Expr, now: Iterate, best: Iterate) -> Iterate:
+def _blend(group: Group, share: Expr, now: Iterate, best: Iterate) -> Iterate:
     """A share of ``now``, the rest of ``best``. Both have their velocities from their impulses, and so has it."""
     momenta, impulses = list(best.momenta), list(best.impulses)
     for i in group.carriers:
@@ -260,26 +262,26 @@ def _softness(masses: tuple[Expr, ...]) -> Expr:
 
 
 @traced
-def _lever(
+def _operators(
     constraint: VelocityConstraint,
     impulse: AnyImpulse,
     states: States,
     sides: tuple[int, ...],
     metric: tuple[Expr, ...],
-) -> Lever:
+) -> ConstraintOperators:
     sizes = [_size(state) for state in states]
     velocities = ca.SX.sym("v", sum(sizes))
-    cut = _cut(velocities, states)
+    cut = _split_states(velocities, states)
     rates = ca.jacobian(constraint.rates(tuple(cut[k] for k in sides)), velocities)
     numbers = ca.SX.sym("p", impulse.count)
-    at_rest = _cut(ca.SX.zeros(sum(sizes)), states)
+    at_rest = _split_states(ca.SX.zeros(sum(sizes)), states)
     after = constraint.apply(tuple(at_rest[k] for k in sides), impulse.like(numbers))
     by_carrier = dict(zip(sides, after, strict=True))
-    responses = ca.jacobian(ca.vertcat(*(_flat(by_carrier[k]) for k in range(len(states)))), numbers)
-    return Lever(rates, responses, ca.mtimes(ca.diagcat(*metric), responses))
+    responses = ca.jacobian(ca.vertcat(*(_flatten(by_carrier[k]) for k in range(len(states)))), numbers)
+    return ConstraintOperators(rates, responses, ca.mtimes(ca.diagcat(*metric), responses))
 
 
-def _cut(velocities: Expr, states: States) -> list[State]:
+def _split_states(velocities: Expr, states: States) -> list[State]:
     """Velocities of carriers, side by side, one by one."""
     found, start = list[State](), 0
     for state in states:
@@ -294,7 +296,7 @@ def _cut(velocities: Expr, states: States) -> list[State]:
     return found
 
 
-def _flat(state: State) -> Expr:
+def _flatten(state: State) -> Expr:
     assert state is not None
     if isinstance(state, GeneralizedVelocities):
         return state.numbers
@@ -302,8 +304,8 @@ def _flat(state: State) -> Expr:
 
 
 @traced
-def _answer(
-    constraint: VelocityConstraint, lever: Lever, momenta: States, old: AnyImpulse, by: Linearisation
+def _linear_response(
+    constraint: VelocityConstraint, lever: ConstraintOperators, momenta: States, old: AnyImpulse, by: Linearisation
 ) -> tuple[Expr, Expr, Expr, Expr]:
     """M H B J, M H a, a and B."""
     a, b = constraint.linearised(momenta, old, by)
@@ -311,7 +313,9 @@ def _answer(
 
 
 @traced
-def _changes(metric: tuple[Expr, ...], parts: tuple[tuple[tuple[int, ...], Expr, Expr], ...]) -> tuple[Expr, ...]:
+def _velocity_changes(
+    metric: tuple[Expr, ...], parts: tuple[tuple[tuple[int, ...], Expr, Expr], ...]
+) -> tuple[Expr, ...]:
     """Return the changes of the velocities of each carrier."""
     sizes = [each.shape[0] for each in metric]
     starts = [0, *accumulate(sizes)]
@@ -328,37 +332,39 @@ def _changes(metric: tuple[Expr, ...], parts: tuple[tuple[tuple[int, ...], Expr,
 
 
 @traced
-def _given(lever: Lever, a: Expr, b: Expr, changes: tuple[Expr, ...]) -> Expr:
+def _impulse_change(lever: ConstraintOperators, a: Expr, b: Expr, changes: tuple[Expr, ...]) -> Expr:
     """(k,): the change of an impulse."""
     return a - ca.mtimes(b, ca.mtimes(lever.rates, ca.vertcat(*changes)))
 
 
 @traced
-def _reach(metric: tuple[Expr, ...], states: States, missed: Expr, count: int) -> Expr:
+def _trust_radius(metric: tuple[Expr, ...], states: States, missed: Expr, count: int) -> Expr:
     """[J] which no step goes beyond: from the energy of the velocities, and of all projections were they to add up."""
-    return FAR * (_energy(metric, ca.vertcat(*map(_flat, states))) + count * missed) + TINY
+    return MAX_ENERGY_RATIO * (_energy(metric, ca.vertcat(*map(_flatten, states))) + count * missed) + MIN_ENERGY
 
 
 @traced
-def _share(parts: tuple[tuple[Lever, Expr], ...], reach: Expr) -> Expr:
+def _share(parts: tuple[tuple[ConstraintOperators, Expr], ...], reach: Expr) -> Expr:
     """Return the length of a step, at most 1, for which each constraint's own change stays bounded."""
     energies = (ca.dot(ca.mtimes(lever.responses, x), ca.mtimes(lever.momenta, x)) for lever, x in parts)
     return ca.sqrt(reach / ca.fmax(reach, sum(energies)))
 
 
 @traced
-def _moved(lever: Lever, given: Expr, share: Expr, momenta: States, old: AnyImpulse) -> tuple[States, AnyImpulse]:
-    after = ca.vertcat(*map(_flat, momenta)) + share * ca.mtimes(lever.responses, given)
-    return tuple(_cut(after, momenta)), old.plus(old.like(share * given))
+def _advance(
+    lever: ConstraintOperators, given: Expr, share: Expr, momenta: States, old: AnyImpulse
+) -> tuple[States, AnyImpulse]:
+    after = ca.vertcat(*map(_flatten, momenta)) + share * ca.mtimes(lever.responses, given)
+    return tuple(_split_states(after, momenta)), old.plus(old.like(share * given))
 
 
 @traced
-def _miss(
+def _constraint_residual(
     constraint: VelocityConstraint, states: States, sides: tuple[int, ...], old: AnyImpulse, metric: tuple[Expr, ...]
 ) -> Expr:
     after, _ = constraint.project(tuple(states[k] for k in sides), old)
     by_carrier = dict(zip(sides, after, strict=True))
-    change = ca.vertcat(*(_flat(by_carrier[k]) - _flat(state) for k, state in enumerate(states)))
+    change = ca.vertcat(*(_flatten(by_carrier[k]) - _flatten(state) for k, state in enumerate(states)))
     return _energy(metric, change)
 
 
@@ -373,15 +379,15 @@ def _sum(energies: tuple[Expr, ...]) -> Expr:
 
 
 @traced
-def _blur(missed: Expr) -> Expr:
-    return BLUR * ca.sqrt(missed + TINY)
+def _slope_width(missed: Expr) -> Expr:
+    return SLOPE_BLUR * ca.sqrt(missed + MIN_ENERGY)
 
 
 @traced
-def _taken(after: Expr, missed: Expr, reach: Expr) -> Expr:
+def _acceptance(after: Expr, missed: Expr, reach: Expr) -> Expr:
     """The share of an iterate that misses ``after`` against what has missed so far: 1 if far better, 0 if far worse."""
-    ratio = after / (missed + EVEN * reach + TINY)
-    return clip((WORSE - ratio) / (WORSE - BETTER), 0, 1, 0)
+    ratio = after / (missed + ROUNDING_SHARE * reach + MIN_ENERGY)
+    return clip((REJECT_RATIO - ratio) / (REJECT_RATIO - ACCEPT_RATIO), 0, 1, 0)
 
 
 @traced
@@ -391,7 +397,7 @@ def _mean(share: Expr, now: Expr, best: Expr) -> Expr:
 
 @traced
 def _mean_state(share: Expr, now: State, best: State) -> State:
-    return _cut(_mean(share, _flat(now), _flat(best)), (best,))[0]
+    return _split_states(_mean(share, _flatten(now), _flatten(best)), (best,))[0]
 
 
 @traced

@@ -36,7 +36,7 @@ DOUBLINGS = 7
 """Doublings of the time that lead from the power series to the whole time."""
 TERMS = 7
 """Terms of the power series."""
-LEAST_B = 1e-12
+MIN_B = 1e-12
 """Smallest b, by which the softness of a constraint divides."""
 RESOLVED, UNRESOLVED = 1.5, 2.5
 """[rad] w d up to which the law is exact, and from which on it is implicit Euler."""
@@ -114,7 +114,7 @@ def spring_law(forward: Response, backward: Response) -> SpringLaw:
     d, before, share = forward.time, backward.time, forward.sigma / backward.sigma
     kick, half = (d + before) / 2, d / 2
     q = (d * forward.p + before * backward.p * share) / 2
-    stiff, b, c = kick * forward.omega**2, ca.fmax(kick / q - 1, LEAST_B), 1 - kick * share / q
+    stiff, b, c = kick * forward.omega**2, ca.fmax(kick / q - 1, MIN_B), 1 - kick * share / q
     heavier = ca.fmax(stiff * d / 4 - INVERSE_COUNT - (b - c) / 2, 0)
     b, c = b + heavier, c - heavier
     # v_end = pushed (a - w^2 e) + kept u_, with a = ((1 + b) u - (1 - c) u_) / kick + w^2 e

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Frame
-from symphys.dynamics.collision.time_of_impact import STILL, TINY_RATE, TOUCH
+from symphys.dynamics.collision.time_of_impact import MAX_REST_SPEED, MAX_TOUCH_GAP, MIN_CLOSING_SPEED
 from symphys.dynamics.contact.body_term import BodyTerm, Motions, at_touch, body_terms, free_slip
-from symphys.dynamics.contact.constraint import UNREACHED, ContactConstraint
+from symphys.dynamics.contact.constraint import INACTIVE_NORMAL_SPEED, ContactConstraint
 from symphys.dynamics.contact.coupling import coupling_of, pulls_together
 from symphys.dynamics.contact.effective_mass import (
     delassus_column,
@@ -26,28 +26,28 @@ from symphys.dynamics.contact.effective_mass import (
 )
 from symphys.dynamics.contact.friction import friction_at
 from symphys.dynamics.contact.soft import SoftApproach, SoftImpulse, soft_impulse
-from symphys.dynamics.context import NEAR, StepSettings
+from symphys.dynamics.context import MAX_REST_GAP, StepSettings
 from symphys.dynamics.motion import apply
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import clip, positive
 from symphys.model.world import Law
 from symphys.types import Expr
 
-MARGIN = 1e-4
+REBOUND_MARGIN = 1e-4
 """Width of chi's rise, as a share of the reference acceleration: a rebound that barely leaves is part rest."""
 
-TIE = 1e-11
+TIE_DISTANCE = 1e-11
 """[m] surfaces that move at speed and are that near at the end of a substep do not touch then; see ``_slack``."""
-ANY = 1e6
+NO_CORRECTION_SLOP = 1e6
 """[m] more than any overlap: what gives no impulse is not pushed out either."""
-SHORTEST = 1e-6
+MIN_SUBSTEP_SHARE = 1e-6
 """Of dt: the shortest substep before or after an impact."""
-LOADED = 1e-3
+MIN_LOAD_SHARE = 1e-3
 """Of the weight of the effective mass: what counts as load. A smooth contact always carries a little."""
 
 
 @dataclass(frozen=True)
-class Conditions:
+class SubstepFlags:
     """What a substep makes of a contact.
 
     Attributes:
@@ -73,7 +73,7 @@ class Conditions:
 
 @traced
 def prepare(
-    settings: StepSettings, law: Law, contact: Contact, motions: Motions, duration: Expr, conditions: Conditions
+    settings: StepSettings, law: Law, contact: Contact, motions: Motions, duration: Expr, conditions: SubstepFlags
 ) -> ContactConstraint:
     """The constraint of a contact along the free motions of its bodies, over a substep of ``duration`` [s]."""
     scheme, smoothing, half = settings.scheme, settings.smoothing, duration / 2
@@ -85,7 +85,7 @@ def prepare(
     terms, friction = body_terms(motions, instant, frame, applied), friction_at(law, frame.normal, motions, instant)
     push, twist = symmetric_mobilities(terms, same)
     k_normal, k_tangent, k_spin, k_roll = inverse_masses(terms, frame.normal, push, twist)
-    slack = ca.if_else(suppressed, ANY, _slack(settings, contact, touch, duration))
+    slack = ca.if_else(suppressed, NO_CORRECTION_SLOP, _slack(settings, contact, touch, duration))
     slip = free_slip(terms, motions)
     free = ca.dot(frame.normal, slip)
     away = ca.fmin(free - (contact.end + slack) / duration, 0)
@@ -96,10 +96,10 @@ def prepare(
     column = delassus_column(terms, applied.normal, same)
     parts = separates(terms, frame.normal, column)
     k_normal = no_less_than_response(terms, frame.normal, column, k_normal)
-    weight, load = LOADED * settings.reference / k_normal, ca.dot(applied.normal, conditions.force)
+    weight, load = MIN_LOAD_SHARE * settings.reference / k_normal, ca.dot(applied.normal, conditions.force)
     loaded = ca.logic_and(load > weight, ca.logic_not(suppressed))
     lasts = _lasts(settings, law, contact, touch.leaving, loaded)
-    target = ca.if_else(lasts, -_parting(settings, contact, k_normal, ca.fmax(load, weight), duration), target)
+    target = ca.if_else(lasts, -_separating_speed(settings, contact, k_normal, ca.fmax(load, weight), duration), target)
     return ContactConstraint(
         law=law,
         friction=friction,
@@ -110,7 +110,7 @@ def prepare(
         **effective_masses(k_normal + softness, k_tangent, k_spin, k_roll, parts),
         softness=softness,
         separates=parts,
-        target=ca.if_else(ca.logic_or(suppressed, 1 - parts), UNREACHED, target),
+        target=ca.if_else(ca.logic_or(suppressed, 1 - parts), INACTIVE_NORMAL_SPEED, target),
         slip_target=touch.slip(half) if scheme.impact_friction else ca.SX.zeros(3),
         delay=_delay(touch, landing, lasts, half, terms) if scheme.time_of_impact and not law.soft else ca.SX(0),
         leaving=touch.leaving,
@@ -129,7 +129,7 @@ def prepare(
 
 
 @dataclass(frozen=True)
-class _Touch:
+class _FreeTouch:
     """What free motion and restitution make of a contact within a substep.
 
     Attributes:
@@ -156,8 +156,8 @@ class _Touch:
 
 
 def _touch(
-    settings: StepSettings, law: Law, contact: Contact, motions: Motions, duration: Expr, conditions: Conditions
-) -> _Touch:
+    settings: StepSettings, law: Law, contact: Contact, motions: Motions, duration: Expr, conditions: SubstepFlags
+) -> _FreeTouch:
     time = contact.time if settings.scheme.time_of_impact else ca.SX(0)
     velocity, acceleration, normal = at_touch(contact, motions, time)
     pull = ca.dot(normal, acceleration)
@@ -166,23 +166,23 @@ def _touch(
         conditions.suppressed, 0, contact.hit
     )  # at the end of a substep rounding decides whether a suppressed one meets
     chi = _leaves(rebound, pull, duration - time, settings.reference, settings.scheme.dt, settings.smoothing)
-    return _Touch(time, acceleration, normal, pull, rebound, hit, hit * chi)
+    return _FreeTouch(time, acceleration, normal, pull, rebound, hit, hit * chi)
 
 
-def _delay(touch: _Touch, landing: Expr, lasts: Expr, half: Expr, terms: tuple[BodyTerm, ...]) -> Expr:
+def _delay(touch: _FreeTouch, landing: Expr, lasts: Expr, half: Expr, terms: tuple[BodyTerm, ...]) -> Expr:
     """Return how late the contact acts [s]; for lasting ones on trees see docs/joints.md, "Feet that stand"."""
     delay = touch.hit * (touch.time + (1 - touch.leaving) * (landing - touch.time))
     return ca.if_else(lasts, half, delay) if any(term.jacobian is not None for term in terms) else delay
 
 
-def _parting(settings: StepSettings, contact: Contact, k_normal: Expr, load: Expr, duration: Expr) -> Expr:
+def _separating_speed(settings: StepSettings, contact: Contact, k_normal: Expr, load: Expr, duration: Expr) -> Expr:
     """On the central path a load keeps surfaces parting at w^2 / (4 k load) [m/s]: less that, what lasts is at rest."""
     return width_of(settings, contact) ** 2 / (4 * k_normal * load * duration)
 
 
 def closes_fast(settings: StepSettings, contact: Contact) -> Expr:
     """1 if a contact closes at a speed that makes it an impact: now, or as a tip that swings round."""
-    swings = contact.gap > settings.fast * contact.time + NEAR * settings.reference * settings.scheme.dt**2
+    swings = contact.gap > settings.fast * contact.time + MAX_REST_GAP * settings.reference * settings.scheme.dt**2
     return ca.logic_or(contact.rate < -settings.fast, ca.logic_and(contact.hit, swings))
 
 
@@ -194,7 +194,7 @@ def width_of(settings: StepSettings, contact: Contact) -> Expr:
 def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: Expr, smoothing: Expr) -> Expr:
     """chi: 1 if the rebound is still off the surface when the step ends, 0 if it has fallen back by then."""
     fall = ca.fmax(-pull, reference) * left
-    return clip((2 * rebound - fall) / (fall + MARGIN * dt), 0, 1, smoothing)
+    return clip((2 * rebound - fall) / (fall + REBOUND_MARGIN * dt), 0, 1, smoothing)
 
 
 def _lasts(settings: StepSettings, law: Law, contact: Contact, leaving: Expr, loaded: Expr) -> Expr:
@@ -202,7 +202,7 @@ def _lasts(settings: StepSettings, law: Law, contact: Contact, leaving: Expr, lo
     if law.soft:
         return ca.SX(0)
     dt = settings.scheme.dt
-    near = contact.gap < (NEAR * settings.reference * dt + settings.smoothing) * dt
+    near = contact.gap < (MAX_REST_GAP * settings.reference * dt + settings.smoothing) * dt
     return ca.logic_and(ca.logic_and(near, loaded), leaving < 0.5)
 
 
@@ -213,11 +213,11 @@ def _landing(contact: Contact, duration: Expr, time: Expr, target: Expr, free: E
     below the surface by a (t* - dt) t*/2, which for small gaps is large beside the gap. ``free`` is the normal velocity
     at mid-step without the impulse.
     """
-    share = (contact.gap + duration * target) / ca.fmax(target - free, TINY_RATE)
+    share = (contact.gap + duration * target) / ca.fmax(target - free, MIN_CLOSING_SPEED)
     return ca.fmin(ca.fmax(share, 0), time)
 
 
-def _slack(settings: StepSettings, contact: Contact, touch: _Touch, duration: Expr) -> Expr:
+def _slack(settings: StepSettings, contact: Contact, touch: _FreeTouch, duration: Expr) -> Expr:
     """[m] an overlap at the end of the substep that is rounding: that of an impact which falls on its very end.
 
     Whether such an impact belongs to this substep or to the next is rounding's choice. Either way nothing but the
@@ -228,11 +228,11 @@ def _slack(settings: StepSettings, contact: Contact, touch: _Touch, duration: Ex
     fast, speed = closes_fast(settings, contact), ca.fabs(contact.rate)
     lands = ca.logic_and(touch.hit, ca.logic_and(touch.leaving < 0.5, fast))
     passes = ca.logic_and(ca.logic_or(fast, speed > settings.fast), ca.logic_not(lands))
-    meets = ca.logic_and(ca.fabs(contact.end) < TIE, contact.gap - contact.end > STILL * duration)
-    return ca.if_else(ca.logic_or(passes, meets), TIE + 2 * SHORTEST * settings.scheme.dt * speed, 0)
+    meets = ca.logic_and(ca.fabs(contact.end) < TIE_DISTANCE, contact.gap - contact.end > MAX_REST_SPEED * duration)
+    return ca.if_else(ca.logic_or(passes, meets), TIE_DISTANCE + 2 * MIN_SUBSTEP_SHARE * settings.scheme.dt * speed, 0)
 
 
-def _normal_target(contact: Contact, duration: Expr, touch: _Touch, away: Expr, smoothing: Expr) -> Expr:
+def _normal_target(contact: Contact, duration: Expr, touch: _FreeTouch, away: Expr, smoothing: Expr) -> Expr:
     """The velocity that the normal constraint of a rigid contact asks for at the middle of the step.
 
     Hit: the rebound carried from t* to the middle, b = max(u + n.f* (dt/2 - t*), 0). Not hit: ``away``, that of the
@@ -247,7 +247,7 @@ def _soft_impulse(
     contact: Contact,
     motions: Motions,
     duration: Expr,
-    conditions: Conditions,
+    conditions: SubstepFlags,
     seen: tuple[Expr, Frame, Expr],
 ) -> SoftImpulse:
     """Return the impulse of a soft contact; ``seen``: its velocity at mid-substep; where and when it begins.
@@ -268,7 +268,9 @@ def _soft_impulse(
     return soft_impulse(
         law,
         SoftApproach(
-            active=ca.logic_and(ca.logic_or(contact.hit, contact.gap < -TOUCH), ca.logic_not(conditions.suppressed)),
+            active=ca.logic_and(
+                ca.logic_or(contact.hit, contact.gap < -MAX_TOUCH_GAP), ca.logic_not(conditions.suppressed)
+            ),
             gap=contact.gap,
             rate=rate,
             time=contact.time,

@@ -12,8 +12,8 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.dynamics.collision.time_of_impact import TOUCH
-from symphys.dynamics.contact.oscillator import LEAST_B, response, spring_law
+from symphys.dynamics.collision.time_of_impact import MAX_TOUCH_GAP
+from symphys.dynamics.contact.oscillator import MIN_B, response, spring_law
 from symphys.maths.smoothing import clip
 from symphys.model.world import Law
 from symphys.types import Expr
@@ -22,7 +22,7 @@ NEWTON_STEPS = 4
 """Newton steps towards the instant at which surfaces part."""
 NO_FORCE = 1e-30
 """[m] Force over stiffness that stands for none where it divides."""
-SHORTEST_CONTACT = 1e-9
+MIN_CONTACT_SHARE = 1e-9
 """Shortest contact as a share of a substep, since mean velocities divide by it."""
 
 
@@ -86,7 +86,7 @@ def soft_impulse(law: Law, at: SoftApproach) -> SoftImpulse:
     kick, a = (d + before) / 2, at.acceleration
     backward = response(omega, -ratio, before)
     flight = ca.if_else(at.active, at.time, d)
-    e = ca.if_else(at.gap < -TOUCH, at.gap, 0)
+    e = ca.if_else(at.gap < -MAX_TOUCH_GAP, at.gap, 0)
     push = a - omega**2 * e
 
     # the velocity at the start of the substep, without what the contact gave for the time before it, and with it
@@ -97,7 +97,7 @@ def soft_impulse(law: Law, at: SoftApproach) -> SoftImpulse:
     # how long the surfaces push
     whole = response(omega, ratio, d - flight)
     touching = _time_in_contact(omega, ratio, whole, meeting, (e, a))
-    held = response(omega, ratio, ca.fmax(touching, SHORTEST_CONTACT * d))
+    held = response(omega, ratio, ca.fmax(touching, MIN_CONTACT_SHARE * d))
     meets = ca.logic_and(at.time > 0, e >= 0)
     event = ca.logic_and(at.active, ca.logic_or(meets, touching < whole.time))
 
@@ -109,7 +109,7 @@ def soft_impulse(law: Law, at: SoftApproach) -> SoftImpulse:
     late = parting + a * left - mean - d / 2 * a
 
     whole_law = spring_law(held, backward)
-    b = ca.if_else(event, ca.fmax(whole_law.b * touching / d, LEAST_B), whole_law.b)
+    b = ca.if_else(event, ca.fmax(whole_law.b * touching / d, MIN_B), whole_law.b)
     wanted = ca.if_else(event, given + b * mean, -(whole_law.stiff * e + whole_law.c * base))
     lasts = ca.logic_and(at.active, ca.logic_not(event))
     return SoftImpulse(

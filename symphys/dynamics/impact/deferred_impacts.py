@@ -9,7 +9,7 @@ import casadi as ca
 
 from symphys.dynamics.collision import Contact
 from symphys.dynamics.context import State, StepContext, StepSettings
-from symphys.dynamics.impact.impact import TOGETHER, TOUCHING, StepSplit, strikes
+from symphys.dynamics.impact.impact import MAX_TOUCH_GAP, SIMULTANEITY_SHARE, StepSplit, strikes
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.tracing.decorator import traced
@@ -49,19 +49,19 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
     contacts = detect_contacts(context, motions, duration)
     near = [each for _, each in context.pairs_and_near()]
     looked_at = list(zip(pairs, near, contacts, strict=True))
-    hits = [_hit(context.settings, pair.law, contact, each) for pair, each, contact in looked_at]
+    hits = [_closing_contact(context.settings, pair.law, contact, each) for pair, each, contact in looked_at]
     eccentric, sides = eccentric_bodies(world), {k for pair in pairs for k in bodies_of(pair)}
     rebounds = {k for pair in pairs if not is_zero(pair.law.restitution) for k in bodies_of(pair)}
     first: dict[int, Expr] = dict.fromkeys(sorted(sides & (eccentric | rebounds)), duration)
     for pair, contact, (_, meets) in zip(pairs, contacts, hits, strict=True):
         for body in first.keys() & set(bodies_of(pair)):
-            first[body] = _sooner(first[body], meets, contact.time)
+            first[body] = _update_first_hit(first[body], meets, contact.time)
     struck = {body: ca.SX(0) for body in sorted(first.keys() & eccentric)}
     for j, pair in enumerate(pairs):
         for body in struck.keys() & set(bodies_of(pair)):
             for split in splits:
-                struck[body] = _or(struck[body], split.struck[j])
-    rooms = [_room(world, pair, eccentric) for pair in pairs]
+                struck[body] = _either(struck[body], split.struck[j])
+    rooms = [_max_overlap(world, pair, eccentric) for pair in pairs]
     central = {k for pair, room in zip(pairs, rooms, strict=True) if room is not None for k in bodies_of(pair)}
     blows = {body: ca.SX.zeros(3) for body in sorted(central)}
     for pair, contact, (_, meets) in zip(pairs, contacts, hits, strict=True):
@@ -70,22 +70,22 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
         for side, body in enumerate(bodies):
             if body in blows:
                 so_far = blows[body], first[body]
-                blows[body] = _blown(context.settings, pair.law, side, masses, so_far, meets, contact)
+                blows[body] = _add_blow(context.settings, pair.law, side, masses, so_far, meets, contact)
     found, chained, plastic = list[Expr](), ca.SX(0), ca.SX(0)
     for (pair, each, contact), (fast, meets), room in zip(looked_at, hits, rooms, strict=True):
-        waits, bodies = _passes(fast, meets), bodies_of(pair)
+        waits, bodies = _closes_without_touch(fast, meets), bodies_of(pair)
         for body in sorted(first.keys() & set(bodies)):
-            waits = _later(waits, fast, contact.time, first[body], struck.get(body, ca.SX(0)))
+            waits = _defer_later_hit(waits, fast, contact.time, first[body], struck.get(body, ca.SX(0)))
         if room is not None:
             before, sight = ((waits,), (chained,), (plastic,)), (fast, contact, each)
             own = tuple((first[body], blows[body]) for body in bodies)
-            (waits,), (chained,), (plastic,) = _driven(context.settings, before, sight, own, duration, room)
+            (waits,), (chained,), (plastic,) = _driven_pair(context.settings, before, sight, own, duration, room)
         found.append(waits)
-        chained = _chained(chained, waits, meets)
+        chained = _update_chained(chained, waits, meets)
     return DeferredImpacts(tuple(found), chained, plastic)
 
 
-def _room(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
+def _max_overlap(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
     """Return how deep two rebounding balls may overlap before they are parted [m]; None for other pairs."""
     if pair.law.soft or is_zero(pair.law.restitution) or eccentric & set(bodies_of(pair)):
         return None
@@ -95,20 +95,20 @@ def _room(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
 
 
 @traced
-def _hit(settings: StepSettings, law: Law, contact: Contact, near: Expr) -> tuple[Expr, Expr]:
+def _closing_contact(settings: StepSettings, law: Law, contact: Contact, near: Expr) -> tuple[Expr, Expr]:
     """(whether it closes at speed, whether it then meets)."""
     fast = strikes(settings, law, contact, near)
     return fast, ca.logic_and(fast, contact.hit)
 
 
 @traced
-def _sooner(first: Expr, meets: Expr, time: Expr) -> Expr:
+def _update_first_hit(first: Expr, meets: Expr, time: Expr) -> Expr:
     """Update the instant at which a body is first hit by one more contact."""
     return ca.if_else(meets, ca.fmin(first, time), first)
 
 
 @traced
-def _blown(
+def _add_blow(
     settings: StepSettings,
     law: Law,
     side: int,
@@ -121,12 +121,12 @@ def _blown(
     blow, first = before
     share = 1 / masses[side] / sum(1 / mass for mass in masses)
     kick = (1 + law.restitution) * share * ca.fmax(-contact.rate, 0) * (1 - 2 * side)
-    counts = ca.logic_and(meets, contact.time < first + TOGETHER * settings.scheme.dt)
+    counts = ca.logic_and(meets, contact.time < first + SIMULTANEITY_SHARE * settings.scheme.dt)
     return blow + ca.if_else(counts, kick, 0) * contact.geometry.frame(contact.time).normal
 
 
 @traced
-def _driven(
+def _driven_pair(
     settings: StepSettings,
     before: tuple[tuple[Expr], ...],
     sight: tuple[Expr, Contact, Expr],
@@ -141,7 +141,7 @@ def _driven(
     for what it was where the pair is far.
     """
     fast, contact, near = sight
-    normal, touch = contact.geometry.frame(duration).normal, TOUCHING * settings.reference * settings.scheme.dt**2
+    normal, touch = contact.geometry.frame(duration).normal, MAX_TOUCH_GAP * settings.reference * settings.scheme.dt**2
     speeds = [-(1 - 2 * side) * ca.dot(normal, blow) for side, (_, blow) in enumerate(blows)]
     way = duration * sum(ca.fmax(speed, 0) for speed in speeds)
     depth = sum((duration - time) * speed for (time, _), speed in zip(blows, speeds, strict=True)) - contact.end
@@ -154,20 +154,20 @@ def _driven(
 
 
 @traced
-def _chained(before: Expr, waits: Expr, meets: Expr) -> Expr:
+def _update_chained(before: Expr, waits: Expr, meets: Expr) -> Expr:
     return either(before, ca.logic_and(waits, meets))
 
 
 @traced
-def _passes(fast: Expr, meets: Expr) -> Expr:
+def _closes_without_touch(fast: Expr, meets: Expr) -> Expr:
     return ca.logic_and(fast, ca.logic_not(meets))
 
 
 @traced
-def _or(before: Expr, new: Expr) -> Expr:
+def _either(before: Expr, new: Expr) -> Expr:
     return either(before, new)
 
 
 @traced
-def _later(waits: Expr, fast: Expr, time: Expr, first: Expr, before: Expr) -> Expr:
+def _defer_later_hit(waits: Expr, fast: Expr, time: Expr, first: Expr, before: Expr) -> Expr:
     return either(waits, ca.logic_and(fast, ca.logic_or(time > first, before)))

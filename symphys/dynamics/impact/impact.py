@@ -9,8 +9,8 @@ import casadi as ca
 
 from symphys.dynamics.collision import Contact
 from symphys.dynamics.contact.body_term import Motions, at_touch, body_terms
-from symphys.dynamics.contact.constraint import UNREACHED, ZERO, ContactConstraint, ContactImpulse
-from symphys.dynamics.contact.coupling import coupling_of, which_couple
+from symphys.dynamics.contact.constraint import INACTIVE_NORMAL_SPEED, ZERO_IMPULSE, ContactConstraint, ContactImpulse
+from symphys.dynamics.contact.coupling import coupled_pairs, coupling_of
 from symphys.dynamics.contact.effective_mass import (
     delassus_column,
     effective_masses,
@@ -18,24 +18,24 @@ from symphys.dynamics.contact.effective_mass import (
     symmetric_mobilities,
 )
 from symphys.dynamics.contact.friction import friction_at
-from symphys.dynamics.contact.preparation import SHORTEST, closes_fast, width_of
+from symphys.dynamics.contact.preparation import MIN_SUBSTEP_SHARE, closes_fast, width_of
 from symphys.dynamics.context import State, StepContext, StepSettings
 from symphys.dynamics.impact.restitution import rebound
 from symphys.dynamics.joints.assembly import locks_at, momenta_of, prepare_trees
 from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply
 from symphys.dynamics.prediction import bodies_of, detect_contacts, predicted_motions
 from symphys.dynamics.substep import Substep
-from symphys.dynamics.tracing.decorator import gathered, traced
+from symphys.dynamics.tracing.decorator import contiguous, traced
 from symphys.dynamics.unknowns import Iterate, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.maths.smoothing import either, positive
 from symphys.model.world import Law
 from symphys.types import Expr
 
-TOGETHER = 1e-9
+SIMULTANEITY_SHARE = 1e-9
 """Of dt: impacts that are no further apart are one."""
-POSE = "position", "orientation"
-TOUCHING = 1e-3
+POSE_FIELDS = "position", "orientation"
+MAX_TOUCH_GAP = 1e-3
 """Of the distance a_ref dt^2: surfaces that near to each other take part in an impact of their bodies."""
 
 
@@ -70,11 +70,11 @@ def find_split(context: StepContext, x: State, duration: Expr, share: float) -> 
     ]
     earliest = (ca.SX(0), duration)
     for contact, closes in zip(contacts, fast, strict=True):
-        earliest = _earlier(earliest, closes, contact.hit, contact.time, context.settings.scheme.dt)
-    first = _inside(earliest, duration, share)
-    until = _until(earliest[1], first, context.settings.scheme.dt)
+        earliest = _update_earliest(earliest, closes, contact.hit, contact.time, context.settings.scheme.dt)
+    first = _substep_length(earliest, duration, share)
+    until = _latest_shared_time(earliest[1], first, context.settings.scheme.dt)
     struck = [_is_struck(c, contact.hit, contact.time, until) for contact, c in zip(contacts, fast, strict=True)]
-    late = [_late(earliest, s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
+    late = [_time_after_split(earliest, s, contact.time) for contact, s in zip(contacts, struck, strict=True)]
     return StepSplit(earliest[0], first, tuple(fast), tuple(struck), tuple(late))
 
 
@@ -85,17 +85,17 @@ def strikes(settings: StepSettings, law: Law, contact: Contact, near: Expr) -> E
 
 
 @traced
-def _earlier(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, dt: Expr) -> tuple[Expr, Expr]:
+def _update_earliest(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, dt: Expr) -> tuple[Expr, Expr]:
     """(whether there is an impact, when), with one more contact looked at; at a tie with the slope of this one."""
     meets = ca.logic_and(closes, hit)
-    sooner = ca.logic_and(meets, time < earliest[1] + TOGETHER * dt)
+    sooner = ca.logic_and(meets, time < earliest[1] + SIMULTANEITY_SHARE * dt)
     return either(earliest[0], meets), ca.if_else(sooner, time, earliest[1])
 
 
 @traced
-def _until(earliest: Expr, first: Expr, dt: Expr) -> Expr:
+def _latest_shared_time(earliest: Expr, first: Expr, dt: Expr) -> Expr:
     """Return the latest instant of impacts that share the split; none may lie between it and the split."""
-    return ca.fmax(earliest, first) + TOGETHER * dt
+    return ca.fmax(earliest, first) + SIMULTANEITY_SHARE * dt
 
 
 @traced
@@ -104,18 +104,18 @@ def _is_struck(closes: Expr, hit: Expr, time: Expr, until: Expr) -> Expr:
 
 
 @traced
-def _late(earliest: tuple[Expr, Expr], struck: Expr, time: Expr) -> Expr:
+def _time_after_split(earliest: tuple[Expr, Expr], struck: Expr, time: Expr) -> Expr:
     impact, first = earliest
     return ca.if_else(ca.logic_and(impact, struck), time - first, 0)
 
 
 @traced
-def _inside(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
+def _substep_length(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
     """The length of the substep before the split; near an end it is shifted, not clamped, so that its slope stays.
 
     Surfaces that rounding has put beyond each other meet at a time below 0 (``time_of_impact.falls``).
     """
-    least, time = SHORTEST * duration, earliest[1]
+    least, time = MIN_SUBSTEP_SHARE * duration, earliest[1]
     early = least * (1 + ca.ceil(ca.fmax(-time, 0) / least))
     shift = ca.if_else(time < least, early, ca.if_else(time > duration - least, -least, 0))
     return ca.if_else(earliest[0], time + shift, share * duration)
@@ -129,7 +129,7 @@ def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
     momenta = tuple(Momentum(motion.velocity, motion.momentum_k) for motion in motions)
     trees = prepare_trees(context, motions, momenta, ca.SX(0))
     constraints = []
-    couple = which_couple(context.world)
+    couple = coupled_pairs(context.world)
     for (pair, near), contact, struck, coupled in zip(
         context.pairs_and_near(), contacts, split.struck, couple, strict=True
     ):
@@ -138,9 +138,9 @@ def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
         arguments = pair.law, contact, moving, struck, split.impact, trees.same(bodies), coupled, near
         constraints.append(trees.placed(bodies, _constraint(context.settings, *arguments)))
     locks = locks_at(context, trees)
-    n, still = len(locks), (*(nothing for _, nothing in locks), *(ZERO for _ in constraints))
+    n, still = len(locks), (*(nothing for _, nothing in locks), *(ZERO_IMPULSE for _ in constraints))
     every = (*(constraint for constraint, _ in locks), *constraints)
-    states = gathered(trees.states) if context.near else trees.states
+    states = contiguous(trees.states) if context.near else trees.states
     solved = rebound(context, every, Iterate(states, still, still), motions, trees)
     after = _with_velocities(context, x, motions, momenta_of(context, trees, solved.momenta), split.impact)
     _delay(context, after, constraints, solved.impulses[n:], split.late)
@@ -164,12 +164,12 @@ def _constraint(
 ) -> ContactConstraint:
     """The constraint of a contact at an impact: where ``struck`` it rebounds, where it touches it holds."""
     now, scheme = ca.SX(0), settings.scheme
-    touching = ca.logic_and(impact, contact.gap < TOUCHING * settings.reference * scheme.dt**2)
+    touching = ca.logic_and(impact, contact.gap < MAX_TOUCH_GAP * settings.reference * scheme.dt**2)
     velocity, _, normal = at_touch(contact, motions, now)
     speed = law.restitution * positive(-ca.dot(normal, velocity), settings.smoothing)
     frame = contact.geometry.frame(now)
     terms, friction = body_terms(motions, now, frame, frame), friction_at(law, frame.normal, motions, now)
-    resting = ca.if_else(touching, 0, UNREACHED)
+    resting = ca.if_else(touching, 0, INACTIVE_NORMAL_SPEED)
     push, twist = symmetric_mobilities(terms, same)
     masses = inverse_masses(terms, frame.normal, push, twist)
     return ContactConstraint(
@@ -182,7 +182,7 @@ def _constraint(
         separates=ca.SX(1),
         **effective_masses(*masses),
         softness=ca.SX(0),
-        target=ca.SX(UNREACHED) if law.soft else ca.if_else(struck, speed, resting),
+        target=ca.SX(INACTIVE_NORMAL_SPEED) if law.soft else ca.if_else(struck, speed, resting),
         slip_target=ca.SX.zeros(3),
         delay=ca.SX(0),
         leaving=struck,
@@ -205,8 +205,8 @@ def _with_velocities(
     for body, motion, momentum in zip(context.world.bodies, motions, momenta, strict=True):
         names = f"{body.name}.velocity", f"{body.name}.angular_velocity"
         before = tuple(x[name] for name in names)
-        values |= zip(names, _after(motion, momentum, before, impact), strict=True)
-    values["lag"] = _renewed(impact, x["lag"])
+        values |= zip(names, _velocities_after(motion, momentum, before, impact), strict=True)
+    values["lag"] = _restarted_lag(impact, x["lag"])
     return values
 
 
@@ -226,7 +226,7 @@ def _delay(
         free = [(k, index) for k, index in enumerate(each.bodies) if index not in held]
         if not free:
             continue
-        names = [tuple(f"{context.world.bodies[index].name}.{part}" for part in POSE) for _, index in free]
+        names = [tuple(f"{context.world.bodies[index].name}.{part}" for part in POSE_FIELDS) for _, index in free]
         poses, terms = tuple(tuple(x[name] for name in own) for own in names), tuple(k for k, _ in free)
         for own, pose in zip(names, _delayed(poses, each.constraint, terms, impulse, time), strict=True):
             x |= zip(own, pose, strict=True)
@@ -252,12 +252,14 @@ def _delayed(
 
 
 @traced
-def _after(motion: PredictedMotion, momentum: Momentum, before: tuple[Expr, ...], impact: Expr) -> tuple[Expr, Expr]:
+def _velocities_after(
+    motion: PredictedMotion, momentum: Momentum, before: tuple[Expr, ...], impact: Expr
+) -> tuple[Expr, Expr]:
     """(velocity, angular velocity): as solved if there is an impact, else as before."""
     spin = angular_velocity(motion.inertia, motion.orientation, momentum.angular)
     return ca.if_else(impact, momentum.velocity, before[0]), ca.if_else(impact, spin, before[1])
 
 
 @traced
-def _renewed(impact: Expr, lag: Expr) -> Expr:
+def _restarted_lag(impact: Expr, lag: Expr) -> Expr:
     return ca.if_else(impact, 0, lag)

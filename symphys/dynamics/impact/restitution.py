@@ -22,7 +22,7 @@ from symphys.dynamics.context import StepContext
 from symphys.dynamics.joints.assembly import KinematicTrees, momenta_of
 from symphys.dynamics.motion import PredictedMotion, apply, inverse_inertia
 from symphys.dynamics.pgs import iterate
-from symphys.dynamics.tracing.decorator import gathered, traced
+from symphys.dynamics.tracing.decorator import contiguous, traced
 from symphys.dynamics.unknowns import (
     AnyImpulse,
     GeneralizedVelocities,
@@ -55,7 +55,7 @@ def rebound(
         return iterate(context, constraints, start, trees)
     dead = tuple(replace(each, constraint=_without_rebound(each.constraint)) for each in constraints)
     plastic = iterate(context, dead, start, trees)
-    between = replace(plastic, momenta=gathered(plastic.momenta)) if context.near else plastic
+    between = replace(plastic, momenta=contiguous(plastic.momenta)) if context.near else plastic
     newton = iterate(context, constraints, between, trees)
     sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
     solutions = replace(start, momenta=trees.states), plastic, newton

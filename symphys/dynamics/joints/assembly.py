@@ -256,4 +256,4 @@ def own(stored: Expr, k: int | None) -> Expr:
 
 @traced
 def _again(constraint: LockConstraint | CoordinateConstraint, stored: Expr, k: int | None, kick: Expr) -> JointImpulse:
-    return constraint.taken_up(kick * own(stored, k))
+    return constraint.from_stored(kick * own(stored, k))

@@ -35,7 +35,7 @@ class CoordinateConstraint:
 
     Attributes:
         terms: arms at the constraint's instant, and to the common point for impulses.
-        seen, given_along: the one direction at the constraint's instant, and of the impulse.
+        seen, impulse_directions: the one direction at the constraint's instant, and of the impulse.
         keep, slope, offset: see the module.
         low, high: bounds of the impulse; None where there is none.
         width: of the smoothed bounds [N m s].
@@ -46,12 +46,13 @@ class CoordinateConstraint:
         landing: 1 for a limit that is struck: its impulse is an impact, not a force.
         drive: what a motor's command gives by itself [N m], [N]; None for what aims at a velocity.
         jump: by how much that differs from the step before; None for a motor that gives nothing else.
-        pushed: how much less impulse it gives for a unit impulse of the constraint before it; see ``project_in_turn``.
+        pushed: how much less impulse it gives for a unit impulse of the constraint before it, see
+            ``project_sequentially``.
     """
 
     terms: tuple[BodyTerm, ...]
     seen: Directions
-    given_along: Directions
+    impulse_directions: Directions
     keep: Expr
     slope: Expr
     offset: Expr
@@ -67,7 +68,7 @@ class CoordinateConstraint:
     jump: Expr | None = None
     pushed: Expr | None = None
 
-    def fitting(self, moved: Expr) -> Expr:
+    def position_impulse(self, moved: Expr) -> Expr:
         """(1,): the impulse times a time that takes a limit back to where it is kept, a coupling to where it holds.
 
         See ``LockConstraint``.
@@ -84,11 +85,11 @@ class CoordinateConstraint:
             return speeds(self.terms, self.seen, momenta)
         return momenta[0].along(self.of_tree.jacobian)
 
-    def carried(self, impulse: JointImpulse) -> Expr:
+    def stored_form(self, impulse: JointImpulse) -> Expr:
         """(1,): what is stored of an impulse; also of a force."""
         return impulse.numbers
 
-    def taken_up(self, stored: Expr) -> JointImpulse:
+    def from_stored(self, stored: Expr) -> JointImpulse:
         """The impulse that is stored so."""
         return JointImpulse(stored)
 
@@ -143,12 +144,12 @@ class CoordinateConstraint:
     def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
         """Implement ``VelocityConstraint.apply``."""
         if self.of_tree is None:
-            return apply_impulse(self.terms, self.given_along, momenta, impulse.numbers, self.same)
+            return apply_impulse(self.terms, self.impulse_directions, momenta, impulse.numbers, self.same)
         after = GeneralizedVelocities(momenta[0].numbers + ca.mtimes(self.of_tree.response, impulse.numbers))
         return tuple(after for _ in self.terms)
 
 
-def project_in_turn(
+def project_sequentially(
     constraints: Sequence[CoordinateConstraint], velocities: GeneralizedVelocities, old: Sequence[JointImpulse]
 ) -> tuple[GeneralizedVelocities, list[JointImpulse]]:
     """Projections of coordinates of one tree, one after the other.
@@ -168,18 +169,18 @@ def project_in_turn(
 
 
 @traced
-def pushed_by(first: CoordinateConstraint, then: CoordinateConstraint) -> Expr:
+def coupling_to_previous(first: CoordinateConstraint, then: CoordinateConstraint) -> Expr:
     """(1,): see ``CoordinateConstraint.pushed``."""
     assert first.of_tree is not None and then.of_tree is not None
     return then.slope * GeneralizedVelocities(first.of_tree.response).along(then.of_tree.jacobian)
 
 
-def towards(target: Expr, mobility: Expr) -> dict[str, Expr]:
+def velocity_law(target: Expr, mobility: Expr) -> dict[str, Expr]:
     """The coefficients of a constraint that asks for a velocity."""
     return {"keep": ca.SX(1), "slope": 1 / mobility, "offset": -target / mobility}
 
 
-def by_law(a: Expr, b: Expr, mobility: Expr) -> dict[str, Expr]:
+def affine_law(a: Expr, b: Expr, mobility: Expr) -> dict[str, Expr]:
     """The coefficients of a constraint whose impulse is -(a + b rate)."""
     share = 1 / (1 + b * mobility)
     return {"keep": b * mobility * share, "slope": b * share, "offset": a * share}

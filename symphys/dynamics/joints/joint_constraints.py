@@ -16,9 +16,9 @@ import casadi as ca
 
 from symphys.dynamics.contact.body_term import BodyTerm, Motions
 from symphys.dynamics.contact.oscillator import SpringLaw, response, spring_law
-from symphys.dynamics.contact.preparation import TIE
+from symphys.dynamics.contact.preparation import TIE_DISTANCE
 from symphys.dynamics.context import StepSettings
-from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint, TreeCoordinate, by_law, towards
+from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint, TreeCoordinate, affine_law, velocity_law
 from symphys.dynamics.joints.joint_frames import JointFrames, free, locked
 from symphys.dynamics.joints.joint_impulse import Directions, mobility, speeds
 from symphys.dynamics.joints.locked_directions import LastingForce, LockConstraint, inverse
@@ -28,12 +28,12 @@ from symphys.maths.smoothing import at_least, at_most, clip
 from symphys.model.joints import AffineMotor, Joint, JointCoupling, Servo, Spring, TorqueMotor, VelocityMotor
 from symphys.types import Expr
 
-NEVER = ca.SX(0)
-REDUNDANT = 1e-6
+NO_STRIKE = ca.SX(0)
+REDUNDANT_MOBILITY_SHARE = 1e-6
 """Of the mobility of both bodies by themselves."""
-HEAVIER = 0.27
+ADDED_MASS_SHARE = 0.27
 """Of k dt^2: what a spring adds to an effective mass; with 1/4 leapfrog would be at the edge of stability."""
-REACHED = 1e-4
+MIN_STRIKE_STEP = 1e-4
 """[rad], [m] in a step: what comes to a limit faster than that strikes it."""
 
 
@@ -111,7 +111,7 @@ def lock_constraint(
     return LockConstraint(
         terms=terms,
         seen=seen,
-        given_along=given,
+        impulse_directions=given,
         mass=inverse(k + ca.diag(softness)),
         softness=softness,
         target=target,
@@ -139,7 +139,7 @@ def regular_mobility(terms: tuple[BodyTerm, ...], seen: Directions, same: bool) 
     if all(term.jacobian is None for term in terms):
         return k
     apart = tuple(replace(term, jacobian=None) for term in terms)
-    return k + REDUNDANT * ca.diag(ca.diag(mobility(apart, seen, False)))
+    return k + REDUNDANT_MOBILITY_SHARE * ca.diag(ca.diag(mobility(apart, seen, False)))
 
 
 def _spring_law(joint: Joint, substep: SubstepTimes) -> SpringLaw:
@@ -220,13 +220,13 @@ def motor_constraint(
     if isinstance(motor, AffineMotor):
         return _affine(settings, motor, at, command, substep)
     if isinstance(motor, TorqueMotor):
-        return _driven(at, commanded_torque(motor, command.given, settings.smoothing), command, substep)
+        return _drive_constraint(at, commanded_torque(motor, command.given, settings.smoothing), command, substep)
     assert isinstance(motor, Servo | VelocityMotor)
     aim = command.given
     wanted = servo_velocity(motor, aim, at.value, settings.smoothing) if isinstance(motor, Servo) else aim
     target = clip(wanted, -motor.velocity, motor.velocity, settings.smoothing)
     most = motor.torque * substep.kick
-    return _constraint(at, towards(target, at.mobility), -most, most, width)
+    return _constraint(at, velocity_law(target, at.mobility), -most, most, width)
 
 
 def commanded_torque(motor: TorqueMotor | AffineMotor, given: Expr, smoothing: Expr = 0, width: Expr = 0) -> Expr:
@@ -242,9 +242,11 @@ def commanded_torque(motor: TorqueMotor | AffineMotor, given: Expr, smoothing: E
     return drive
 
 
-def _driven(at: CoordinateTerms, drive: Expr, command: Command, substep: SubstepTimes) -> CoordinateConstraint:
+def _drive_constraint(
+    at: CoordinateTerms, drive: Expr, command: Command, substep: SubstepTimes
+) -> CoordinateConstraint:
     """A motor that gives what its command says: ``drive`` [N m] in the substep, over the lag what it was before."""
-    law = by_law(-_impulse(drive, command, substep), ca.SX(0), at.mobility)
+    law = affine_law(-_impulse(drive, command, substep), ca.SX(0), at.mobility)
     return _constraint(at, law, None, None, ca.SX(0), drive=drive)
 
 
@@ -260,9 +262,9 @@ def _affine(
     gear, kick, width, ends = motor.gear, substep.kick, settings.smoothing / at.mobility, _force_ends(motor)
     drive = commanded_torque(motor, command.given, settings.smoothing, width / kick)
     if motor.passive:
-        return _driven(at, drive, command, substep)
+        return _drive_constraint(at, drive, command, substep)
     pull, slope = _spring(settings, at, substep, Spring(gear**2 * motor.kp, gear**2 * motor.kv))
-    law = by_law(pull - _impulse(drive, command, substep), slope, at.mobility)
+    law = affine_law(pull - _impulse(drive, command, substep), slope, at.mobility)
     low, high = (None if end is None else kick * end for end in ends)
     return _constraint(at, law, low, high, width, drive=drive, jump=drive - command.before)
 
@@ -293,8 +295,10 @@ def lower_limit(
     What is beyond it is taken back by the position pass, without velocity.
     """
     left, strikes = at.value - joint.limits.lower, _strikes(settings, at, -at.rate_now)
-    law = towards(-_room(left, strikes) / substep.duration, at.mobility)
-    return _constraint(at, law, ca.SX(0), None, settings.smoothing / at.mobility, left + TIE * strikes, strikes)
+    law = velocity_law(-_limit_slack(left, strikes) / substep.duration, at.mobility)
+    return _constraint(
+        at, law, ca.SX(0), None, settings.smoothing / at.mobility, left + TIE_DISTANCE * strikes, strikes
+    )
 
 
 @traced
@@ -303,18 +307,20 @@ def upper_limit(
 ) -> CoordinateConstraint:
     """A limit from above."""
     left, strikes = joint.limits.upper - at.value, _strikes(settings, at, at.rate_now)
-    law = towards(_room(left, strikes) / substep.duration, at.mobility)
-    return _constraint(at, law, None, ca.SX(0), settings.smoothing / at.mobility, left + TIE * strikes, strikes)
+    law = velocity_law(_limit_slack(left, strikes) / substep.duration, at.mobility)
+    return _constraint(
+        at, law, None, ca.SX(0), settings.smoothing / at.mobility, left + TIE_DISTANCE * strikes, strikes
+    )
 
 
-def _room(left: Expr, strikes: Expr) -> Expr:
-    """Return how far a limit may go within the substep; by rounding more at a strike, see ``TIE``."""
-    return ca.if_else(left < -TIE, 0, left) + TIE * strikes
+def _limit_slack(left: Expr, strikes: Expr) -> Expr:
+    """Return how far a limit may go within the substep; by rounding more at a strike, see ``TIE_DISTANCE``."""
+    return ca.if_else(left < -TIE_DISTANCE, 0, left) + TIE_DISTANCE * strikes
 
 
 def _strikes(settings: StepSettings, at: CoordinateTerms, closing: Expr) -> Expr:
     """1 if a limit is reached at speed: faster than what acts in two steps brings about."""
-    return closing > 4 * ca.fabs(at.rate - at.rate_now) + REACHED / settings.scheme.dt
+    return closing > 4 * ca.fabs(at.rate - at.rate_now) + MIN_STRIKE_STEP / settings.scheme.dt
 
 
 @traced
@@ -324,7 +330,7 @@ def spring_constraint(
     """A spring and damper."""
     assert joint.spring is not None
     pull, half = _spring(settings, at, substep, joint.spring)
-    return _constraint(at, by_law(pull, half, at.mobility), None, None, ca.SX(0))
+    return _constraint(at, affine_law(pull, half, at.mobility), None, None, ca.SX(0))
 
 
 @traced
@@ -333,7 +339,7 @@ def friction_constraint(
 ) -> CoordinateConstraint:
     """Dry friction: it stops the coordinate with at most so much."""
     most = joint.friction * substep.kick
-    return _constraint(at, towards(ca.SX(0), at.mobility), -most, most, settings.smoothing / at.mobility)
+    return _constraint(at, velocity_law(ca.SX(0), at.mobility), -most, most, settings.smoothing / at.mobility)
 
 
 @traced
@@ -357,18 +363,18 @@ def coupling_constraint(
         error = follows.value - coupling.value(leads.value)
     both = TreeCoordinate(jacobian, response)
     at = replace(follows, mobility=ca.mtimes(jacobian, response), of_tree=both)
-    return _constraint(at, towards(ca.SX(0), at.mobility), None, None, ca.SX(0), error)
+    return _constraint(at, velocity_law(ca.SX(0), at.mobility), None, None, ca.SX(0), error)
 
 
 def _spring(settings: StepSettings, at: CoordinateTerms, substep: SubstepTimes, spring: Spring) -> tuple[Expr, Expr]:
     """(a, b) of the impulse -(a + b rate) of a spring and damper.
 
-    The spring acts as if the coordinate were heavier by ``HEAVIER`` k dt^2, whatever accelerates it: of second order,
-    keeps energy, is stable at any k, and at rest its force is k (q - rest). The damper acts on the mean of the rates
-    before and after: with all that acted in the step before, else what falls on it from then to now would count twice,
-    an error of first order.
+    The spring acts as if the coordinate were heavier by ``ADDED_MASS_SHARE`` k dt^2, whatever accelerates it: of second
+    order, keeps energy, is stable at any k, and at rest its force is k (q - rest). The damper acts on the mean of the
+    rates before and after: with all that acted in the step before, else what falls on it from then to this step would
+    count twice, an error of first order.
     """
-    heavier = HEAVIER * spring.stiffness * settings.scheme.dt**2
+    heavier = ADDED_MASS_SHARE * spring.stiffness * settings.scheme.dt**2
     half = substep.kick * spring.damping / 2
     before = at.rate_now + (at.rate_due - at.rate_now) * (1 - 2 * substep.kick / substep.duration)
     pull = substep.kick * spring.stiffness * (at.value - spring.rest)
@@ -392,7 +398,7 @@ def _constraint(
     high: Expr | None,
     width: Expr,
     left: Expr | None = None,
-    landing: Expr = NEVER,
+    landing: Expr = NO_STRIKE,
     drive: Expr | None = None,
     jump: Expr | None = None,
 ) -> CoordinateConstraint:

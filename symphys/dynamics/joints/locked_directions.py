@@ -32,7 +32,7 @@ class LockConstraint:
 
     Attributes:
         terms: arms at the constraint's instant, and to the common point for impulses.
-        seen, given_along: directions at the constraint's instant, and of impulses.
+        seen, impulse_directions: directions at the constraint's instant, and of impulses.
         mass: (n, n) inverse of mobility and softness.
         softness: (n,) gamma of a joint that is soft, 0 if rigid.
         target: (n,) velocities that the constraint asks for [m/s], [rad/s].
@@ -45,7 +45,7 @@ class LockConstraint:
 
     terms: tuple[BodyTerm, ...]
     seen: Directions
-    given_along: Directions
+    impulse_directions: Directions
     mass: Expr
     softness: Expr
     target: Expr
@@ -54,7 +54,7 @@ class LockConstraint:
     same: bool
     lasting: LastingForce | None = None
 
-    def fitting(self, moved: Expr) -> Expr:
+    def position_impulse(self, moved: Expr) -> Expr:
         """(n,): displacements by the directions moved to impulses times a time that close what is then left open."""
         return -ca.mtimes(self.mass, self.error + moved)
 
@@ -64,15 +64,15 @@ class LockConstraint:
         moving = self.lasting.slope * speeds(self.terms, self.seen, momenta)
         return JointImpulse(impulse.numbers / self.lasting.kick + moving + self.lasting.constant)
 
-    def carried(self, impulse: JointImpulse) -> Expr:
+    def stored_form(self, impulse: JointImpulse) -> Expr:
         """(n,): what is stored of an impulse; also of a force."""
-        if self.given_along.slides is not None:
+        if self.impulse_directions.slides is not None:
             return impulse.numbers
         return ca.vertcat(ca.mtimes(self.axes.T, impulse.numbers[:3, 0]), impulse.numbers[3:, 0])
 
-    def taken_up(self, stored: Expr) -> JointImpulse:
+    def from_stored(self, stored: Expr) -> JointImpulse:
         """The impulse that is stored so."""
-        return JointImpulse(stored if self.given_along.slides is not None else in_world(self.axes, stored))
+        return JointImpulse(stored if self.impulse_directions.slides is not None else in_world(self.axes, stored))
 
     def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
         """Implement ``VelocityConstraint.project``."""
@@ -93,7 +93,7 @@ class LockConstraint:
 
     def apply(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> tuple[Any, ...]:
         """Implement ``VelocityConstraint.apply``."""
-        return apply_impulse(self.terms, self.given_along, momenta, impulse.numbers, self.same)
+        return apply_impulse(self.terms, self.impulse_directions, momenta, impulse.numbers, self.same)
 
 
 def in_world(axes: Expr, stored: Expr) -> Expr:

@@ -80,7 +80,7 @@ def _fit(
     constraint: LockConstraint | CoordinateConstraint, moved: Displacements, along: tuple[TreeDisplacement, ...]
 ) -> tuple[TreeDisplacement, ...]:
     """Displacements after which the joint fits."""
-    push, twist = constraint.given_along.split(constraint.fitting(_relative(constraint, moved)))
+    push, twist = constraint.impulse_directions.split(constraint.position_impulse(_relative(constraint, moved)))
     if constraint.same:
         after = along[0]
         for term in constraint.terms:

@@ -9,12 +9,14 @@ import casadi as ca
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.joints.assembly import JointPath
 from symphys.dynamics.joints.joint_frames import JointFrames, free
-from symphys.dynamics.position_correction import Corrected
+from symphys.dynamics.position_correction import CorrectedConfiguration
 from symphys.dynamics.tracing.decorator import traced
 from symphys.types import Expr
 
 
-def unwrapped_angles(context: StepContext, paths: Sequence[JointPath], closed: Corrected, duration: Expr) -> State:
+def unwrapped_angles(
+    context: StepContext, paths: Sequence[JointPath], closed: CorrectedConfiguration, duration: Expr
+) -> State:
     """``Joint.unwrapped`` of all joints that turn, at the end of a substep of ``duration`` [s].
 
     The coordinate at the start plus its change in the step is its angle to third order in the step. Poses give the

@@ -116,7 +116,7 @@ def _lasting_forces(
 
 @traced
 def _sprung(constraint: LockConstraint, momenta: tuple[Any, ...], impulse: JointImpulse) -> Expr:
-    return constraint.carried(constraint.at_end(momenta, impulse))
+    return constraint.stored_form(constraint.at_end(momenta, impulse))
 
 
 def of_body(struck: Struck, body: int) -> Expr:
@@ -134,7 +134,7 @@ def _lasting(
 ) -> Expr:
     """The force; of what a command gives the last one, although its impulse began with that of the step before."""
     kick, lag, shortest = times
-    given = constraint.carried(impulse)
+    given = constraint.stored_form(impulse)
     if isinstance(constraint, CoordinateConstraint) and constraint.drive is not None:
         if constraint.jump is None:
             return constraint.drive

@@ -8,7 +8,7 @@ from symphys.maths import rotation
 from symphys.model.joints import Joint
 from symphys.types import Expr
 
-UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+WORLD_ORIENTATION = (1.0, 0.0, 0.0, 0.0)
 """Of the world."""
 
 
@@ -20,7 +20,7 @@ def joint_turn(joint: Joint, orientations: tuple[Expr, ...], spins: tuple[Expr, 
         orientations: (4,) of its bodies in the order of ``Joint.bodies``.
         spins: (3,) [rad/s] their angular velocities, world frame.
     """
-    first, second = ((*orientations, ca.DM(UPRIGHT))[k] for k in (0, 1))
+    first, second = ((*orientations, ca.DM(WORLD_ORIENTATION))[k] for k in (0, 1))
     own, other = (
         rotation.multiply(q, ca.vertcat(*frame.orientation))
         for q, frame in zip((first, second), joint.frames, strict=True)

@@ -35,17 +35,21 @@ def half_step_function(
         context = context_of(world, scheme, inputs, arguments)
         x, dt = parts_of(layout, arguments[0]), ca.SX(context.settings.scheme.dt)
         values = dict(x)
-        for body, motion in zip(world.bodies, predicted_motions(context, _commanded(context, x), dt), strict=True):
-            place = _drifted(motion.position, motion.orientation, motion.velocity, motion.angular_velocity, dt / 2)
+        for body, motion in zip(
+            world.bodies, predicted_motions(context, _with_commanded_torques(context, x), dt), strict=True
+        ):
+            place = _half_step_pose(
+                motion.position, motion.orientation, motion.velocity, motion.angular_velocity, dt / 2
+            )
             changes = (motion.acceleration, motion.angular_acceleration)
-            moving = _accelerated(motion.velocity, motion.angular_velocity, *changes, dt / 2)
-            for name, value in zip(FIELDS, (*place, *moving), strict=True):
+            moving = _half_step_velocity(motion.velocity, motion.angular_velocity, *changes, dt / 2)
+            for name, value in zip(STATE_FIELDS, (*place, *moving), strict=True):
                 values[f"{body.name}.{name}"] = value
     packed = layout.pack({name: tracer.value(part) for name, part in values.items()})
     return ca.Function("half_step", arguments[:3], [ca.densify(packed)], ["x", "u", "p"], ["x_half"])
 
 
-def _commanded(context: StepContext, x: State) -> State:
+def _with_commanded_torques(context: StepContext, x: State) -> State:
     """The state with the torques that are commanded in this step in place of those of the last one."""
     values, bodies = dict(x), context.world.bodies
     for joint in context.world.joints:
@@ -61,14 +65,14 @@ def _commanded(context: StepContext, x: State) -> State:
     return values
 
 
-FIELDS = ("position", "orientation", "velocity", "angular_velocity")
+STATE_FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 
 
 @traced
-def _drifted(position: Expr, orientation: Expr, velocity: Expr, spin: Expr, half: Expr) -> tuple[Expr, Expr]:
+def _half_step_pose(position: Expr, orientation: Expr, velocity: Expr, spin: Expr, half: Expr) -> tuple[Expr, Expr]:
     return position + half * velocity, rotation.turn(orientation, half * spin)
 
 
 @traced
-def _accelerated(velocity: Expr, spin: Expr, change: Expr, turning: Expr, half: Expr) -> tuple[Expr, Expr]:
+def _half_step_velocity(velocity: Expr, spin: Expr, change: Expr, turning: Expr, half: Expr) -> tuple[Expr, Expr]:
     return velocity + half * change, spin + half * turning

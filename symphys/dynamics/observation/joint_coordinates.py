@@ -131,7 +131,9 @@ def _reactions(at: SensedState) -> dict[str, Wrench]:
         # what joints of trees lock: from the leaves to the root, what all bodies beyond a joint lack
         motions = predicted_motions(context, x, ca.SX(at.dt))
         for tree in kinematic_trees(world.joints):
-            lacking = {i: _lacking(motions[i], context.settings.gravity, *_known(context, x, i)) for i in tree.bodies}
+            lacking = {
+                i: _missing_wrench(motions[i], context.settings.gravity, *_known(context, x, i)) for i in tree.bodies
+            }
             for link in reversed(tree.links):
                 place = poses[link.body][0]
                 if link.parent is not None:
@@ -163,7 +165,7 @@ def _point(frame: JointFrame, pose: tuple[Expr, Expr]) -> Expr:
 
 
 @traced
-def _lacking(motion: PredictedMotion, gravity: Expr, given: Wrench, lasting: Wrench) -> Wrench:
+def _missing_wrench(motion: PredictedMotion, gravity: Expr, given: Wrench, lasting: Wrench) -> Wrench:
     """The rates of a body's momenta less all forces on it but those that its tree locks; a frame has no momenta."""
     counted = 0 if motion.massless else 1
     force = counted * motion.mass * (motion.acceleration - gravity) - given[0] - lasting[0]

@@ -34,7 +34,7 @@ class Tracing(Protocol):
         """Allow all calls that depend on ``word`` to be jumped over together."""
         ...
 
-    def gathered(self, tree: T) -> T:
+    def contiguous(self, tree: T) -> T:
         """Store a tree contiguously."""
         ...
 
@@ -86,10 +86,10 @@ def section(word: T) -> T:
     return word
 
 
-def gathered(tree: T) -> T:
+def contiguous(tree: T) -> T:
     """Return the tree, stored contiguously between calls so that it can substitute results of a call."""
     tracer = _TRACER.get()
-    return tree if tracer is None else tracer.gathered(tree)
+    return tree if tracer is None else tracer.contiguous(tree)
 
 
 def repeat(count: int, once: Callable[[C, T], T], context: C, state: T) -> T:

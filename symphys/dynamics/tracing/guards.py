@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 from symphys.types import Expr
 
-MANY = 80
+MAX_EXAMINED_ARGUMENTS = 80
 """Arguments of a call that is not looked into: it puts together what many bodies or pairs have."""
 Known = int
 """Which entries of a vector are known to be 0, as bits."""
@@ -48,7 +48,7 @@ class Guard(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Same:
+class _Substitute:
     """Entries ``start`` and after of an argument, by its number; of None: zeros."""
 
     argument: int | None
@@ -59,7 +59,7 @@ class _Same:
         return Part(None if self.argument is None else inputs[self.argument], self.start)
 
 
-Simplified = tuple[_Same | None, Known]
+Simplified = tuple[_Substitute | None, Known]
 """What a result equals, and where it is 0."""
 
 
@@ -75,13 +75,13 @@ def with_guards(
         guards: words that each leave out a few calls, here and there. What they depend on comes first.
         sections: words, as entries of vectors, that each leave out many calls that follow one another.
     """
-    search = _Search(calls)
-    first, found = search.needed(guards), dict[int, Guard]()
+    search = _GuardSearch(calls)
+    first, found = search.dependencies(guards), dict[int, Guard]()
     own, implied, taken = search.implied(guards), dict[int, list[int]](), set(first)
     for word in sorted(guards, key=lambda each: len(own[each.number])):
-        weaker = {k for number in own[word.number] for k in implied[number]}
+        implied_calls = {k for number in own[word.number] for k in implied[number]}
         taken -= search.writers(own[word.number])
-        left = search.left_out(Part(word), taken, weaker, [found[k] for k in weaker])
+        left = search.skippable(Part(word), taken, implied_calls, [found[k] for k in implied_calls])
         implied[word.number] = list(left)
         found |= left
         taken |= left.keys()
@@ -90,14 +90,14 @@ def with_guards(
     order = [*free, *held, *(k for k in range(len(calls)) if k not in first)]
     apart: dict[int, Guard] = {}
     for vector, entry in sections:
-        left = search.left_out(Part(vector, entry), apart.keys())
-        arranged = search.in_one_piece(order, left)
+        left = search.skippable(Part(vector, entry), apart.keys())
+        arranged = search.consecutive(order, left)
         if arranged is not None:
             order, apart = arranged, apart | left
     return tuple([calls[k]._replace(guard=found.get(k), section=apart.get(k)) for k in order])
 
 
-class _Search:
+class _GuardSearch:
     """Calls by who reads and who writes a vector, and the guards that have been found."""
 
     def __init__(self, calls: Sequence[TracedCall]) -> None:
@@ -105,7 +105,7 @@ class _Search:
         self._readers: dict[int, list[int]] = {}
         self._writer: dict[int, int] = {}
         self._evaluated: dict[tuple[int, Pattern], list[Simplified]] = {}
-        self._disregarded: dict[tuple[int, Pattern], _Disregarded] = {}
+        self._ignored: dict[tuple[int, Pattern], _IgnoredArguments] = {}
         self._zeros: dict[int, Pattern] = {}
         for k, call in enumerate(calls):
             for vector in call.outputs:
@@ -132,20 +132,24 @@ class _Search:
         """The calls that write vectors."""
         return {self._writer[number] for number in numbers}
 
-    def left_out(
-        self, word: Part, without: Collection[int], weaker: Collection[int] = (), standing_for: Iterable[Guard] = ()
+    def skippable(
+        self,
+        word: Part,
+        without: Collection[int],
+        implied_calls: Collection[int] = (),
+        substitutes: Iterable[Guard] = (),
     ) -> dict[int, Guard]:
         """The calls that are without effect where ``word`` is 0, but for those ``without``.
 
-        ``weaker`` are among these: calls that are left out then by guards of their own, ``standing_for`` what stands
-        for their results.
+        ``implied_calls`` are among these: calls that guards of their own skip then; ``substitutes`` are these guards,
+        which name what replaces their results.
         """
         assert word.vector is not None
         found = self._simplified(word.vector, word.start)
-        left, standing = dict[int, Guard](), {word.vector.number}
-        standing |= {
+        left, substitute_vectors = dict[int, Guard](), {word.vector.number}
+        substitute_vectors |= {
             part.vector.number
-            for guard in standing_for
+            for guard in substitutes
             for part in guard.otherwise
             if part is not None and part.vector is not None
         }
@@ -154,13 +158,13 @@ class _Search:
         heapify(waiting)
         while waiting:
             k = -heappop(waiting)
-            otherwise = None if k in without else self._otherwise(k, found, left, weaker, standing)
+            otherwise = None if k in without else self._otherwise(k, found, left, implied_calls, substitute_vectors)
             if otherwise is None:
                 continue
             left[k] = Guard(word, otherwise)
             for part in otherwise:
                 if part is not None and part.vector is not None:
-                    standing.add(part.vector.number)
+                    substitute_vectors.add(part.vector.number)
             for vector in self._calls[k].inputs:
                 writer = self._writer.get(vector.number)
                 if writer is not None and writer not in looked_at:
@@ -168,7 +172,7 @@ class _Search:
                     heappush(waiting, -writer)
         return left
 
-    def in_one_piece(self, order: Sequence[int], left: Mapping[int, Guard]) -> list[int] | None:
+    def consecutive(self, order: Sequence[int], left: Mapping[int, Guard]) -> list[int] | None:
         """The calls in an order in which those of a section follow one another; None if there is none."""
         places = [i for i, k in enumerate(order) if k in left]
         if not places:
@@ -190,7 +194,7 @@ class _Search:
                 follows.update(writes)
         return [*order[: places[0]], *before, *inside, *after, *order[places[-1] + 1 :]]
 
-    def needed(self, words: Sequence[TracedVector]) -> set[int]:
+    def dependencies(self, words: Sequence[TracedVector]) -> set[int]:
         """The calls that words depend on."""
         found: set[int] = set()
         waiting = [self._writer[word.number] for word in words if word.number in self._writer]
@@ -207,42 +211,42 @@ class _Search:
         k: int,
         found: Mapping[int, Sequence[Simplified]],
         left: Collection[int],
-        weaker: Collection[int],
-        standing: Collection[int],
+        implied_calls: Collection[int],
+        substitute_vectors: Collection[int],
     ) -> tuple[Part | None, ...] | None:
         """Return the substitutes of the results of a call; None if a needed result must be computed.
 
-        ``left`` and ``weaker`` are the calls that are left out, ``standing`` what stands for their results.
+        ``left`` and ``implied_calls`` are skipped calls, ``substitute_vectors`` what replaces their results.
         """
         parts: list[Part | None] = []
         call, results = self._calls[k], found.get(k)
         for i, vector in enumerate(call.outputs):
-            needed, read = bool(vector.name) or vector.number in standing, False
+            needed, read = bool(vector.name) or vector.number in substitute_vectors, False
             for reader in () if needed else self._readers.get(vector.number, ()):
-                if reader not in left and reader not in weaker:
+                if reader not in left and reader not in implied_calls:
                     read = True
-                    if not self._disregards(reader, vector.number, found):
+                    if not self._ignores(reader, vector.number, found):
                         needed = True
                         break
             same = results[i][0] if needed and results is not None else None
             if needed and (vector.name or same is None):
                 return None
             if read and not needed:
-                same = _Same(None)  # any number would do
+                same = _Substitute(None)  # any number would do
             parts.append(None if same is None else same.of(call.inputs))
         return tuple(parts)
 
-    def _disregards(self, k: int, number: int, found: Mapping[int, Sequence[Simplified]]) -> bool:
+    def _ignores(self, k: int, number: int, found: Mapping[int, Sequence[Simplified]]) -> bool:
         """Whether the results of a call are the same whatever is in a vector that it reads, and with zeros there."""
         if k not in found:
             return False
         call = self._calls[k]
-        if call.outputs[0].name or len(call.inputs) > MANY:
+        if call.outputs[0].name or len(call.inputs) > MAX_EXAMINED_ARGUMENTS:
             return False
         key = id(call.function), self._zeros[k]
-        if key not in self._disregarded:
-            self._disregarded[key] = _Disregarded(call.function, self._zeros[k])
-        return all(self._disregarded[key][i] for i, vector in enumerate(call.inputs) if vector.number == number)
+        if key not in self._ignored:
+            self._ignored[key] = _IgnoredArguments(call.function, self._zeros[k])
+        return all(self._ignored[key][i] for i, vector in enumerate(call.inputs) if vector.number == number)
 
     def _simplified(self, word: TracedVector, start: int, until: Collection[int] = ()) -> dict[int, list[Simplified]]:
         """Return for each call with known arguments what is known of its results, in order.
@@ -275,7 +279,7 @@ class _Search:
     def _results(self, call: TracedCall, zeros: Pattern) -> list[Simplified]:
         """Return what is known of each result; nothing if it is needed anyway, or few of many arguments are known."""
         function = call.function
-        if call.outputs[0].name or len(zeros) > max(MANY, 2 * sum(map(bool, zeros))):
+        if call.outputs[0].name or len(zeros) > max(MAX_EXAMINED_ARGUMENTS, 2 * sum(map(bool, zeros))):
             return [(None, 0)] * len(call.outputs)
         key = id(function), zeros
         if key not in self._evaluated:
@@ -300,7 +304,7 @@ def _with_zeros(function: ca.Function, zeros: Pattern) -> tuple[dict[int, tuple[
     return homes, function.call(arguments)
 
 
-class _Disregarded:
+class _IgnoredArguments:
     """For each argument of a function whether results do not depend on it, and are the same with zeros in its place."""
 
     def __init__(self, function: ca.Function, zeros: Pattern) -> None:
@@ -332,13 +336,13 @@ def _entry(expression: Expr, homes: dict[int, tuple[int, int]]) -> Any:
     return homes.get(expression.element_hash())
 
 
-def _part(entries: Sequence[Any]) -> _Same | None:
+def _part(entries: Sequence[Any]) -> _Substitute | None:
     """Return what a result equals: zeros, or adjacent entries of one argument; None if it must be computed."""
     if all(entry == 0 for entry in entries):
-        return _Same(None)
+        return _Substitute(None)
     if any(entry is None or entry == 0 for entry in entries):
         return None
     (argument, start), *_ = entries
     if any(entry != (argument, start + j) for j, entry in enumerate(entries)):
         return None
-    return _Same(argument, start)
+    return _Substitute(argument, start)

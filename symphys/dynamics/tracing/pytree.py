@@ -77,7 +77,7 @@ class TracedMatrix:
 
 
 @dataclass(frozen=True)
-class Knot:
+class TreeDef:
     """Where a tree forks: its kind, its keys, and what hangs below. Also what is no fork: ``keys`` hold that."""
 
     kind: type
@@ -90,7 +90,7 @@ def outline(matrix: Expr) -> Leaf:
     return Leaf(matrix.size1(), matrix.size2(), None if matrix.is_dense() else tuple(matrix.sparsity().find()))
 
 
-def dismantle(tree: Any, leaves: list[Expr]) -> Hashable:
+def flatten(tree: Any, leaves: list[Expr]) -> Hashable:
     """The shape of a tree, which compares equal for equal trees; its matrices are appended to ``leaves``.
 
     Whatever is neither a matrix nor a fork (numbers, texts, functions) belongs to the shape.
@@ -100,16 +100,16 @@ def dismantle(tree: Any, leaves: list[Expr]) -> Hashable:
         leaves.append(tree)
         return tree.leaf  # type: ignore[no-any-return]
     if kind is list or kind is tuple:
-        return Knot(kind, (), tuple([dismantle(part, leaves) for part in tree]))
+        return TreeDef(kind, (), tuple([flatten(part, leaves) for part in tree]))
     if kind is dict:
-        return Knot(kind, tuple(tree), tuple([dismantle(part, leaves) for part in tree.values()]))
+        return TreeDef(kind, tuple(tree), tuple([flatten(part, leaves) for part in tree.values()]))
     if isinstance(tree, ca.SX | ca.DM):
         leaves.append(tree if kind is ca.SX else ca.SX(tree))  # a copy costs as much as an addition
         return outline(leaves[-1])
     names = field_names(kind)  # type: ignore[arg-type]
     if names is not None:
-        return Knot(kind, (), tuple([dismantle(getattr(tree, name), leaves) for name in names]))
-    return Knot(kind, (tree,), ())
+        return TreeDef(kind, (), tuple([flatten(getattr(tree, name), leaves) for name in names]))
+    return TreeDef(kind, (tree,), ())
 
 
 @cache
@@ -118,16 +118,16 @@ def field_names(kind: type) -> tuple[str, ...] | None:
     return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else None
 
 
-def rebuild(shape: Any, leaves: Iterator[Expr]) -> Any:
+def unflatten(shape: Any, leaves: Iterator[Expr]) -> Any:
     """The tree of this shape with other matrices."""
     kind = type(shape)
     if kind is Leaf:
         return next(leaves)
     if shape.kind is dict:
-        return dict(zip(shape.keys, [rebuild(part, leaves) for part in shape.below], strict=True))
+        return dict(zip(shape.keys, [unflatten(part, leaves) for part in shape.below], strict=True))
     if shape.keys:
         return shape.keys[0]
-    parts = [rebuild(part, leaves) for part in shape.below]
+    parts = [unflatten(part, leaves) for part in shape.below]
     return shape.kind(*parts) if field_names(shape.kind) is not None else shape.kind(parts)
 
 
@@ -152,7 +152,7 @@ def slots_of(shape: Any) -> list[int]:
         if type(part) is Leaf:
             found.append(slot)
             return
-        apart = part.kind is tuple and any(type(member) is Knot for member in part.below)
+        apart = part.kind is tuple and any(type(member) is TreeDef for member in part.below)
         for member in part.below:
             visit(member, next(numbers) if apart else slot)
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import casadi as ca
 
-from symphys.dynamics.tracing.pytree import TracedMatrix, dismantle, outline, rebuild, slots_of
+from symphys.dynamics.tracing.pytree import TracedMatrix, flatten, outline, slots_of, unflatten
 from symphys.dynamics.tracing.trace import Tracer
 from symphys.types import Expr
 
@@ -74,10 +74,10 @@ class Recorder(Tracer):
         if not isinstance(code, float):
             self.sections.append((self._slots[code[0]], code[1]))
 
-    def gathered(self, tree: T) -> T:
+    def contiguous(self, tree: T) -> T:
         """Return the tree with each of its parts in a slot of its own."""
         leaves: list[Expr] = []
-        shape = dismantle(tree, leaves)
+        shape = flatten(tree, leaves)
         columns: dict[int, list[tuple[int, int]]] = {}
         codes = [leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf) for leaf in leaves]
         for slot, each in zip(slots_of(shape), codes, strict=True):
@@ -89,14 +89,14 @@ class Recorder(Tracer):
         symbols = [ca.SX.sym("a", self._sizes[k]) for k in used]
         results = [ca.vertcat(*(symbols[used[k]][j] for k, j in column)) for column in columns.values() if column]
         new = iter(
-            self._apply(self._pieces.shared(ca.Function("piece", symbols, results)), list(used)) if results else ()
+            self._apply(self._cache.shared(ca.Function("piece", symbols, results)), list(used)) if results else ()
         )
         taken = {slot: (next(new), count()) for slot, column in columns.items() if column}
         found = []
         for slot, leaf, each in zip(slots_of(shape), leaves, codes, strict=True):
             moved = [c if isinstance(c, float) else (taken[slot][0], next(taken[slot][1])) for c in each]
             found.append(TracedMatrix(leaf.leaf if isinstance(leaf, TracedMatrix) else outline(leaf), tuple(moved)))
-        together: T = rebuild(shape, iter(found))
+        together: T = unflatten(shape, iter(found))
         return together
 
     def give(self, name: str, values: Sequence[Expr]) -> TracedVector:
@@ -106,7 +106,7 @@ class Recorder(Tracer):
         codes = [(slots.setdefault(c[0], len(slots)), c[1]) if isinstance(c, tuple) else c for c in stacked.codes]
         symbols = [ca.SX.sym("a", self._slots[k].size) for k in slots]
         entries = [ca.SX(c) if isinstance(c, float) else symbols[c[0]][c[1]] for c in codes]
-        function = self._pieces.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
+        function = self._cache.shared(ca.Function("piece", symbols, [ca.vertcat(*entries)]))
         (given,) = self._add(name, function, list(slots))
         return self._slots[given]
 
@@ -128,7 +128,7 @@ class Recorder(Tracer):
         homes = {symbol.element_hash(): self._homes[symbol.element_hash()][0] for symbol in ca.symvar(column)}
         slots = list(dict.fromkeys(homes.values()))
         symbols = [self._column(slot) for slot in slots]
-        (given,) = self._add("", self._pieces.shared(ca.Function("piece", symbols, [column])), slots)
+        (given,) = self._add("", self._cache.shared(ca.Function("piece", symbols, [column])), slots)
         self._adopted.append(column)
         self._homes |= {entry.element_hash(): (given, k) for k, entry in enumerate(column.nonzeros())}
 
@@ -151,8 +151,8 @@ class Recorder(Tracer):
             given = self._add("", call.function, inputs)
             slots |= dict(zip((slot.number for slot in call.outputs), given, strict=True))
         leaves: list[Expr] = []
-        shape = dismantle(after, leaves)
-        renamed: T = rebuild(shape, (self._renamed(leaf, slots) for leaf in leaves))
+        shape = flatten(after, leaves)
+        renamed: T = unflatten(shape, (self._renamed(leaf, slots) for leaf in leaves))
         return renamed
 
     def _renamed(self, leaf: Expr, slots: dict[int, int]) -> TracedMatrix:

@@ -31,23 +31,23 @@ from symphys.dynamics.tracing.decorator import tracing
 from symphys.dynamics.tracing.pytree import (
     SCALAR,
     Code,
-    Knot,
     Leaf,
     TracedMatrix,
-    dismantle,
+    TreeDef,
     field_names,
+    flatten,
     leaves_of,
     matrix,
     outline,
-    rebuild,
     slots_of,
+    unflatten,
 )
 from symphys.maths.verbatim import verbatim
 from symphys.types import Expr
 
 Structure = tuple[int, tuple[int, ...]]
 """The number of a tree's structure, and the slots that its entries lie in, in order."""
-MOST_KEPT = 300_000
+MAX_KEPT_BRANCHES = 300_000
 """Branches that are kept: more would take memory for what no call takes again."""
 
 
@@ -107,7 +107,7 @@ class Structures:
 
     def keep(self, tree: Any, structure: Structure) -> None:
         """Remember the structure of a tree that stays as it is."""
-        if len(self._branches) >= MOST_KEPT:
+        if len(self._branches) >= MAX_KEPT_BRANCHES:
             self._branches.clear()
         self._branches[id(tree)] = tree, structure
 
@@ -131,8 +131,8 @@ class Blueprint:
     """How trees of one shape are put together from their matrices; parts without any are made once."""
 
     def __init__(self, shape: Any) -> None:
-        """``shape``: see ``dismantle``."""
-        self._shape = _with_still_parts(shape)
+        """``shape``: see ``flatten``."""
+        self._shape = _with_constant_parts(shape)
         self._structures: tuple[tuple[int, tuple[int, ...]], ...] | None = None
 
     def tree(self, leaves: Iterator[Expr], slots: Sequence[int], structures: Structures) -> Any:
@@ -150,7 +150,7 @@ class Blueprint:
         return tree
 
 
-class _Still:
+class _ConstantPart:
     """A part without matrices."""
 
     __slots__ = ("value",)
@@ -159,13 +159,13 @@ class _Still:
         self.value = value
 
 
-def _with_still_parts(shape: Any) -> Any:
+def _with_constant_parts(shape: Any) -> Any:
     if type(shape) is Leaf:
         return shape
-    below = tuple(map(_with_still_parts, shape.below))
-    whole = Knot(shape.kind, shape.keys, below)
-    if shape.kind is not list and shape.kind is not dict and all(type(part) is _Still for part in below):
-        return _Still(rebuild(shape, iter(())))
+    below = tuple(map(_with_constant_parts, shape.below))
+    whole = TreeDef(shape.kind, shape.keys, below)
+    if shape.kind is not list and shape.kind is not dict and all(type(part) is _ConstantPart for part in below):
+        return _ConstantPart(unflatten(shape, iter(())))
     return whole
 
 
@@ -174,7 +174,7 @@ def _assembled(shape: Any, leaves: Iterator[Expr], nodes: list[Any]) -> Any:
     kind = type(shape)
     if kind is Leaf:
         return next(leaves)
-    if kind is _Still:
+    if kind is _ConstantPart:
         return shape.value
     parts = [_assembled(part, leaves, nodes) for part in shape.below]
     if shape.kind is tuple or shape.kind is list:
@@ -207,7 +207,7 @@ class Template:
     matrices: tuple[tuple[Leaf, tuple[Code, ...]], ...]
 
 
-class Pieces:
+class TraceCache:
     """What tracers have built, for all tracers of this process: one problem's step is traced for several uses.
 
     Attributes:
@@ -226,17 +226,17 @@ class Pieces:
         return self._functions.setdefault(function.serialize(), function)
 
 
-MOST_PIECES = 10_000
+MAX_TEMPLATES = 10_000
 """Templates that are kept for the next tracer, some 90 MB."""
-_PIECES = Pieces()
+_CACHE = TraceCache()
 
 
-def _pieces() -> Pieces:
+def _trace_cache() -> TraceCache:
     """Return the templates for the next tracer."""
-    global _PIECES
-    if len(_PIECES.templates) > MOST_PIECES:
-        _PIECES = Pieces()
-    return _PIECES
+    global _CACHE
+    if len(_CACHE.templates) > MAX_TEMPLATES:
+        _CACHE = TraceCache()
+    return _CACHE
 
 
 class Tracer(ABC):
@@ -252,8 +252,8 @@ class Tracer(ABC):
         self._entries: list[list[Expr]] = []
         self._sizes: list[int] = []
         self._homes: dict[int, tuple[int, int]] = {}
-        self._pieces = _pieces()
-        self._structures = Structures(self._pieces.numbers, self._codes, self._sizes)
+        self._cache = _trace_cache()
+        self._structures = Structures(self._cache.numbers, self._codes, self._sizes)
 
     def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
         """The state after ``count`` times ``state = once(context, state)``."""
@@ -269,7 +269,7 @@ class Tracer(ABC):
         """Ignore a predicate; only a recorder makes sections."""
         del word
 
-    def gathered(self, tree: T) -> T:
+    def contiguous(self, tree: T) -> T:
         """Return the tree unchanged."""
         return tree
 
@@ -319,7 +319,7 @@ class Tracer(ABC):
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
         """``function(*arguments, **named)``."""
         number, slots = self._structures.of_call(arguments, named)
-        known = self._pieces.templates
+        known = self._cache.templates
         template = known.get((function, number, True)) or known.get((function, number, self._reduces))
         if template is None:
             template = known[function, number, self._reduces] = self._build(function, arguments, named, slots)
@@ -339,7 +339,7 @@ class Tracer(ABC):
     ) -> Template:
         """The template of a function for arguments of this structure."""
         leaves: list[Expr] = []
-        shape = dismantle((arguments, named), leaves)
+        shape = flatten((arguments, named), leaves)
         places = {slot: k for k, slot in enumerate(slots)}
         codes = (leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf) for leaf in leaves)
         known = [[c if isinstance(c, float) else (places[c[0]], c[1]) for c in each] for each in codes]
@@ -349,10 +349,10 @@ class Tracer(ABC):
         leaves_of(shape, outlines)
         expressions = (_argument(symbols, entries, *each) for each in zip(outlines, known, strict=True))
         results: list[Expr] = []
-        inner, inner_named = rebuild(shape, expressions)
+        inner, inner_named = unflatten(shape, expressions)
         with tracing(None):
-            result_shape = dismantle(function(*inner, **inner_named), results)
-        given = _Given(entries)
+            result_shape = flatten(function(*inner, **inner_named), results)
+        given = _Results(entries)
         matrices = given.placed(list(map(self.value, results)), slots_of(result_shape))
         blueprint = Blueprint(result_shape)
         if not given.columns:
@@ -362,7 +362,7 @@ class Tracer(ABC):
             columns = ca.cse(columns)
         needed = {symbol.element_hash() for symbol in ca.symvar(ca.vertcat(*columns))}
         used = [k for k, column in enumerate(entries) if any(e.element_hash() in needed for e in column)]
-        built = self._pieces.shared(ca.Function("piece", [symbols[k] for k in used], columns))
+        built = self._cache.shared(ca.Function("piece", [symbols[k] for k in used], columns))
         return Template(built, tuple(used), blueprint, matrices)
 
     def _fill(self, template: Template, slots: Sequence[int]) -> Any:
@@ -401,7 +401,7 @@ class InlineTracer(Tracer):
         return found
 
 
-class _Given:
+class _Results:
     """What a part gives, column by column, and where each of its numbers lies."""
 
     def __init__(self, entries: Sequence[Sequence[Expr]]) -> None:

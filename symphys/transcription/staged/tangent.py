@@ -22,7 +22,7 @@ from symphys.dynamics.context import make_context
 from symphys.dynamics.joints.joint_frames import joint_frames_at
 from symphys.dynamics.joints.warm_start import add_joint_forces
 from symphys.dynamics.prediction import bodies_of, jointed_bodies
-from symphys.dynamics.step import splits_of
+from symphys.dynamics.step import max_splits
 from symphys.maths import rotation
 from symphys.model.joints import Joint, kinematic_trees, tree_joints
 from symphys.model.state_layout import BODY_FIELDS, Layout
@@ -172,7 +172,7 @@ class Tangent:
         of_bodies = {f"{body.name}.{field}" for body in world.bodies for field, _ in BODY_FIELDS}
         in_trees = {joint.unwrapped for joint in self._in_trees}
         names = [name for name in self._layout.names() if name not in of_bodies | in_trees and name != "lag"]
-        if splits_of(world, scheme) or self.rollout.problem.free_duration:  # half a step, without impacts
+        if max_splits(world, scheme) or self.rollout.problem.free_duration:  # half a step, without impacts
             names.append("lag")
         parts = [(name, self._layout[name]) for name in names]
         return tuple((name, part.stop - part.start) for name, part in parts)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from symphys.dynamics.articulated.forward_kinematics import HERE, JointStart, final_poses
+from symphys.dynamics.articulated.forward_kinematics import WORLD_POSE, JointStart, final_poses
 from symphys.dynamics.joints.joint_frames import JointFrames, joint_frames_at
 from symphys.maths import rotation
 from symphys.model.joints import Joint, JointFrame, KinematicTree, Link
@@ -176,7 +176,7 @@ class TreeChart:
         frames = self._frames(joint, poses)
         placed, arms = frames.placed(NOW), tuple(arm.at(NOW) for arm in frames.arms)
         ordered = (arms[1], arms[0]) if link.sign > 0 else (arms[0], arms[1])
-        return JointStart(ordered, placed.apart, joint.kind.axes(placed), HERE.turn)
+        return JointStart(ordered, placed.apart, joint.kind.axes(placed), WORLD_POSE.turn)
 
     def _turned(self, link: Link, before: Mapping[int, Pose], after: Mapping[int, Pose]) -> Expr:
         """(3,) rotation vector of a ball joint's first side against its second; see ``final_poses``."""

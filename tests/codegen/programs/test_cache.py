@@ -286,7 +286,7 @@ def test_a_builder_that_stands_still_is_not_waited_for_for_ever(tmp_path: Path, 
     slept = [0.0]
     clock = SimpleNamespace(monotonic=lambda: sum(slept), time=time.time, sleep=slept.append)
     monkeypatch.setattr("symphys.codegen.toolchain.cache.time", clock)
-    monkeypatch.setattr("symphys.codegen.toolchain.cache.TICK", LOCK_TIMEOUT / 100)
+    monkeypatch.setattr("symphys.codegen.toolchain.cache.LOCK_INTERVAL", LOCK_TIMEOUT / 100)
     own = Cache(tmp_path / "cache")
     with own.building("k"), own.building("k"):
         assert LOCK_TIMEOUT <= sum(slept) < 1.02 * LOCK_TIMEOUT
@@ -339,7 +339,7 @@ def test_a_long_compile_is_told_beforehand_once(
     tmp_path: Path, monkeypatch: Patch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """With the seconds that its operations take; what is kept takes none."""
-    monkeypatch.setattr("symphys.codegen.toolchain.build.ANNOUNCED", 2.0)
+    monkeypatch.setattr("symphys.codegen.toolchain.build.MIN_ANNOUNCED_TIME", 2.0)
     for _ in range(2):
         compile_program(programs.pendulum(), cache=Cache(tmp_path / "cache"), threads=1)
     (record,) = caplog.records

@@ -83,7 +83,7 @@ def test_a_compiler_without_memory(tmp_path: Path, monkeypatch: Patch) -> None:
 @UNIX
 def test_a_compiler_that_hangs_is_stopped_with_all_that_it_started(tmp_path: Path, monkeypatch: Patch) -> None:
     monkeypatch.setenv("CC", fake(tmp_path, f"sleep 100000 & echo $! >> {tmp_path}/started; wait"))
-    monkeypatch.setattr("symphys.codegen.toolchain.compiler.LIMIT", 0.5)
+    monkeypatch.setattr("symphys.codegen.toolchain.compiler.COMPILE_TIMEOUT", 0.5)
     with pytest.raises(KernelUnavailable, match=r"fakecc did not end within 0\.5 s and was stopped"):
         compile_program(programs.pendulum(), cache=Cache(tmp_path / "cache"))
     assert_gone(tmp_path / "started")
@@ -94,7 +94,7 @@ def test_a_version_that_does_not_come(tmp_path: Path, monkeypatch: Patch) -> Non
     path = Path(fake(tmp_path, ""))
     path.write_text("#!/bin/sh\nexec sleep 100000\n", "utf-8")
     monkeypatch.setenv("CC", str(path))
-    monkeypatch.setattr("symphys.codegen.toolchain.compiler.ANSWER", 0.5)
+    monkeypatch.setattr("symphys.codegen.toolchain.compiler.VERSION_TIMEOUT", 0.5)
     with pytest.raises(KernelUnavailable, match="did not end within"):
         find_compiler()
 

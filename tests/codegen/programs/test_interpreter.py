@@ -37,7 +37,7 @@ import os, signal, sys
 from worlds import programs
 from symphys.codegen.toolchain import build
 from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
-build.LONG_COMPILATION = 0
+build.MIN_LONG_OPERATIONS = 0
 kernel = compile_source(ProgramSource(programs.chain, "a chain"), ("merit",), 1, wait=False)
 kernel.forward([0.5] * kernel.program.z.size, [1.0] * kernel.program.parameters.size)
 os.kill(os.getpid(), signal.{signal})
@@ -47,7 +47,7 @@ os.kill(os.getpid(), signal.{signal})
 @pytest.fixture(autouse=True)
 def worth(monkeypatch: pytest.MonkeyPatch) -> None:
     require("simd")
-    monkeypatch.setattr(build, "LONG_COMPILATION", 0)
+    monkeypatch.setattr(build, "MIN_LONG_OPERATIONS", 0)
 
 
 class Never:

@@ -9,7 +9,7 @@ import pytest
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.graph.activity import Activity, CallActivity
-from symphys.codegen.graph.reach import KnownCalls, Reach
+from symphys.codegen.graph.reach import AnnotatedCalls, LivenessGraph
 
 STEPS = 3
 
@@ -56,10 +56,12 @@ def test_words_that_matter(seed: int) -> None:
         ],
         [program.outputs["out"]],
     )
-    at_once = Reach(
+    at_once = LivenessGraph(
         program.size,
         [
-            KnownCalls(phase, count, [np.concatenate(functions.dependence(function)) for function in phase.functions])
+            AnnotatedCalls(
+                phase, count, [np.concatenate(functions.dependence(function)) for function in phase.functions]
+            )
             for phase, count in zip(program.phases, steps, strict=True)
         ],
     )

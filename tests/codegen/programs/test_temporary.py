@@ -11,7 +11,7 @@ import pytest
 from fakes.compilers import HANGS, building, fake
 from tools.waiting import FOREVER, until, wait_for
 
-from symphys.codegen.toolchain.temporary import LOCK, OLD, YOUNG, TemporaryFolder
+from symphys.codegen.toolchain.temporary import LOCK, MAX_UNLOCKED_AGE, MIN_UNLOCKED_AGE, TemporaryFolder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no files are locked there")
 KIND = "symphys-kernel-"
@@ -48,13 +48,13 @@ def test_what_a_killed_build_left_goes_with_the_next(tmp_path: Path, place: Path
     try:
         wait_for(tmp_path / "started")
         (left,) = place.iterdir()
-        aged(left, 2 * OLD)
+        aged(left, 2 * MAX_UNLOCKED_AGE)
         with TemporaryFolder(KIND):
             assert left.is_dir(), "its process is at work"
     finally:
         process.kill()
         process.communicate(timeout=FOREVER)
-    aged(left, 2 * YOUNG)
+    aged(left, 2 * MIN_UNLOCKED_AGE)
 
     def only_the_next() -> bool:
         with TemporaryFolder(KIND) as own:
@@ -65,13 +65,13 @@ def test_what_a_killed_build_left_goes_with_the_next(tmp_path: Path, place: Path
 
 
 def test_what_may_be_in_use_stays(place: Path) -> None:
-    new = aged(made(place, "new", locked=True), YOUNG / 2)
-    unlocked = aged(made(place, "unlocked"), OLD / 2)
-    old, other = aged(made(place, "old"), 2 * OLD), made(place, "other")
-    other = aged(other.rename(place / "other-folder"), 2 * OLD)
+    new = aged(made(place, "new", locked=True), MIN_UNLOCKED_AGE / 2)
+    unlocked = aged(made(place, "unlocked"), MAX_UNLOCKED_AGE / 2)
+    old, other = aged(made(place, "old"), 2 * MAX_UNLOCKED_AGE), made(place, "other")
+    other = aged(other.rename(place / "other-folder"), 2 * MAX_UNLOCKED_AGE)
     elsewhere = place.parent / "elsewhere"
     elsewhere.mkdir()
-    (place / f"{KIND}link").symlink_to(aged(elsewhere, 2 * OLD))
+    (place / f"{KIND}link").symlink_to(aged(elsewhere, 2 * MAX_UNLOCKED_AGE))
     with TemporaryFolder(KIND):
         assert new.is_dir() and unlocked.is_dir() and other.is_dir() and elsewhere.is_dir()
         assert not old.exists()
@@ -79,12 +79,12 @@ def test_what_may_be_in_use_stays(place: Path) -> None:
 
 def test_folders_of_one_process_do_not_remove_each_other(place: Path) -> None:
     with TemporaryFolder(KIND) as first:
-        aged(Path(first), 2 * OLD)
+        aged(Path(first), 2 * MAX_UNLOCKED_AGE)
         with TemporaryFolder("symphys-external-") as second:
             assert {Path(first), Path(second)} == set(place.iterdir())
 
 
-@pytest.mark.parametrize("seconds", [2 * OLD, -2 * OLD])
+@pytest.mark.parametrize("seconds", [2 * MAX_UNLOCKED_AGE, -2 * MAX_UNLOCKED_AGE])
 def test_a_clock_that_was_set_removes_nothing_in_use_and_keeps_nothing_else(place: Path, seconds: float) -> None:
     """Forward: all that there is is old. Back: it was made at a time that is still to come."""
     left = aged(made(place, "left", locked=True), seconds)

@@ -19,7 +19,7 @@ from worlds.toys import require
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Program
 from symphys.codegen.toolchain import warm_start
-from symphys.codegen.toolchain.cache import PLANS
+from symphys.codegen.toolchain.cache import PLAN_SUFFIX
 from symphys.codegen.toolchain.identity import identity_of
 from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
 from symphys.expression import parse
@@ -96,7 +96,7 @@ def test_what_has_changed_is_built_again(cache: Cache, other: str, monkeypatch: 
     if other == "package":
         monkeypatch.setattr(warm_start, "package_stamp", lambda: "another")
     if other in ("library", "damaged"):
-        (path,) = cache.folder.glob("*.so" if other == "library" else f"*{PLANS}")
+        (path,) = cache.folder.glob("*.so" if other == "library" else f"*{PLAN_SUFFIX}")
         path.unlink() if other == "library" else path.write_bytes(path.read_bytes()[:-7])
     seeded = ("merit", "objective") if other == "seeded" else ("merit",)
     compile_source(again.source, seeded, 1, "single" if other == "precision" else "double", cache)

@@ -55,7 +55,7 @@ def test_jacobians_are_casadis(kernel: SlopeKernel) -> None:
 
 def test_calls_that_follow_each_other_are_merged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Six steps of a pendulum: calls of four and of two, with the same Jacobian."""
-    monkeypatch.setattr(plan, "SMALLEST", 0)
+    monkeypatch.setattr(plan, "MIN_INSTRUCTIONS", 0)
     y, a = ca.SX.sym("y", 2), ca.SX.sym("a")
     swing = ca.Function("swing", [y, a], [y + 0.1 * ca.vertcat(y[1], -a * ca.sin(y[0]))])
     at = MemoryLayout()

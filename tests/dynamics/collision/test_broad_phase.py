@@ -105,8 +105,8 @@ def test_motions_are_those_without_a_broad_phase(
     path.write_text(heap(kinds), "utf-8")
     world = symphys.load(path).world()
     states = []
-    for fewest in (broad_phase.FEWEST, 1000):
-        monkeypatch.setattr(broad_phase, "FEWEST", fewest)
+    for fewest in (broad_phase.MIN_PAIRS, 1000):
+        monkeypatch.setattr(broad_phase, "MIN_PAIRS", fewest)
         step, layout = step_function(world, Scheme(dt=0.01, sweeps=6)), Layout(world)
         random = np.random.default_rng(7)
         start = initial_state(world, {f"b{i}.velocity": random.uniform(-2, 2, 3) for i in range(len(kinds))})

@@ -12,14 +12,14 @@ from tools.distances import distance
 from tools.repeats import few
 from worlds.meetings import PLACE, STILL, Thing, met, moved_to, random_thing, rule, shifted
 
-from symphys.dynamics.collision.pairs.box_box import RIM
+from symphys.dynamics.collision.pairs.box_box import RIM_SHARE
 from symphys.model.shapes import POINTS, SHAPES, Plane, Terrain
 from symphys.types import Array
 
 KINDS = ("sphere", "capsule", "box")
 PAIRS = [(a, b) for a in KINDS for b in KINDS]
 ROUNDING = 1e-12
-SHIFT = RIM * 0.5
+SHIFT = RIM_SHARE * 0.5
 """[m] how far beyond the rim of the largest box here a corner still counts."""
 
 

@@ -10,7 +10,7 @@ import pytest
 from worlds.contacts import contact_of, numbers
 
 from symphys.dynamics.contact.body_term import BodyTerm
-from symphys.dynamics.contact.constraint import ZERO
+from symphys.dynamics.contact.constraint import ZERO_IMPULSE
 from symphys.dynamics.contact.load_distribution import distribute_loads
 from symphys.dynamics.context import make_context
 from symphys.dynamics.unknowns import PlacedConstraint
@@ -30,7 +30,7 @@ def distributed(loads: Array, scheme: Scheme | None = None) -> Array:
     for place in places:
         term = BodyTerm(1, ca.SX(1.0), ca.SX.eye(3), ca.SX(place), ca.SX(place))
         constraints.append(PlacedConstraint((0,), contact_of((term,), Law(), load=ca.SX(1e-3)), (0,)))
-    impulses = [replace(ZERO, normal=ca.SX(load)) for load in (*loads, 0, 0, 0, 0)]
+    impulses = [replace(ZERO_IMPULSE, normal=ca.SX(load)) for load in (*loads, 0, 0, 0, 0)]
     found = distribute_loads(context, constraints, impulses)
     return np.array([float(numbers(each.normal)) for each in found])[:4]
 

@@ -10,7 +10,7 @@ import pytest
 from tools.repeats import few
 from worlds.contacts import contact_of, momenta_of, numbers, terms_of
 
-from symphys.dynamics.contact.constraint import ZERO, ContactImpulse, known_before
+from symphys.dynamics.contact.constraint import ZERO_IMPULSE, ContactImpulse, precompute
 from symphys.dynamics.contact.coupling import coupling_of
 from symphys.dynamics.contact.effective_mass import mobilities
 from symphys.dynamics.contact.friction import Disc
@@ -28,7 +28,7 @@ def test_a_contact_obeys_its_law(seed: int, coupled: bool) -> None:
     normal, target = ca.SX([0, 0, 1]), 0.3 * rng.normal()
     coupling = coupling_of(mobilities(terms, False)[0], normal, Disc(mu), ca.SX(0)) if coupled else None
     contact = contact_of(terms, Law(friction=mu), target=ca.SX(target), coupling=coupling)
-    impulse = ZERO
+    impulse = ZERO_IMPULSE
     for _ in range(MANY):
         momenta, impulse = contact.project(momenta, impulse)
     slip, press, tangent = numbers(contact.slip(momenta)), float(numbers(impulse.normal)), numbers(impulse.tangent)
@@ -47,7 +47,9 @@ def test_what_is_known_before_the_sweeps_changes_nothing(seed: int, smoothing: f
     widths = {"softness": ca.SX(0.1), "width": ca.SX(smoothing), "smoothing": ca.SX(smoothing)}
     contact = contact_of(terms, Law(friction=0.3), **asked, **widths)
     old = ContactImpulse(ca.SX(0.2), ca.SX([0.05, -0.02, 0.0]), ca.SX(0), ca.SX.zeros(3))
-    plain, ready = (each.project(momenta, old)[1] for each in (contact, replace(contact, before=known_before(contact))))
+    plain, ready = (
+        each.project(momenta, old)[1] for each in (contact, replace(contact, precomputed=precompute(contact)))
+    )
     assert numbers(ready.normal) == pytest.approx(numbers(plain.normal), rel=1e-12)
     assert numbers(ready.tangent) == pytest.approx(numbers(plain.tangent), rel=1e-12, abs=1e-15)
     assert numbers(plain.normal) > 0 and np.abs(numbers(plain.tangent)[:2]).min() > 0
@@ -59,7 +61,7 @@ def test_torques_stay_within_their_limits() -> None:
     rng = np.random.default_rng(1)
     momenta = momenta_of(rng)
     contact = contact_of(terms_of(rng), Law(torsion=0.02, rolling=0.01), target=ca.SX(2.0))
-    impulse = ZERO
+    impulse = ZERO_IMPULSE
     for _ in range(MANY):
         momenta, impulse = contact.project(momenta, impulse)
     press = float(numbers(impulse.normal))
@@ -73,7 +75,7 @@ def test_smoothing_ends_on_the_central_path() -> None:
     rng, width = np.random.default_rng(2), 0.1
     momenta = momenta_of(rng)
     contact = contact_of(terms_of(rng), Law(friction=0.0), width=ca.SX(width), smoothing=ca.SX(width))
-    impulse = ZERO
+    impulse = ZERO_IMPULSE
     for _ in range(MANY):
         momenta, impulse = contact.project(momenta, impulse)
     product = float(numbers(impulse.normal)) * numbers(contact.slip(momenta))[2]

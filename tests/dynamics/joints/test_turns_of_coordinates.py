@@ -13,9 +13,9 @@ from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.joints.coordinate_constraint import (
     CoordinateConstraint,
     TreeCoordinate,
-    by_law,
-    project_in_turn,
-    pushed_by,
+    affine_law,
+    coupling_to_previous,
+    project_sequentially,
 )
 from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse
 from symphys.dynamics.unknowns import GeneralizedVelocities
@@ -29,12 +29,12 @@ def constraints(bounded: bool) -> list[CoordinateConstraint]:
     rng, found = np.random.default_rng(4), []
     for _ in range(COUNT):
         jacobian, response = ca.SX(rng.normal(size=(1, NUMBERS))), ca.SX(rng.normal(size=NUMBERS))
-        law = by_law(ca.SX(rng.normal()), ca.SX(rng.uniform()), ca.SX(rng.uniform(0.5, 2)))
+        law = affine_law(ca.SX(rng.normal()), ca.SX(rng.uniform()), ca.SX(rng.uniform(0.5, 2)))
         found.append(
             CoordinateConstraint(
                 terms=(BODY,),
                 seen=NOWHERE,
-                given_along=NOWHERE,
+                impulse_directions=NOWHERE,
                 **law,
                 low=ca.SX(-0.1) if bounded else None,
                 high=ca.SX(0.1) if bounded else None,
@@ -57,8 +57,8 @@ def test_looking_ahead_changes_nothing(bounded: bool) -> None:
     for constraint, impulse in zip(given, old, strict=True):
         velocities, new = one(constraint, velocities, impulse)
         impulses.append(new)
-    ahead = [given[0], *(replace(then, pushed=pushed_by(first, then)) for first, then in pairwise(given))]
-    found, news = project_in_turn(ahead, start, old)
+    ahead = [given[0], *(replace(then, pushed=coupling_to_previous(first, then)) for first, then in pairwise(given))]
+    found, news = project_sequentially(ahead, start, old)
     assert numbers(found.numbers) == pytest.approx(numbers(velocities.numbers), rel=1e-12)
     assert [float(each.numbers) for each in news] == pytest.approx(
         [float(each.numbers) for each in impulses], rel=1e-12

@@ -36,7 +36,7 @@ def test_boxes_alike_are_built_once(make: Callable[[World], object], monkeypatch
         return rule(*arguments)
 
     monkeypatch.setitem(RULES, (Box, Plane), counted)
-    monkeypatch.setattr(trace, "_PIECES", trace.Pieces())
+    monkeypatch.setattr(trace, "_CACHE", trace.TraceCache())
     make(boxes(2))
     of_two = len(built)
     make(boxes(4))

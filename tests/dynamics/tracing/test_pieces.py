@@ -55,7 +55,7 @@ def builds(monkeypatch: pytest.MonkeyPatch) -> list[object]:
         found.append(function)
         return build(self, function, *given)
 
-    monkeypatch.setattr(trace, "_PIECES", trace.Pieces())
+    monkeypatch.setattr(trace, "_CACHE", trace.TraceCache())
     monkeypatch.setattr(trace.Tracer, "_build", noted)
     return found
 
@@ -69,7 +69,7 @@ def test_a_step_of_pieces_that_were_there_is_that_built_alone(name: str, monkeyp
     )
     together = [make(world, scheme, INPUTS) for make, scheme in asked]
     for (make, scheme), step in zip(asked, together, strict=True):
-        monkeypatch.setattr(trace, "_PIECES", trace.Pieces())
+        monkeypatch.setattr(trace, "_CACHE", trace.TraceCache())
         same(step, make(world, scheme, INPUTS), world)
 
 
@@ -94,6 +94,6 @@ def test_another_world_of_the_same_parts_builds_nothing(builds: list[object], mo
     assert counts[0] == counts[1] > 0
     one, other = ([call.function.serialize() for call in step.calls] for step in steps)
     assert one == other
-    monkeypatch.setattr(trace, "MOST_PIECES", 0)
+    monkeypatch.setattr(trace, "MAX_TEMPLATES", 0)
     trace_step(world_of("balls"), SCHEME)
     assert len(builds) == 2 * counts[0]

@@ -20,7 +20,7 @@ from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Convex, Sphere
 from symphys.types import Expr
 
-NEXT = ((0, 1), (1, 2), (2, 0))
+EDGES = ((0, 1), (1, 2), (2, 0))
 """The edges of a triangle."""
 
 
@@ -54,7 +54,7 @@ class TriangleField:
         """The height over the plane, whether the foot is within the edges, and from the nearest point of these."""
         face = self._face()
         height, within, found = ca.dot(face, point - self.corners[0]), ca.SX(1), list[Expr]()
-        for i, j in NEXT:
+        for i, j in EDGES:
             edge, arm = self.corners[j] - self.corners[i], point - self.corners[i]
             within = ca.logic_and(within, ca.dot(ca.cross(face, edge), arm) >= 0)
             share = ca.fmin(ca.fmax(ca.dot(edge, arm) / ca.dot(edge, edge), 0), 1)
@@ -71,7 +71,7 @@ def squared_distances(triangles: NDArray[np.float64], point: Expr) -> list[Expr]
     planes /= np.linalg.norm(planes, axis=1, keepdims=True)
     height = ca.mtimes(ca.DM(planes), point) - ca.DM((planes * triangles[:, 0]).sum(axis=1))
     within, nearest = ca.SX(ca.DM.ones(len(triangles))), ca.SX(ca.DM.inf(len(triangles)))
-    for i, j in NEXT:
+    for i, j in EDGES:
         start, edge = triangles[:, i], triangles[:, j] - triangles[:, i]
         inward, length = np.cross(planes, edge), (edge**2).sum(axis=1)
         beside = ca.mtimes(ca.DM(inward), point) - ca.DM((inward * start).sum(axis=1))

@@ -15,7 +15,7 @@ from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Capsule, Cylinder, Sphere
 from symphys.types import Expr
 
-NO_LENGTH = 2e-12
+MIN_AXIS_DISTANCE = 2e-12
 """[m] from the axis at which a point counts that is nearer to it, so that it has a direction."""
 
 
@@ -50,7 +50,7 @@ class CylinderField:
     def _from_axis(self, point: Expr) -> Expr:
         """(3,): from the axis; along x where the point is on it."""
         on_axis = point[0] * point[0] + point[1] * point[1] < TINY_SQUARE
-        return ca.vertcat(point[0] + ca.if_else(on_axis, NO_LENGTH, 0), point[1], 0)
+        return ca.vertcat(point[0] + ca.if_else(on_axis, MIN_AXIS_DISTANCE, 0), point[1], 0)
 
     def _over(self, point: Expr) -> tuple[Expr, Expr]:
         """Return how far the point is beyond the side and beyond the nearer end [m]."""

@@ -16,7 +16,7 @@ from symphys.types import Expr
 
 FOOT_STEPS = 5
 """Newton steps towards the foot of a perpendicular."""
-INSIDE = 0.02
+POLE_MARGIN = 0.02
 """Of the smallest squared radius: how near the multiplier may come to its pole, for points deep inside."""
 
 
@@ -47,7 +47,7 @@ class EllipsoidField:
         """The multiplier m, and p_i / (r_i^2 + m): a vector along the normal."""
         radii = ca.vertcat(*map(ca.SX, self.radii))
         squares, scaled = radii * radii, radii * point
-        low = (INSIDE - 1) * ca.mmin(squares)
+        low = (POLE_MARGIN - 1) * ca.mmin(squares)
         m = ca.fmax(ca.mmax(ca.fabs(scaled) - squares), low)
         for _ in range(FOOT_STEPS):
             parts = scaled / (squares + m)

@@ -4,7 +4,7 @@ Each box turns one face to the other: the one whose normal is nearest to the dir
 apart when they meet. The candidates are the corners of these two faces over the other face, and the points where
 edges of the one cross edges of the other: the corners of the region that both faces cover. They are chosen where the
 boxes are expected to meet, or at the end of the step. A box that slides over the seam of two boards meets their tops
-alone (``box_geometry.nearing``).
+alone (``box_geometry.first_overlap``).
 
 What it cannot do: two pairs of faces that meet in the same step; boxes that have sunk into each other deeper than
 about half of the thinner one may be pushed out at another side. Where edges cross, the point of contact stays where it
@@ -17,17 +17,24 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 
-from symphys.dynamics.collision.box_geometry import Face, Nearing, faces_and_edges, facing, moving_box, nearing
+from symphys.dynamics.collision.box_geometry import (
+    BoxOverlap,
+    Face,
+    faces_and_edges,
+    first_overlap,
+    moving_box,
+    nearest_face,
+)
 from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.witness_points import Witness, contact_of
 from symphys.model.shapes import Box
 from symphys.types import Expr
 
-RIM = 0.001
+RIM_SHARE = 0.001
 """Of a face's size: how far beyond its rim a corner still counts, as a point of the rim. So no candidate comes and
 goes as boxes that lie flush creep by rounding; it is given up only where others have long been at the same place."""
-FLAT = 1e-9
+MIN_EDGE_CHANGE = 1e-9
 """[m] an edge that changes less than this across a strip counts as parallel to it."""
 
 
@@ -60,7 +67,7 @@ class BoxApproach:
         return replace(self, bodies=(self.bodies[1], self.bodies[0]), normal=-1 * self.normal)
 
 
-def approach_of(near: Nearing, bodies: tuple[PredictedPath, PredictedPath], size: Expr) -> BoxApproach:
+def approach_of(near: BoxOverlap, bodies: tuple[PredictedPath, PredictedPath], size: Expr) -> BoxApproach:
     """Make the geometry of two boxes."""
     return BoxApproach(bodies, near.direction, near.time, near.apart, ca.fmax(near.distance, 0) + size)
 
@@ -68,10 +75,10 @@ def approach_of(near: Nearing, bodies: tuple[PredictedPath, PredictedPath], size
 def box_box(first: Box, second: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """Sixteen points: the corners of each face over the other, and where their edges cross."""
     one, other = moving_box(first, a), moving_box(second, b)
-    near = nearing(one, other, *faces_and_edges(one, other), a.dt)
+    near = first_overlap(one, other, *faces_and_edges(one, other), a.dt)
     approach = approach_of(near, (a, b), sum(first.half_sizes) + sum(second.half_sizes))
     normal, time = approach.normal.at(near.time), near.time
-    face, ground = facing(one, -normal, time), facing(other, normal, time)
+    face, ground = nearest_face(one, -normal, time), nearest_face(other, normal, time)
     return [
         *corners_over(face, ground, approach),
         *map(flipped, corners_over(ground, face, approach.flipped())),
@@ -85,14 +92,16 @@ def corners_over(face: Face, ground: Face, approach: BoxApproach) -> list[Contac
     for corner in face.corners():
         away = (corner - ground.centre).at(t)
         x, y = ca.dot(away, ground.u.at(t)), ca.dot(away, ground.v.at(t))
-        inside = ca.logic_and(ca.fabs(x) <= (1 + RIM) * ground.half_u, ca.fabs(y) <= (1 + RIM) * ground.half_v)
-        at_x, at_y = held(x, ground.half_u), held(y, ground.half_v)
+        inside = ca.logic_and(
+            ca.fabs(x) <= (1 + RIM_SHARE) * ground.half_u, ca.fabs(y) <= (1 + RIM_SHARE) * ground.half_v
+        )
+        at_x, at_y = clamp(x, ground.half_u), clamp(y, ground.half_v)
         over = corner + (at_x - x) * ground.u + (at_y - y) * ground.v
         found.append(approach.contact((over, ground.point(at_x, at_y)), ground.normal, inside))
     return found
 
 
-def held(x: Expr, half: Expr) -> Expr:
+def clamp(x: Expr, half: Expr) -> Expr:
     """X in [-half, half]."""
     return ca.fmin(ca.fmax(x, -half), half)
 
@@ -125,7 +134,7 @@ def seen_along(point: Expr, ground: Face, approach: BoxApproach) -> tuple[Expr, 
 
 def inside_strip(start: Expr, change: Expr, half: Expr) -> tuple[Expr, Expr]:
     """The shares of an edge at which it enters and leaves |x| <= half; an edge along the rim is inside."""
-    along = ca.fabs(change) < FLAT
-    pace, wide = ca.if_else(along, FLAT, change), half + ca.if_else(along, RIM * half, 0)
+    along = ca.fabs(change) < MIN_EDGE_CHANGE
+    pace, wide = ca.if_else(along, MIN_EDGE_CHANGE, change), half + ca.if_else(along, RIM_SHARE * half, 0)
     one, other = (-wide - start) / pace, (wide - start) / pace
     return ca.fmin(one, other), ca.fmax(one, other)

@@ -7,7 +7,7 @@ the capsule.
 from __future__ import annotations
 
 from symphys.dynamics.collision.body_points import ends
-from symphys.dynamics.collision.box_geometry import facing, moving_box, nearing
+from symphys.dynamics.collision.box_geometry import first_overlap, moving_box, nearest_face
 from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.pairs.box_box import approach_of, edges_across
 from symphys.dynamics.collision.pairs.sphere_box import ball_at_box
@@ -22,9 +22,9 @@ def capsule_box(capsule: Capsule, box: Box, a: PredictedPath, b: PredictedPath) 
     found = [ball_at_box(end, capsule.radius, box, a, b) for end in tips]
     rod, other = moving_box(capsule, a), moving_box(box, b)
     edges = [rod.axes[2].cross(edge) for edge in other.axes]
-    near = nearing(rod, other, list(other.axes), edges, a.dt, capsule.radius)
+    near = first_overlap(rod, other, list(other.axes), edges, a.dt, capsule.radius)
     approach = approach_of(near, (a, b), capsule.half_length + sum(box.half_sizes))
-    ground = facing(other, near.direction.at(near.time), near.time)
+    ground = nearest_face(other, near.direction.at(near.time), near.time)
     found += edges_across([a.path(end) for end in tips], ground, approach, capsule.radius)
     corners = [ball_at_capsule(c, c - b.centre(), 0.0, capsule, a) for c in ground.corners()]
     return found + [flipped(contact) for contact in corners]

@@ -2,7 +2,7 @@
 
 On terrain corners are chosen over the paraboloid below the hull's centre, and measured over the terrain itself.
 
-A hull of few corners has a slot for each. Of many, six slots take the deepest on ground that leans by ``LEAN`` to six
+A hull of few corners has a slot for each. Of many, six slots take the deepest on ground that leans by ``TILT`` to six
 sides: these are the outermost corners of a face that lies on the ground, and both ends of an edge. Two more take the
 deepest where it is expected to touch, and at the end of the substep, if it is deeper than those. So a hull stands on
 its faces and rolls over its edges, and no corner that is the deepest is left out. A corner counts once.
@@ -26,13 +26,13 @@ from symphys.model.shapes import SLOTS, Convex, Plane, Terrain
 from symphys.types import Expr
 
 Point = Sequence[Any]
-LEAN = 0.01
+TILT = 0.01
 """[rad] how much the ground is tilted, in thought, for the corners around a face."""
-SIDES = tuple((cos(a), sin(a)) for a in (0.3 + 2 * pi * k / (SLOTS - 2) for k in range(SLOTS - 2)))
+TILT_DIRECTIONS = tuple((cos(a), sin(a)) for a in (0.3 + 2 * pi * k / (SLOTS - 2) for k in range(SLOTS - 2)))
 """Directions in the ground; turned from its axes, so that faces along these have no two corners equally far out."""
-DEEPER = 1e-6
+EQUAL_DEPTH_SHARE = 1e-6
 """Times its extent: what is deeper by less is equally deep. At rest rounding decides which corner of a face is."""
-AWAY = 4.0
+EMPTY_SLOT_HEIGHT = 4.0
 """Times its extent: how far a slot without a corner of its own stays off the ground."""
 
 
@@ -57,7 +57,7 @@ def slot_points(shape: Convex, seen: Seen, dt: Expr) -> list[tuple[tuple[Expr, .
         seen: how its points lie over the ground.
         dt: length of the substep [s].
     """
-    corners, away = shape.hull.corners.tolist(), -AWAY * shape.extent
+    corners, away = shape.hull.corners.tolist(), -EMPTY_SLOT_HEIGHT * shape.extent
     if len(corners) <= SLOTS:
         own = [(tuple(corner), 0.0) for corner in corners]
         return own + [(tuple(corners[0]), away)] * (SLOTS - len(corners))
@@ -65,11 +65,14 @@ def slot_points(shape: Convex, seen: Seen, dt: Expr) -> list[tuple[tuple[Expr, .
     meets = ca.logic_and(start[0] > 0, end[0] < 0)
     share = ca.if_else(meets, start[0] / ca.if_else(meets, start[0] - end[0], 1), ca.if_else(start[0] > 0, 1, 0))
     then = list(map(seen(share * dt), corners))
-    found = [lowest(corners, [each.height - LEAN * (c * each.x + s * each.y) for each in then])[1] for c, s in SIDES]
-    slots = [(point, ca.if_else(taken(point, found[:k]), away, 0)) for k, point in enumerate(found)]
+    found = [
+        lowest(corners, [each.height - TILT * (c * each.x + s * each.y) for each in then])[1]
+        for c, s in TILT_DIRECTIONS
+    ]
+    slots = [(point, ca.if_else(is_among(point, found[:k]), away, 0)) for k, point in enumerate(found)]
     for t, (least, point) in ((share * dt, lowest(corners, [each.height for each in then])), (dt, end)):
         others = [seen(t)(other).height for other in found]
-        deeper = least < ca.mmin(ca.vertcat(*others)) - DEEPER * shape.extent
+        deeper = least < ca.mmin(ca.vertcat(*others)) - EQUAL_DEPTH_SHARE * shape.extent
         slots.append((point, ca.if_else(deeper, 0, away)))
         found.append(point)
     return slots
@@ -85,7 +88,7 @@ def lowest(corners: Sequence[Point], heights: Sequence[Expr]) -> tuple[Expr, tup
     return least, point
 
 
-def taken(point: tuple[Expr, ...], before: Sequence[tuple[Expr, ...]]) -> Expr:
+def is_among(point: tuple[Expr, ...], before: Sequence[tuple[Expr, ...]]) -> Expr:
     """1 if a corner is among others."""
     found = ca.SX(0)
     for other in before:

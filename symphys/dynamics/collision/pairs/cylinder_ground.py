@@ -23,9 +23,9 @@ from symphys.maths.smoothing import length
 from symphys.model.shapes import Cylinder, Plane, Terrain
 from symphys.types import Expr
 
-LEVEL = 1e-6
+MIN_TILT_SINE = 1e-6
 """Sine of the angle between a face and the ground below which they count as parallel."""
-BESIDE = (2 * pi / 3, -2 * pi / 3)
+RIM_ANGLES = (2 * pi / 3, -2 * pi / 3)
 """[rad] from the deepest point of a rim to the others."""
 
 
@@ -71,7 +71,7 @@ class RimOnPlane:
 def downhill(normal: Expr, axis: Expr, side: Expr) -> Expr:
     """(3,): the unit vector across ``axis`` that points most against ``normal``; ``side`` where that has none."""
     down = axis * ca.dot(axis, normal) - normal
-    level = ca.dot(down, down) < LEVEL * LEVEL
+    level = ca.dot(down, down) < MIN_TILT_SINE * MIN_TILT_SINE
     chosen = ca.if_else(level, side, down)
     return chosen / length(chosen)
 
@@ -114,7 +114,7 @@ def cylinder_plane(cylinder: Cylinder, plane: Plane, a: PredictedPath, _: Predic
         rim = RimOnPlane(normal, plane.offset, cylinder.radius, a.path(centre), a.arm(centre), frame[2], frame[0])
         deepest = contact_along(rim, a.dt)
         down = own_direction(normal, frame, deepest.time)
-        beside = [ball_on_plane(rolling, rim_point(cylinder, sign, down, turn), 0.0, plane) for turn in BESIDE]
+        beside = [ball_on_plane(rolling, rim_point(cylinder, sign, down, turn), 0.0, plane) for turn in RIM_ANGLES]
         found += [deepest, *beside]
     return found
 
@@ -130,6 +130,6 @@ def cylinder_terrain(cylinder: Cylinder, terrain: Terrain, a: PredictedPath, _: 
         for _round in range(2):
             down = own_direction(upwards(surface(place[:2])[1]), frame, ca.SX(0))
             place = a.path(rim_point(cylinder, sign, down, 0.0)).start
-        points = [rim_point(cylinder, sign, down, turn) for turn in (0.0, *BESIDE)]
+        points = [rim_point(cylinder, sign, down, turn) for turn in (0.0, *RIM_ANGLES)]
         found += [ball_on_terrain(point, 0.0, terrain, rolling) for point in points]
     return found

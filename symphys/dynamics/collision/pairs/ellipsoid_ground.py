@@ -9,7 +9,15 @@ import casadi as ca
 from symphys.dynamics.collision.body_points import axes
 from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
-from symphys.dynamics.collision.terrain import CONVEX, Paraboloid, determinant, nearest, solved, surface_of, upwards
+from symphys.dynamics.collision.terrain import (
+    MIN_DETERMINANT,
+    Paraboloid,
+    determinant,
+    nearest,
+    solved,
+    surface_of,
+    upwards,
+)
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.maths.smoothing import length
 from symphys.model.shapes import Ellipsoid, Plane, Terrain
@@ -126,7 +134,7 @@ class EllipsoidOnTerrain:
             moves = ca.mtimes([tangents.T, self._bend_of_support(solid, normal, t), turn, bend])
             rough = ca.SX.eye(2) + ca.mtimes(slope, slope.T)
             exact = rough - over[2] * bend + moves
-            convex = ca.logic_and(exact[0, 0] > CONVEX, determinant(exact) > CONVEX)
+            convex = ca.logic_and(exact[0, 0] > MIN_DETERMINANT, determinant(exact) > MIN_DETERMINANT)
             place = place + solved(ca.if_else(convex, exact, rough), ca.mtimes(tangents.T, over))
         return place
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import Offset, axes
-from symphys.dynamics.collision.box_geometry import FLUSH, leans_little
+from symphys.dynamics.collision.box_geometry import MIN_OVERLAP, is_nearly_vertical
 from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
@@ -19,7 +19,7 @@ from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Box, Sphere
 from symphys.types import Expr
 
-TINY = 1e-9
+MIN_RIM_APPROACH = 1e-9
 """[m] Smallest approach to a face in a step by which a ball counts as coming over its rim."""
 
 
@@ -84,8 +84,8 @@ def rolls_onto(offset: Offset, radius: Expr, box: Box, a: PredictedPath, b: Pred
     velocity = a.true_velocity_of(offset) - b.true_velocity_of(box.centre) - ca.cross(b.angular_velocity, apart)
     now, change = (ca.vertcat(*(ca.dot(axis, vector) for axis in own)) for vector in (apart, a.dt * velocity))
     before, after = (ca.fabs(place) - ca.vertcat(*box.half_sizes) for place in (now, now + change))
-    onto = ca.logic_or(after <= 0, ca.logic_and(after < before - TINY, after <= radius))
-    level = ca.fmin(before, after) >= radius - FLUSH
-    tops = [ca.logic_and(level[k], leans_little(own[k], gravity)) for k in range(3)]
+    onto = ca.logic_or(after <= 0, ca.logic_and(after < before - MIN_RIM_APPROACH, after <= radius))
+    level = ca.fmin(before, after) >= radius - MIN_OVERLAP
+    tops = [ca.logic_and(level[k], is_nearly_vertical(own[k], gravity)) for k in range(3)]
     over = [ca.logic_and(tops[k], ca.logic_and(onto[(k + 1) % 3], onto[(k + 2) % 3])) for k in range(3)]
     return tuple(ca.logic_or(over[(k + 1) % 3], over[(k + 2) % 3]) for k in range(3))

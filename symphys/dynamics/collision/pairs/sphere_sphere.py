@@ -8,7 +8,7 @@ import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
-from symphys.dynamics.collision.time_of_impact import NEWTON_STEPS, TINY_RATE, falls, no_later
+from symphys.dynamics.collision.time_of_impact import MIN_CLOSING_SPEED, NEWTON_STEPS, approaches, clip_to_end
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Sphere
 from symphys.types import Expr
@@ -63,13 +63,13 @@ def first_touch(path: Parabola, reach: Expr, dt: Expr) -> Expr:
     closing, speed2 = -ca.dot(d, w), ca.dot(w, w)
     excess = ca.dot(d, d) - reach * reach
     root = ca.sqrt(ca.fmax(closing * closing - speed2 * excess, 0) + TINY_SQUARE)
-    t = no_later(excess / ca.fmax(closing + root, TINY_RATE), dt)
+    t = clip_to_end(excess / ca.fmax(closing + root, MIN_CLOSING_SPEED), dt)
     for _ in range(NEWTON_STEPS):
         at = path.at(t)
-        slope = ca.fmin(2 * ca.dot(at, path.velocity_at(t)), -TINY_RATE)
-        t = no_later(ca.fmax(t - (ca.dot(at, at) - reach * reach) / slope, -dt), dt)
+        slope = ca.fmin(2 * ca.dot(at, path.velocity_at(t)), -MIN_CLOSING_SPEED)
+        t = clip_to_end(ca.fmax(t - (ca.dot(at, at) - reach * reach) / slope, -dt), dt)
     apart = distance(d)
-    return ca.if_else(falls(apart - reach, -closing / apart), t, 0)
+    return ca.if_else(approaches(apart - reach, -closing / apart), t, 0)
 
 
 def _meets(path: Parabola, reach: Expr, dt: Expr) -> Expr:

@@ -12,18 +12,17 @@ from tools.repeats import few
 from worlds.toys import require
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Program, compile_program
-from symphys.codegen.emit.alone import alone
+from symphys.codegen.emit.packs import pack_calls, single_lane_plan
 from symphys.codegen.emit.plan import plan
 from symphys.codegen.graph.adjoint import with_early_sums
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.instructions import graph_of
-from symphys.codegen.program.teams import teamed
 from symphys.codegen.runtime.widths import suited
 
 STEPS = 3
 
 
-def limbs(count: int = 4, crossed: bool = False, odd: bool = False) -> Program:
+def limb_program(count: int = 4, crossed: bool = False, odd: bool = False) -> Program:
     """Limbs that hang on a trunk of two words; a limb is moved by the trunk, and the trunk by all limbs in turn.
 
     ``crossed``: two limbs each have one arm at the same place. ``odd``: the first is bent by a function of its own.
@@ -73,7 +72,7 @@ def limbs(count: int = 4, crossed: bool = False, odd: bool = False) -> Program:
 @few("odd", [False, True], 1)
 def test_one_rollout_alone_gives_the_same_bits(count: int, crossed: bool, odd: bool, tmp_path: Path) -> None:
     require("simd")
-    program, cache = limbs(count, crossed, odd), Cache(tmp_path / "kernels")
+    program, cache = limb_program(count, crossed, odd), Cache(tmp_path / "kernels")
     rng = np.random.default_rng(count)
     Z, seeds = rng.normal(size=(5, program.z.size)), rng.normal(size=(5, program.z.size))
     wide = compile_program(program, cache=cache, threads=1, lanes=4)
@@ -89,12 +88,12 @@ def test_one_rollout_alone_gives_the_same_bits(count: int, crossed: bool, odd: b
 
 def test_equal_calls_are_found_and_no_call_is_lost() -> None:
     """Without teams the law above would say nothing."""
-    program = limbs()
-    found = teamed(program)
-    assert found.teams and min(count for _, count in found.teams) > 1
+    program = limb_program()
+    found = pack_calls(program)
+    assert found.packs and min(count for _, count in found.packs) > 1
     assert sorted(found.program.body, key=id) == sorted(program.body, key=id)
-    assert teamed(replace(program, in_order=True)).teams == ()
-    assert alone(plan(program, ["end"])) is not None
+    assert pack_calls(replace(program, in_order=True)).packs == ()
+    assert single_lane_plan(plan(program, ["end"])) is not None
 
 
 def test_sums_do_not_wait_for_all_their_terms() -> None:
