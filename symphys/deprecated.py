@@ -17,7 +17,7 @@ NAMES = {name: ("symphys.model", f"symphys.model.{name}") for name in WORLDS} | 
     "ShootingProblem": ("symphys.shooting", "symphys.shooting.ShootingProblem"),
     "Transcription": ("symphys.transcription", "symphys.CompiledRollout"),
     "load_problem": ("symphys.problem", "symphys.load"),
-    "roll_out": ("symphys.dynamics.horizon", "symphys.step_function and its mapaccum"),
+    "roll_out": ("symphys.dynamics.functions", "symphys.step_function and its mapaccum"),
     "transcribe": ("symphys.transcription", "symphys.compile"),
 }
 """The module that has each name, and its replacement."""

@@ -15,10 +15,9 @@ from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.joints.joint_impulse import JointImpulse
 from symphys.dynamics.step import take_step
 from symphys.dynamics.substep import Substep
-from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import traced, tracing
 from symphys.dynamics.tracing.guards import with_guards
-from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector
+from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector, without_dead_code
 from symphys.dynamics.tracing.trace import InlineTracer
 from symphys.dynamics.unknowns import AnyImpulse
 from symphys.maths.verbatim import verbatim
@@ -27,6 +26,10 @@ from symphys.model.state_layout import Layout
 from symphys.model.world import Pair, Scheme, World
 from symphys.types import Expr
 
+MAX_REDUCED_INSTRUCTIONS = 105_000
+"""Of a step in which what several parts compute alike is looked for: that saves a tenth, but takes its time."""
+PAIRS_PER_CALL = 32
+"""Pairs whose forces one call hands on to the next state, in worlds of many pairs: most are 0."""
 MAX_ORTHOGONAL_COSINE = 1e-3
 """Cosine of normals up to which two impacts of a body do not act on each other."""
 
@@ -148,14 +151,6 @@ def _crowded(before: Expr, constraints: tuple[tuple[tuple[int, ...], Expr, Expr]
     return result
 
 
-MAX_REDUCED_INSTRUCTIONS = 105_000
-"""Of a step in which what several parts compute alike is looked for: that saves a tenth, but takes its time."""
-
-
-PAIRS_PER_CALL = 32
-"""Pairs whose forces one call hands on to the next state, in worlds of many pairs: most are 0."""
-
-
 def step_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
@@ -266,3 +261,33 @@ def _together(world: World, owners: Mapping[str, list[str]], many: bool) -> list
 
 def _packed(layout: Layout, tracer: InlineTracer, x: State) -> Expr:
     return layout.pack({name: tracer.value(part) for name, part in x.items()})
+
+
+def roll_out(step: ca.Function, steps: int, x0: Expr, u: Expr, p: Expr, smoothing: Expr) -> tuple[Expr, ...]:
+    """``steps`` steps from x0; the inputs change with each, parameters and smoothing do not.
+
+    Args:
+        step: a function (x, u, p, smoothing) -> (x_next, ...).
+        steps: how many, N.
+        x0: (nx,) the state at t = 0.
+        u: (nu, N) inputs of each step.
+        p: (np,) parameters.
+        smoothing: scalar [m/s].
+
+    Returns:
+        The states (nx, N + 1) that include x0, then each further output of ``step``, N columns of them.
+
+    Example:
+        >>> from symphys import step_function
+        >>> from symphys.dynamics.functions import roll_out
+        >>> from symphys.model import Body, Layout, Plane, initial_state, make_world
+        >>> world = make_world([Body.ball("ball", radius=0.1, mass=0.5, position=(0, 0, 1))], [Plane.ground()])
+        >>> (x,) = roll_out(step_function(world), 100, initial_state(world), [], [], 0)
+        >>> x[Layout(world)["ball.position"], :].shape  # expressions, in any casadi problem
+        (3, 101)
+    """
+    whole = {"base": -1}  # all steps side by side: nested groups of steps take longer to build and to differentiate
+    horizon = step.mapaccum(f"{step.name()}_{steps}", steps, whole)
+    outputs: Any = horizon(x0, u, ca.repmat(p, 1, steps), ca.repmat(ca.MX(smoothing), 1, steps))
+    outputs = outputs if isinstance(outputs, tuple) else (outputs,)
+    return (ca.horzcat(x0, outputs[0]), *outputs[1:])

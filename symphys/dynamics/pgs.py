@@ -163,7 +163,7 @@ def _extrapolate_impulse(share: Expr, now: ContactImpulse, before: ContactImpuls
 
 @dataclass(frozen=True)
 class ExtrapolationContext:
-    """Constraints, the clusters of bodies that they connect, and the motions of bodies; see ``line_search``."""
+    """Constraints, the clusters of bodies that they connect, and the motions of bodies; see the module."""
 
     constraints: tuple[PlacedConstraint, ...]
     clusters: tuple[Cluster, ...]

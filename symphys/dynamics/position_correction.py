@@ -1,4 +1,7 @@
-"""From velocities to displacements: impacts act from their instant on, then a pass removes what still overlaps."""
+"""From velocities to displacements: impacts act from their instant on, then a pass removes the overlap that is left.
+
+Angles of joints that count whole turns follow from these displacements.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,10 @@ from symphys.dynamics.collision.contact_geometry import ZERO_DISPLACEMENT, Conta
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
 from symphys.dynamics.contact.newton_start import contact_softness, open_groups, solve_together
-from symphys.dynamics.context import StepContext
-from symphys.dynamics.joints.assembly import KinematicTrees
+from symphys.dynamics.context import State, StepContext
+from symphys.dynamics.joints.assembly import JointPath, KinematicTrees
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
+from symphys.dynamics.joints.joint_frames import JointFrames, free
 from symphys.dynamics.joints.joint_impulse import JointImpulse
 from symphys.dynamics.joints.loop_closure import Displacements, TreeDisplacement, close_loops, displaced
 from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
@@ -348,3 +352,36 @@ def _enforce_limit(constraint: CoordinateConstraint, along: TreeDisplacement) ->
     return GeneralizedVelocities(
         along.numbers + ca.mtimes(constraint.of_tree.response, constraint.position_impulse(moved))
     )
+
+
+def unwrapped_angles(
+    context: StepContext, paths: Sequence[JointPath], closed: CorrectedConfiguration, duration: Expr
+) -> State:
+    """``Joint.unwrapped`` of all joints that turn, at the end of a substep of ``duration`` [s].
+
+    The coordinate at the start plus its change in the step is its angle to third order in the step. Poses give the
+    angle exactly up to whole turns, whose number follows from this estimate, however far a step turns.
+    """
+    found = State()
+    for index, (joint, path) in enumerate(zip(context.world.joints, paths, strict=True)):
+        if joint.unwrapped is None:
+            continue
+        if index in closed.along:
+            moved = closed.along[index]
+        else:
+            moved = _turned(path.frames, tuple(closed.turning[i] for i in joint.bodies), duration)
+        found[joint.unwrapped] = _gone_on(path.values, moved)
+    return found
+
+
+@traced
+def _gone_on(values: tuple[Expr, ...], moved: Expr) -> Expr:
+    return ca.vertcat(*values) + moved
+
+
+@traced
+def _turned(frames: JointFrames, turning: tuple[Expr, ...], duration: Expr) -> Expr:
+    """The change (count,) [rad] of the coordinates as the first body turned against the second."""
+    middle, zero = frames.placed(duration / 2), ca.SX.zeros(3)
+    angular = turning[0] if len(turning) == 1 else turning[0] - turning[1]
+    return ca.vertcat(*(free(each, middle).forwards(zero, angular) for each in frames.joint.kind.coordinates))

@@ -15,8 +15,7 @@ import casadi as ca
 
 from symphys.dynamics.collision.broad_phase import near_pairs
 from symphys.dynamics.context import State, StepContext
-from symphys.dynamics.impact.deferred_impacts import defer_impacts
-from symphys.dynamics.impact.impact import StepSplit, find_split, resolve_impact
+from symphys.dynamics.impact.impact import StepSplit, defer_impacts, find_split, resolve_impact
 from symphys.dynamics.impact.restitution import eccentric_bodies
 from symphys.dynamics.substep import Substep, advance
 from symphys.dynamics.tracing.decorator import section, traced

@@ -163,7 +163,7 @@ class Rollout:
 
     def rolled(self, step: ca.Function) -> tuple[Expr, Expr, list[Expr]]:
         """States (nx, N + 1), inputs (nu, N) and what else a step gives, N columns each; ``step`` is not closed."""
-        from symphys.dynamics.horizon import roll_out
+        from symphys.dynamics.functions import roll_out
 
         given = self.given
         if self.feedback is not None:

@@ -59,7 +59,7 @@ def test_a_second_start_loads_nothing_that_makes_kernels(tmp_path: Path) -> None
 
 EXAMPLES = (
     "CompiledRollout", "Problem", "Solution", "Trajectory", "cache", "check", "compile", "compile_step", "doctor",
-    "dynamics.horizon.roll_out", "export_problem", "load", "model.Heightfield", "model.Slider", "model.initial_state",
+    "dynamics.functions.roll_out", "export_problem", "load", "model.Heightfield", "model.Slider", "model.initial_state",
     "new", "problem.load_problem", "read", "results.runs", "schema", "show", "simulate", "solve", "solve_all",
     "step_function", "transcription.transcribe", "write_report",
 )  # fmt: skip

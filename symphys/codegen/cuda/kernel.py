@@ -1,30 +1,176 @@
-"""A program on a device: a robot in each thread of a warp, several warps for the calls that run side by side."""
+"""A program on a device: a robot in each thread of a warp, several warps for the calls that run side by side.
+
+The CUDA C++ has the same functions as the C for processors, and a driver. Functions are spread over several texts that
+are linked later: a compiler's time grows far faster than its text. The driver reads structures of addresses.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.resources import files
 from typing import Any, Literal
 
 import numpy as np
 
 from symphys.codegen.cuda.device import Device
-from symphys.codegen.cuda.schedule import schedules
-from symphys.codegen.cuda.source import device_sources
-from symphys.codegen.cuda.tables import DeviceJob, Tables
+from symphys.codegen.cuda.schedule import Schedule, schedules
+from symphys.codegen.emit import source
+from symphys.codegen.emit.alternatives import LEFT_OUT
+from symphys.codegen.emit.dialect import DEVICE
 from symphys.codegen.emit.plan import FAST_MEMORY, plan
+from symphys.codegen.emit.planned import Plan
+from symphys.codegen.emit.writer import write
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.runtime.kernel import BuildReport, Kernel
-from symphys.codegen.runtime.library import RowSource
+from symphys.codegen.runtime.library import WORD, List, RowSource, data_places, program_fields, strided
 from symphys.codegen.toolchain.build import names_of
+from symphys.types import Ints
 
+ROOM = "symphys.codegen.cuda"
+MAX_FILES = 24
+SIGNATURE = "(V *m, V *b, const word *t, word k)"
 WARPS_PER_BLOCK = 4
 """Of a block. The table robot's step has 102 levels, whose dearest shares are 2.2 times less work than all calls with
 4 warps, 2.6 times with 8, which leaves a thread half the registers."""
 STEPS_PER_LAUNCH = 64
 """In one launch: between launches a user can interrupt, and a display can be drawn."""
+
+
+class DevicePhase(ctypes.Structure):
+    """The driver's ``phase``."""
+
+    _fields_ = (("levels", WORD), ("spans", ctypes.c_void_p), ("entries", ctypes.c_void_p))
+
+
+class DeviceProgram(ctypes.Structure):
+    """The driver's ``program``."""
+
+    _fields_ = program_fields(DevicePhase)
+
+
+class DeviceJob(ctypes.Structure):
+    """The driver's ``job``."""
+
+    _fields_ = (
+        ("program", ctypes.c_void_p),
+        ("memory", ctypes.c_void_p),
+        *((name, WORD) for name in ("rows", "first", "end")),
+        *((name, RowSource) for name in ("z", "parameters", "seed")),
+        *((name, ctypes.c_void_p) for name in ("outputs", "gradient", "trajectory")),
+        *((name, WORD) for name in ("offset", "size", "stride", "count")),
+        ("discount", ctypes.c_double),
+    )
+
+
+class Tables:
+    """A program's data in the memory of a device.
+
+    Attributes:
+        address: of the driver's ``program``.
+        warps: of a block.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        program: Program,
+        planned: Plan,
+        seeded: Sequence[str],
+        phases: Mapping[str, Schedule],
+        warps: int,
+    ) -> None:
+        """Copy everything there."""
+        self.device, self.warps = device, warps
+        data = DeviceProgram(program.size, planned.tape, program.steps)
+        values = [x for _, row in program.constants for x in row]
+        self._kept = [device.put(np.array(values or [0], float))]
+        data.values = device.address(self._kept[0])
+        for name, places in data_places(program, seeded).items():
+            words = np.array([x for place in places for x in (place.offset, place.size)], np.int64)
+            setattr(data, name, List(len(places), self._put(words)))
+        for name, each in phases.items():
+            spans, entries = self._put(each.spans.ravel()), self._put(interleaved(each.entries, device.lanes))
+            setattr(data, name, DevicePhase(len(each.spans), spans, entries))
+        written = [place for call in program.body for place in call.outputs if place.stride]
+        data.written = List(len(written), self._put(strided(written)))
+        if program.discounted is not None:
+            state, kept = program.discounted.state, program.discounted.kept
+            data.discounted = (WORD * 3)(state.offset, state.size, state.stride)
+            data.kept = (WORD * 2)(*((kept.offset, kept.stride) if kept else (0, 0)))
+        self._kept.append(device.put(np.frombuffer(bytes(data), np.uint8)))
+        self.address = device.address(self._kept[-1])
+
+    def _put(self, words: Ints) -> int:
+        """The address of a copy."""
+        self._kept.append(self.device.put(words if words.size else np.zeros(1, np.int64)))
+        return self.device.address(self._kept[-1])
+
+
+def interleaved(entries: Ints, lanes: int) -> Ints:
+    """Entries whose offsets and strides count the words of all lanes; those of what is copied count robots' words."""
+    found, at = entries.copy(), 0
+    while at < len(found):
+        length = int(found[at + 1])
+        found[at + 2 : at + length] *= 1 if found[at] == LEFT_OUT else lanes
+        at += length
+    return found
+
+
+def results_apart(planned: Plan, steps: int) -> list[set[int]]:
+    """Return the choice for each function; everything for a function without calls."""
+    calls: list[list[Ints]] = [[] for _ in planned.functions]
+    for count, table in planned.tables.values():
+        at = 0
+        for _ in range(count):
+            calls[int(table[at])].append(table[at + 2 : at + table[at + 1]].reshape(-1, 2))
+            at += int(table[at + 1])
+    found = []
+    for (graph, _), own in zip(planned.functions, calls, strict=True):
+        met: set[int] = set()
+        sizes = [len(result) for result in graph.results]
+        places = np.array([call[len(graph.sizes) :] for call in own]).reshape(len(own), len(sizes), 2)
+        for a, b in zip(*np.triu_indices(len(sizes), 1), strict=True):
+            if sizes[a] and sizes[b] and _meet(places[:, a], sizes[a], places[:, b], sizes[b], steps):
+                met |= {int(a), int(b)}
+        found.append(set(range(len(sizes))) - met)
+    return found
+
+
+def _meet(a: Ints, size: int, b: Ints, other: int, steps: int) -> bool:
+    """Whether places, (calls, 2) offsets and strides, have a word in common in any step of any call."""
+    offset, stride = (b - a).T
+    ends = [offset, offset + stride * (steps - 1)]
+    least, most = np.minimum(*ends), np.maximum(*ends)  # of the distance, over time: what lies between counts as met
+    return bool(((least < size) & (most > -other)).any())
+
+
+def device_sources(planned: Plan, steps: int, lanes: int, warps: int, single: bool) -> list[str]:
+    """The texts of a plan's kernels, for blocks of so many robots and warps; the last one is the driver's."""
+    head = f"#define LANES {lanes}\n#define WARPS {warps}\n#define SINGLE {int(single)}\n{resource('device.h')}"
+    apart = results_apart(planned, steps)
+    texts = [
+        write(f"f{number}", graph, form, DEVICE, apart=apart[number] if form.adds else ())
+        for number, (graph, form) in enumerate(planned.functions)
+    ]
+    work = [len(graph.nodes) for graph, _ in planned.functions]
+    names = [f"f{number}" for number in range(len(texts))]
+    declared = "".join(f"{DEVICE.entry} {name}{SIGNATURE};\n" for name in names)
+    cases = "".join(f"    case {number}: {name}(m, b, t, k); break;\n" for number, name in enumerate(names))
+    call = (
+        "static __device__ __forceinline__ void call(word number, V *m, V *b, const word *t, word k) {\n"
+        f"  switch (number) {{\n{cases}  }}\n}}\n"
+    )
+    driver = "\n".join([head, declared, call, source.resource("program.h"), resource("driver.cu")])
+    return [*("\n".join([head, *group]) for group in source.spread(texts, work, MAX_FILES)), driver]
+
+
+def resource(name: str) -> str:
+    """The text of a file of this room."""
+    return files(ROOM).joinpath(name).read_text(encoding="utf-8")
 
 
 class DeviceKernel(Kernel):

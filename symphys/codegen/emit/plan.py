@@ -14,9 +14,9 @@ from symphys.codegen.emit.packs import pack_calls
 from symphys.codegen.emit.pieces import Form
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.tables import Recipe, Table, table_of
+from symphys.codegen.graph.activity import AnnotatedCalls, LivenessGraph
 from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
-from symphys.codegen.graph.reach import AnnotatedCalls, LivenessGraph
 from symphys.codegen.graph.rewrite import Taped
 from symphys.codegen.program.phase_calls import PhaseCalls, grouped, rows_of
 from symphys.codegen.program.program import Function, Place, Program

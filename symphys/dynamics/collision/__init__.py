@@ -9,20 +9,18 @@ from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.fields.convex import sphere_convex
 from symphys.dynamics.collision.fields.cylinder import capsule_cylinder, sphere_cylinder
 from symphys.dynamics.collision.fields.ellipsoid import capsule_ellipsoid, sphere_ellipsoid
+from symphys.dynamics.collision.half_space import box_plane, capsule_plane, sphere_plane
 from symphys.dynamics.collision.pairs.box_box import box_box
-from symphys.dynamics.collision.pairs.box_plane import box_plane
 from symphys.dynamics.collision.pairs.capsule_box import capsule_box
 from symphys.dynamics.collision.pairs.capsule_capsule import capsule_capsule
-from symphys.dynamics.collision.pairs.capsule_plane import capsule_plane
 from symphys.dynamics.collision.pairs.convex_ground import convex_plane, convex_terrain
 from symphys.dynamics.collision.pairs.cylinder_ground import cylinder_plane, cylinder_terrain
 from symphys.dynamics.collision.pairs.ellipsoid_ground import ellipsoid_plane, ellipsoid_terrain
 from symphys.dynamics.collision.pairs.sphere_box import sphere_box
 from symphys.dynamics.collision.pairs.sphere_capsule import sphere_capsule
-from symphys.dynamics.collision.pairs.sphere_plane import sphere_plane
 from symphys.dynamics.collision.pairs.sphere_sphere import sphere_sphere
-from symphys.dynamics.collision.pairs.terrain import box_terrain, capsule_terrain, sphere_terrain
 from symphys.dynamics.collision.predicted_path import PredictedPath
+from symphys.dynamics.collision.terrain import box_terrain, capsule_terrain, sphere_terrain
 from symphys.dynamics.tracing.decorator import traced
 from symphys.model.shapes import (
     Box,

@@ -1,4 +1,4 @@
-"""A ball, or a point, that a body carries, against a static plane: what all shapes do on planes."""
+"""Shapes on a body against a static plane: each touches it with balls or points that the body carries."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.dynamics.collision.body_points import corners, ends
 from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import first_root
-from symphys.model.shapes import Plane
+from symphys.model.shapes import Box, Capsule, Plane, Sphere
 from symphys.types import Expr
 
 
@@ -57,3 +58,18 @@ def ball_on_plane(body_path: PredictedPath, offset: Sequence[Any], radius: Expr,
         end=end,
         geometry=OnPlane(normal, plane.offset, radius, body_path.arm(offset), path.start),
     )
+
+
+def sphere_plane(sphere: Sphere, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
+    """One point."""
+    return [ball_on_plane(a, sphere.centre, sphere.radius, plane)]
+
+
+def capsule_plane(capsule: Capsule, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
+    """Two points: the round ends."""
+    return [ball_on_plane(a, end, capsule.radius, plane) for end in ends(capsule)]
+
+
+def box_plane(box: Box, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
+    """Eight points: the corners, balls where edges are round."""
+    return [ball_on_plane(a, corner, box.edge, plane) for corner in corners(box)]

@@ -1,4 +1,4 @@
-"""A ball, or a point, that a body carries, against terrain: what all shapes do there.
+"""Shapes on a body against terrain: their round ends and corners touch it, as balls or points that the body carries.
 
 The surface is replaced by its osculating paraboloid below the place where the ball is expected to touch, so that it
 is evaluated a few times a step only. Within a step that is right to third order in the distance covered. A ball that
@@ -14,11 +14,12 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.dynamics.collision.body_points import corners, ends
 from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.predicted_path import ZERO_PATH, PredictedPath, at_rest
 from symphys.dynamics.collision.signed_distance import InField
 from symphys.dynamics.collision.time_of_impact import contact_along
-from symphys.model.shapes import Terrain
+from symphys.model.shapes import Box, Capsule, Sphere, Terrain
 from symphys.types import Expr
 
 FOOT_STEPS = 3
@@ -132,3 +133,18 @@ def surface_of(terrain: Terrain) -> Surface:
     bend, slope = ca.hessian(height, xy)
     function = ca.Function("surface", [xy], [height, ca.densify(slope), ca.densify(bend)])
     return lambda place: tuple(function.call([place]))  # type: ignore[return-value]
+
+
+def sphere_terrain(sphere: Sphere, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
+    """One point."""
+    return [ball_on_terrain(sphere.centre, sphere.radius, terrain, a)]
+
+
+def capsule_terrain(capsule: Capsule, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
+    """Two points: the round ends."""
+    return [ball_on_terrain(end, capsule.radius, terrain, a) for end in ends(capsule)]
+
+
+def box_terrain(box: Box, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
+    """Eight points: the corners, balls where edges are round."""
+    return [ball_on_terrain(corner, box.edge, terrain, a) for corner in corners(box)]

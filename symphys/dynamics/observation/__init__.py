@@ -1,9 +1,7 @@
 """What can be computed from a state without taking a step: sensors, coordinates of joints, queries."""
 
-from symphys.dynamics.observation.ball_turns import joint_turn
-from symphys.dynamics.observation.half_step import half_step_function
-from symphys.dynamics.observation.joint_coordinates import joint_readings, reading_function, readings
-from symphys.dynamics.observation.queries import gap_function, slip_function
+from symphys.dynamics.observation.joint_coordinates import joint_readings, joint_turn, reading_function, readings
+from symphys.dynamics.observation.queries import gap_function, half_step_function, slip_function
 from symphys.dynamics.observation.sensor_kind import MjcfSensor, SensedState, SensorKind
 from symphys.dynamics.observation.sensors import SENSOR_KINDS, NamedSensor, named_sensors, sensor_readings
 

@@ -1,4 +1,4 @@
-"""Sensors of joints: their coordinates and rates, and what their motors give; also how far joints are apart."""
+"""Sensors of joints: coordinates and rates, the forces of motors, reactions, separation, relative orientation."""
 
 from __future__ import annotations
 
@@ -18,12 +18,15 @@ from symphys.dynamics.observation.sensor_kind import MjcfSensor, SensedState, Se
 from symphys.dynamics.prediction import predicted_motions
 from symphys.dynamics.tracing.decorator import traced, tracing
 from symphys.dynamics.tracing.trace import InlineTracer
+from symphys.maths import rotation
 from symphys.maths.rotation import matrix, rotate
 from symphys.model.joints import Coordinate, Joint, JointFrame, PlacedFrames, kinematic_trees
 from symphys.model.state_layout import INPUT_FIELDS, Layout, input_sizes
 from symphys.model.world import World
 from symphys.types import Expr
 
+WORLD_ORIENTATION = (1.0, 0.0, 0.0, 0.0)
+"""Of the world."""
 Motion = tuple[Expr, Expr]
 """(3,) velocity [m/s], (3,) angular velocity [rad/s], world frame."""
 
@@ -268,3 +271,21 @@ JOINT_SENSORS = (
     ),
 )
 """Every kind of sensor of a joint."""
+
+
+def joint_turn(joint: Joint, orientations: tuple[Expr, ...], spins: tuple[Expr, ...]) -> tuple[Expr, Expr]:
+    """The orientation (4,) of the joint's first frame in its second, and the angular velocity (3,) [rad/s] there.
+
+    Args:
+        joint: of the world.
+        orientations: (4,) of its bodies in the order of ``Joint.bodies``.
+        spins: (3,) [rad/s] their angular velocities, world frame.
+    """
+    first, second = ((*orientations, ca.DM(WORLD_ORIENTATION))[k] for k in (0, 1))
+    own, other = (
+        rotation.multiply(q, ca.vertcat(*frame.orientation))
+        for q, frame in zip((first, second), joint.frames, strict=True)
+    )
+    back = ca.vertcat(other[0], -other[1:4])
+    apart = spins[0] - spins[1] if len(spins) > 1 else spins[0]
+    return rotation.multiply(back, own), rotation.rotate(back, apart)

@@ -12,8 +12,7 @@ import pytest
 
 from symphys.codegen import Cache, KernelUnavailable
 from symphys.codegen.cuda import find_gpu
-from symphys.codegen.cuda.compiler import Image
-from symphys.codegen.cuda.gpu import Gpu
+from symphys.codegen.cuda.gpu import Gpu, Image
 
 
 class Refusal(RuntimeError):

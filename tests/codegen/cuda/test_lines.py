@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from worlds import programs
 
-from symphys.codegen.cuda.source import results_apart
+from symphys.codegen.cuda.kernel import results_apart
 from symphys.codegen.emit.plan import FAST_MEMORY, plan
 from symphys.codegen.emit.writer import Lines
 

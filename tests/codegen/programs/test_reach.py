@@ -8,8 +8,7 @@ import pytest
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
 from symphys.codegen.emit.functions import DistinctFunctions
-from symphys.codegen.graph.activity import Activity, CallActivity
-from symphys.codegen.graph.reach import AnnotatedCalls, LivenessGraph
+from symphys.codegen.graph.activity import Activity, AnnotatedCalls, CallActivity, LivenessGraph
 
 STEPS = 3
 

@@ -7,7 +7,7 @@ import pytest
 
 from symphys.dynamics.context import make_context
 from symphys.dynamics.functions import parts_of
-from symphys.dynamics.impact.deferred_impacts import defer_impacts
+from symphys.dynamics.impact.impact import defer_impacts
 from symphys.model.shapes import Plane
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Body, Law, Scheme, make_world

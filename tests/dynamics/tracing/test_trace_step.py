@@ -10,9 +10,8 @@ import pytest
 from tools.repeats import first
 
 from symphys.dynamics.functions import TracedStep, step_function, trace_step
-from symphys.dynamics.tracing.dead_code import without_dead_code
 from symphys.dynamics.tracing.decorator import repeat, traced, tracing
-from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector
+from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector, without_dead_code
 from symphys.maths.verbatim import verbatim
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
 from symphys.model.state_layout import Layout, initial_state
