@@ -1,4 +1,4 @@
-"""What can go wrong between a program and its kernel."""
+"""Errors between a program and its kernel."""
 
 from __future__ import annotations
 

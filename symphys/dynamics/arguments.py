@@ -15,7 +15,10 @@ from symphys.types import Expr
 
 
 def inline(world: World, arguments: Sequence[Expr], reduces: bool = True) -> InlineTracer:
-    """A tracer of functions of x, u, p and smoothing; x by its parts, so that equal bodies share what they compute."""
+    """Return a tracer of functions of x, u, p and smoothing.
+
+    X by its parts, so that equal bodies share what they compute.
+    """
     (x, *others), tracer = arguments, InlineTracer(reduces)
     for column in (*parts_of(Layout(world), x).values(), *others):
         tracer.take(column)
@@ -28,11 +31,11 @@ def context_of(world: World, scheme: Scheme | None, inputs: Sequence[str], argum
 
 
 def parts_of(layout: Layout, x: Expr) -> State:
-    """The state's parts by name."""
+    """Return the state's parts by name."""
     return {name: x[layout[name]] for name in layout.names()}
 
 
 def arguments_of(world: World, inputs: Sequence[str], parameters: Sequence[Any]) -> list[Expr]:
-    """Symbols for x, u, p and smoothing."""
+    """Return symbols for x, u, p and smoothing."""
     x = ca.SX.sym("x", Layout(world).size)
     return [x, input_symbols(world, inputs), ca.vertcat(ca.SX(0, 1), *parameters), ca.SX.sym("smoothing")]

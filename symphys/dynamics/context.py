@@ -1,4 +1,4 @@
-"""What stays the same over a step."""
+"""Settings, world and inputs that are constant over a step."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from symphys.model.world import Pair, Scheme, World
 from symphys.types import Expr
 
 MIN_KICK_SHARE = 1 / 8
-"""Of dt; see ``StepContext.shortest_kick``."""
+"""Least time over which impulses act as forces, as a share of dt; see ``StepContext.shortest_kick``."""
 MAX_REST_GAP = 0.1
-"""Of the distance a_ref dt^2: surfaces that carried load and are that near to each other go on touching."""
+"""Largest gap of surfaces that carried load and go on touching, as a share of the distance a_ref dt^2."""
 MIN_REFERENCE_ACCELERATION = 1.0
 """[m/s^2] least reference acceleration: what counts as fast when there is no gravity."""
 
@@ -43,13 +43,13 @@ class StepSettings:
 
     @property
     def fast(self) -> Expr:
-        """The speed [m/s] of approach above which a contact is an impact, not rest."""
+        """Return the speed [m/s] of approach above which a contact is an impact, not rest."""
         return 2 * self.reference * self.scheme.dt
 
 
 @dataclass(frozen=True)
 class StepContext:
-    """What stays the same over a step.
+    """World, settings and inputs, constant over a step.
 
     Attributes:
         world: what is simulated.
@@ -66,22 +66,22 @@ class StepContext:
     near: tuple[Expr, ...] = ()
 
     def pairs_and_near(self) -> Iterator[tuple[Pair, Expr]]:
-        """The pairs, and whether they may act."""
+        """Yield the pairs, and whether they may act."""
         return zip(self.world.pairs, self.near or [ca.SX(1)] * len(self.world.pairs), strict=True)
 
     def input(self, name: str) -> Expr | None:
-        """The input of this name; None if there is none."""
+        """Return the input of this name; None if there is none."""
         columns = input_columns(self.world, self.inputs).get(name)
         return None if columns is None else self.u[columns]
 
     @property
     def shortest_kick(self) -> Expr:
-        """[s]: impulses of a shorter substep are stored as forces over this time; what an impact adds is no force."""
+        """Return the least time [s] over which impulses of a substep are stored as forces; an impact adds no force."""
         return MIN_KICK_SHARE * self.settings.scheme.dt
 
 
 def make_context(world: World, scheme: Scheme | None, inputs: tuple[str, ...], u: Expr, smoothing: Expr) -> StepContext:
-    """The context of a world."""
+    """Return the context of a world."""
     gravity = ca.vertcat(*world.gravity)
     settings = StepSettings(scheme or Scheme(), gravity, smoothing, reference(gravity))
     return StepContext(world, settings, inputs, u)
@@ -89,5 +89,5 @@ def make_context(world: World, scheme: Scheme | None, inputs: tuple[str, ...], u
 
 @traced
 def reference(gravity: Expr) -> Expr:
-    """|gravity|, or 1 m/s^2 if that is more."""
+    """Return |gravity|, at least 1 m/s^2."""
     return ca.fmax(ca.sqrt(ca.dot(gravity, gravity) + TINY_SQUARE), MIN_REFERENCE_ACCELERATION)

@@ -1,4 +1,4 @@
-"""How a body without torque turns: its angular momentum stays, for any inertia and any angle in a step.
+"""Free rotation of a body without torque: it conserves angular momentum at any inertia and any angle in a step.
 
 The rotational energy l . J l / 2, with l the angular momentum in the body's frame and J the inverse inertia, is split
 into c l . l / 2, a rotation about the constant momentum that commutes with all else, and two terms b (u . l)^2 / 2,
@@ -39,7 +39,7 @@ class Splitting:
 
 
 def turned(inertia: Expr, q: Expr, momentum: Expr, t: Expr, shares: Sequence[float] = FOURTH_ORDER) -> Expr:
-    """(4,): orientation ``q`` after the time ``t`` [s] in free rotation.
+    """Return the orientation ``q`` after the time ``t`` [s] in free rotation (4,).
 
     Args:
         inertia: see ``world.Body``; no scalar.
@@ -58,7 +58,7 @@ def turned(inertia: Expr, q: Expr, momentum: Expr, t: Expr, shares: Sequence[flo
 
 
 def _composition(terms: int, shares: Sequence[float]) -> list[tuple[int, float]]:
-    """The rotations in their order: (which term, share of the time); symmetric, those that meet as one."""
+    """Return the rotations in their order: (which term, share of the time); symmetric, those that meet as one."""
     if terms < 2:
         return [(k, 1.0) for k in range(terms)]
     ways = list(range(terms - 1, 0, -1))
@@ -71,7 +71,7 @@ def _composition(terms: int, shares: Sequence[float]) -> list[tuple[int, float]]
 
 
 def splitting(inertia: Expr) -> Splitting:
-    """The terms; of principal moments the two that are nearest to each other share the sphere."""
+    """Return the terms; of principal moments the two that are nearest to each other share the sphere."""
     rows = [ca.vertcat(*row) if isinstance(row, (tuple, list)) else ca.SX(row) for row in inertia]
     if rows[0].is_scalar():
         return _principal(rows, ca.SX.eye(3))

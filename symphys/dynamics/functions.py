@@ -27,7 +27,7 @@ from symphys.model.world import Pair, Scheme, World
 from symphys.types import Expr
 
 MAX_REDUCED_INSTRUCTIONS = 105_000
-"""Of a step in which what several parts compute alike is looked for: that saves a tenth, but takes its time."""
+"""Instructions of a step up to which common subexpressions are eliminated: that saves a tenth, but takes its time."""
 PAIRS_PER_CALL = 32
 """Pairs whose forces one call hands on to the next state, in worlds of many pairs: most are 0."""
 MAX_ORTHOGONAL_COSINE = 1e-3
@@ -36,7 +36,7 @@ MAX_ORTHOGONAL_COSINE = 1e-3
 
 @dataclass(frozen=True)
 class StepReport:
-    """What happened in a step; forces and gaps in the order of the world's pairs.
+    """Report of a step; forces and gaps in the order of the world's pairs.
 
     Attributes:
         forces: (3 * pairs,) impulse / dt on each pair's first body [N], world frame.
@@ -81,7 +81,7 @@ Met = tuple[Expr, Expr, Expr]
 
 
 def _simultaneous(world: World, substep: Substep) -> list[tuple[Met, Met]]:
-    """The contacts of one body with two others, two by two, of which one rebounds."""
+    """Return the contacts of one body with two others, two by two, of which one rebounds."""
     of: dict[int, list[int]] = {}
     for k, each in enumerate(substep.constraints):
         for body in each.bodies:
@@ -104,7 +104,7 @@ def _partner(pair: Pair, body: int) -> tuple[int | None, int]:
 
 @traced
 def _ambiguous(before: Expr, met: tuple[Met, Met]) -> Expr:
-    """1 if both give an impulse at one instant, one of them as an impact, and neither leaves the other as it is."""
+    """Return 1 if both give an impulse at one instant, one of them as an impact, and each changes the other."""
     (n, press, struck), (other, also, hit) = met
     both = ca.logic_and(ca.logic_and(press > 0, also > 0), ca.logic_or(struck, hit))
     return ca.fmax(before, ca.logic_and(both, ca.fabs(ca.dot(n, other)) > MAX_ORTHOGONAL_COSINE))
@@ -140,7 +140,7 @@ def _larger(one: Expr, other: Expr) -> Expr:
 
 @traced
 def _crowded(before: Expr, constraints: tuple[tuple[tuple[int, ...], Expr, Expr], ...]) -> Expr:
-    """1 if some body has two or more impacts in this substep, or had before."""
+    """Return 1 if some body has two or more impacts in this substep, or had before."""
     counts: dict[int, Expr] = {}
     for bodies, struck, leaving in constraints:
         for body in bodies:
@@ -154,7 +154,7 @@ def _crowded(before: Expr, constraints: tuple[tuple[tuple[int, ...], Expr, Expr]
 def step_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
-    """One time step as a casadi function (x, u, p, smoothing) -> x_next; no branches, all derivatives finite.
+    """Return one time step as a casadi function (x, u, p, smoothing) -> x_next; no branches, all derivatives finite.
 
     Args:
         world: bodies, planes, pairs; its numbers may be SX symbols listed in ``parameters``.
@@ -223,7 +223,7 @@ def trace_step(
     parameters: Sequence[Any] = (),
     exact: bool = False,
 ) -> TracedStep:
-    """The step of ``step_function`` in calls; their named slots are the parts of x, and "u", "p" and "smoothing".
+    """Return the step of ``step_function`` in calls; named slots are the parts of x, "u", "p" and "smoothing".
 
     ``exact`` is the step at smoothing 0 only: what the smoothing would add is left out.
     """
@@ -245,7 +245,7 @@ def trace_step(
 
 
 def _together(world: World, owners: Mapping[str, list[str]], many: bool) -> list[list[str]]:
-    """The names of parts of the next state that one call writes: of each owner, or of several of ``many`` pairs."""
+    """Return the names of parts of the next state that one call writes: of an owner, or of ``many`` pairs."""
     pairs = {pair.name for pair in world.pairs} if many else set()
     found: list[list[str]] = []
     room = 0
@@ -264,7 +264,7 @@ def _packed(layout: Layout, tracer: InlineTracer, x: State) -> Expr:
 
 
 def roll_out(step: ca.Function, steps: int, x0: Expr, u: Expr, p: Expr, smoothing: Expr) -> tuple[Expr, ...]:
-    """``steps`` steps from x0; the inputs change with each, parameters and smoothing do not.
+    """Take ``steps`` steps from x0; the inputs change with each, parameters and smoothing do not.
 
     Args:
         step: a function (x, u, p, smoothing) -> (x_next, ...).

@@ -1,4 +1,4 @@
-"""What is built of worlds that are equal but for what their symbols stand for, kept for the next of them.
+"""A cache of functions of worlds that are equal but for the meaning of their symbols.
 
 Building a step takes a tenth of a second for a ball and several for a robot, as long as many a solve.
 """
@@ -35,7 +35,7 @@ def kept(
     parameters: Sequence[Any],
     *more: Hashable,
 ) -> T:
-    """``make(world, scheme, inputs, parameters, *more)``, or what it gave for an equal world; functions of casadi."""
+    """Return ``make(world, scheme, inputs, parameters, *more)``, or its result for an equal world."""
     key = (make, structure(world, parameters), scheme, tuple(inputs), more)
     if key not in KEPT:
         while len(KEPT) >= MAX_KEPT:

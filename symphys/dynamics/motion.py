@@ -23,7 +23,7 @@ MAX_TURN = 4.0
 
 @dataclass(frozen=True)
 class BodyState:
-    """What a body brings into a step: (3,) or (4,) each, world frame, velocities without persistent forces."""
+    """State of a body at the start of a step: (3,) or (4,) each, world frame, velocities without persistent forces."""
 
     position: Expr
     orientation: Expr
@@ -89,12 +89,12 @@ class PredictedMotion(PredictedPath):
         return ca.SX(0) if self.massless else self.mass
 
     def predicted_path(self) -> PredictedPath:
-        """The motion without its inertia, which turns by at most ``MAX_TURN`` in the step."""
+        """Return the motion without its inertia, which turns by at most ``MAX_TURN`` in the step."""
         path = PredictedPath(**{field.name: getattr(self, field.name) for field in fields(PredictedPath)})
         return replace(path, angular_velocity=self.path_turn[0], angular_acceleration=self.path_turn[1])
 
     def inverse_inertia(self, t: Expr) -> Expr:
-        """World-frame inverse inertia at time t in the step, to first order; scalar if isotropic."""
+        """Return world-frame inverse inertia at time t in the step, to first order; scalar if isotropic."""
         if self.inverse_rate is None:
             return self.inverse_mid
         return self.inverse_mid + (t - self.dt / 2) * self.inverse_rate
@@ -109,14 +109,14 @@ class PredictedMotion(PredictedPath):
         return replace(self, inverse_mid=inverse, inverse_rate=None, inertia_mid=now)
 
     def inertia_at(self, t: Expr) -> Expr:
-        """(3, 3), world frame: the inverse of what ``inverse_inertia`` gives."""
+        """Return the inverse of ``inverse_inertia`` (3, 3), world frame."""
         if self.inverse_rate is None or ca.SX(t - self.dt / 2).is_zero():
             return self.inertia_mid
         return ca.inv_minor(self.inverse_inertia(t))
 
 
 def bounded_turn(angular_velocity: Expr, dt: Expr) -> tuple[Expr, Expr]:
-    """An angular velocity (3,) shortened to ``MAX_TURN`` in the time ``dt`` [s], and 1 if it was longer, else 0."""
+    """Return an angular velocity (3,), at most ``MAX_TURN`` in the time ``dt`` [s], and 1 if it was longer, else 0."""
     square = dt * dt * ca.dot(angular_velocity, angular_velocity)
     fast = square > MAX_TURN**2
     return angular_velocity * ca.if_else(fast, MAX_TURN / ca.sqrt(ca.fmax(square, MAX_TURN**2)), 1), fast
@@ -128,7 +128,7 @@ def isotropic(inertia: Expr) -> bool:
 
 
 def inertia_matrix(inertia: Expr) -> Expr:
-    """(3, 3): inertia in the body frame, from a scalar, three principal moments or a tensor."""
+    """Return the inertia in the body frame (3, 3), from a scalar, three principal moments or a tensor."""
     if isotropic(inertia):
         return inertia * ca.SX.eye(3)
     rows = [ca.vertcat(*row) if isinstance(row, (tuple, list)) else row for row in inertia]
@@ -136,12 +136,12 @@ def inertia_matrix(inertia: Expr) -> Expr:
 
 
 def apply(operator: Expr, vector: Expr) -> Expr:
-    """A scalar or (3, 3) operator times a vector."""
+    """Return a scalar or (3, 3) operator times a vector."""
     return ca.mtimes(operator, vector)
 
 
 def momentum(inertia: Expr, orientation: Expr, angular_velocity: Expr) -> Expr:
-    """(3,): angular momentum I(q) w, world frame [N m s]."""
+    """Return the angular momentum I(q) w (3,), world frame [N m s]."""
     if isotropic(inertia):
         return inertia * angular_velocity
     r = rotation.matrix(orientation)
@@ -149,26 +149,26 @@ def momentum(inertia: Expr, orientation: Expr, angular_velocity: Expr) -> Expr:
 
 
 def angular_velocity(inertia: Expr, orientation: Expr, angular_momentum: Expr) -> Expr:
-    """(3,): I(q)^-1 L, world frame [rad/s]."""
+    """Return the I(q)^-1 L (3,), world frame [rad/s]."""
     return apply(inverse_inertia(inertia, rotation.matrix(orientation)), angular_momentum)
 
 
 def inverse_inertia(inertia: Expr, r_wb: Expr) -> Expr:
-    """World-frame inverse inertia: a scalar if isotropic, else (3, 3)."""
+    """Return world-frame inverse inertia: a scalar if isotropic, else (3, 3)."""
     if isotropic(inertia):
         return 1 / inertia
     return in_world(ca.inv_minor(inertia_matrix(inertia)), r_wb)
 
 
 def in_world(tensor: Expr, r_wb: Expr) -> Expr:
-    """(3, 3): a symmetric tensor of the body's frame in the world's; both halves are the same expressions."""
+    """Return a symmetric tensor of the body's frame in the world's (3, 3); both halves are the same expressions."""
     return ca.triu2symm(ca.triu(ca.densify(ca.mtimes(r_wb, ca.mtimes(tensor, r_wb.T)))))
 
 
 def free_motion(
     mass: Expr, inertia: Expr, state: BodyState, gravity: Expr, dt: Expr, jointed: bool = False
 ) -> PredictedMotion:
-    """The motion from ``state`` under gravity, force and torque, all constant over the step.
+    """Return the motion from ``state`` under gravity, force and torque, all constant over the step.
 
     ``jointed``: whether joints hold the body, so that it does not turn freely.
     """
@@ -221,14 +221,14 @@ def motion_from(
 
 
 def _middle(inertia: Expr, q: Expr, w: Expr | None, momentum: Expr, t: Expr) -> Expr:
-    """(4,): orientation ``q`` after half a step ``t`` [s], at the angular velocity ``w`` or, for None, freely."""
+    """Return orientation ``q`` (4,) after half a step ``t`` [s], at the angular velocity ``w`` or, for None, freely."""
     if isotropic(inertia):
         return q
     return free_rotation.turned(inertia, q, momentum, t, free_rotation.SECOND_ORDER) if w is None else turn(q, t * w)
 
 
 def _inertias(inertia: Expr, middle: Expr) -> tuple[Expr, Expr]:
-    """Inverse inertia and inertia at the orientation ``middle``."""
+    """Return inverse inertia and inertia at the orientation ``middle``."""
     if isotropic(inertia):
         return 1 / inertia, inertia_matrix(inertia)
     turned = rotation.matrix(middle)
@@ -236,6 +236,6 @@ def _inertias(inertia: Expr, middle: Expr) -> tuple[Expr, Expr]:
 
 
 def _turning(inverse: Expr, angular_velocity: Expr) -> Expr:
-    """The time derivative (3, 3) of an inverse inertia as its body turns [1/(kg m^2 s)]."""
+    """Return the time derivative (3, 3) of an inverse inertia as its body turns [1/(kg m^2 s)]."""
     changing: Expr = ca.mtimes(rotation.cross_matrix(angular_velocity), inverse)
     return changing + changing.T

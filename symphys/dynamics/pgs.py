@@ -81,7 +81,7 @@ def clusters(world: World, constraints: Sequence[PlacedConstraint]) -> list[Clus
 
 
 def _root(roots: list[int], k: int) -> int:
-    """The representative of a body's group."""
+    """Return the representative of a body's group."""
     while roots[k] != k:
         roots[k] = roots[roots[k]]
         k = roots[k]
@@ -102,7 +102,7 @@ def extrapolate(
     before: Iterate,
     now: Iterate,
 ) -> Iterate:
-    """The solution after the change of the last sweep, from ``before`` to ``now``, is repeated in part."""
+    """Repeat the change of the last sweep, from ``before`` to ``now``, by the factor of the line search."""
     sums: tuple[Expr, Expr] = (ca.SX(0), ca.SX(0))
     longest: Expr = ca.SX(MAX_EXTRAPOLATION)
     for k in cluster.bodies:
@@ -122,7 +122,7 @@ def extrapolate(
 def _add_body_terms(
     sums: tuple[Expr, Expr], motion: PredictedMotion, now: Velocities, before: Velocities
 ) -> tuple[Expr, Expr]:
-    """(what the energy responses along the change, its curvature), with a body's share."""
+    """Add a body's terms to the slope of the energy along the change, and to its curvature."""
     assert isinstance(now, Momentum) and isinstance(before, Momentum)
     moved, turned = now.velocity - before.velocity, now.angular - before.angular
     spun = apply(motion.inverse_mid, turned)
@@ -135,7 +135,7 @@ def _add_body_terms(
 def _add_constraint_terms(
     sums: tuple[Expr, Expr], longest: Expr, constraint: ContactConstraint, now: ContactImpulse, before: ContactImpulse
 ) -> tuple[tuple[Expr, Expr], Expr]:
-    """Return the slip less the targets, and how often the change can be repeated."""
+    """Add a constraint's terms to slope and curvature, and bound how often the change can be repeated."""
     press = now.normal - before.normal
     target_work = constraint.target * press + ca.dot(constraint.slip_target, now.tangent - before.tangent)
     slope = sums[0] - target_work + constraint.softness * now.normal * press
@@ -173,7 +173,7 @@ class ExtrapolationContext:
 def iterate(
     context: StepContext, constraints: tuple[PlacedConstraint, ...], start: Iterate, trees: KinematicTrees
 ) -> Iterate:
-    """The solution after all sweeps; in clusters of unequal bodies with a line search after some of them.
+    """Return the solution after all sweeps; in clusters of unequal bodies with a line search after some of them.
 
     Groups whose loads statics may leave undetermined start from the solution of Newton's method.
     """
@@ -190,7 +190,7 @@ def iterate(
 
 
 def _accelerated_sweeps(fixed: ExtrapolationContext, state: Iterate) -> Iterate:
-    """Some sweeps, then a longer step along the last."""
+    """Make some sweeps, then a longer step along the last."""
     before = repeat(SWEEPS_PER_EXTRAPOLATION - 1, sweep, fixed.constraints, state)
     now = sweep(fixed.constraints, before)
     for cluster in fixed.clusters:
@@ -199,7 +199,7 @@ def _accelerated_sweeps(fixed: ExtrapolationContext, state: Iterate) -> Iterate:
 
 
 def sweep(constraints: tuple[PlacedConstraint, ...], before: Iterate) -> Iterate:
-    """One pass over all constraints."""
+    """Make one pass over all constraints."""
     momenta, new = list(before.momenta), list(before.impulses)
     for run in runs(constraints, momenta):
         carriers = tuple(dict.fromkeys(i for k in run for i in constraints[k].carriers))
@@ -215,7 +215,7 @@ def sweep(constraints: tuple[PlacedConstraint, ...], before: Iterate) -> Iterate
 
 
 def projection_order(constraints: Sequence[PlacedConstraint]) -> list[int]:
-    """Consecutive constraints share no body where possible: a processor works on several projections at once."""
+    """Order constraints so that neighbours share no body where possible: a processor works on several at once."""
     order: list[int] = []
     left = list(range(len(constraints)))
     busy: set[int] = set()
@@ -229,7 +229,7 @@ def projection_order(constraints: Sequence[PlacedConstraint]) -> list[int]:
 
 
 def runs(constraints: Sequence[PlacedConstraint], momenta: Sequence[Velocities]) -> list[list[int]]:
-    """The constraints in the order of projection; runs of those on one kinematic tree are traced as one call.
+    """Return the constraints in the order of projection; runs of those on one kinematic tree are traced as one call.
 
     A constraint joins the last run that shares a body with it, which does not change the order on any body.
     """
@@ -293,7 +293,7 @@ def _on_tree_coordinate(constraint: VelocityConstraint) -> bool:
 def _project_run(
     projections: tuple[tuple[VelocityConstraint, tuple[int, ...]], ...], states: AllVelocities, old: list[AnyImpulse]
 ) -> tuple[AllVelocities, list[AnyImpulse]]:
-    """One constraint after the other: each with the places of its bodies among the states."""
+    """Project one constraint after the other, each given with the places of its bodies among the states."""
     momenta, given = list(states), list[AnyImpulse]()
     while len(given) < len(projections):
         first, after = len(given), projections[len(given) + 1 :]

@@ -1,4 +1,4 @@
-"""From velocities to displacements: impacts act from their instant on, then a pass removes the overlap that is left.
+"""Displacements from velocities: impacts act from their instant on, then a pass removes the overlap that is left.
 
 Angles of joints that count whole turns follow from these displacements.
 """
@@ -50,7 +50,7 @@ def displacements(
     given: Sequence[ContactImpulse],
     duration: Expr,
 ) -> list[TreeDisplacement]:
-    """Duration times the new velocities, less what impulses would have done before they act, at the carriers."""
+    """Return duration times the new velocities, less the motion by impulses before they act, at the carriers."""
     late = [_drift(motion, state, duration) for motion, state in zip(trees.motions, solved, strict=True)]
     if not context.settings.scheme.time_of_impact:
         return late
@@ -80,7 +80,7 @@ def _remove_early_motions(
     impulses: list[ContactImpulse],
     turning: tuple[Expr, ...],
 ) -> tuple[TreeDisplacement, ...]:
-    """The displacements less those which the impulse would have caused on each term before it acts.
+    """Return the displacements less those which the impulse would have caused on each term before it acts.
 
     What goes on from the last step has acted all the time, whatever rounding makes of the gap.
     """
@@ -110,7 +110,7 @@ def _remove_early_motion(
 
 @dataclass(frozen=True)
 class CorrectedConfiguration:
-    """What the pass comes to.
+    """Result of the position pass.
 
     Attributes:
         shifts: displacements of bodies that are not part of a tree.
@@ -136,7 +136,7 @@ def close_gaps(
     joints: Sequence[PlacedConstraint],
     moved: Sequence[TreeDisplacement],
 ) -> CorrectedConfiguration:
-    """Gauss-Seidel on the displacements until no rigid contact overlaps, and those that last do not gape; then joints.
+    """Apply Gauss-Seidel to displacements until no rigid contact overlaps and none that lasts gapes; then joints.
 
     What is on a tree is pushed along the tree's coordinates. Joints that close loops push along them too.
     """
@@ -203,12 +203,12 @@ def _corrected_configuration(
 
 
 Pushed = tuple[tuple[TreeDisplacement, ...], tuple[Expr, ...]]
-"""What pushes did to bodies and trees; pushes of contacts."""
+"""Displacements of bodies and trees, and the accumulated pushes of contacts."""
 
 
 @dataclass(frozen=True)
 class PositionPass:
-    """What stays the same over the sweeps of the pass over contacts.
+    """Motions and constraints, constant over the sweeps of the pass over contacts.
 
     Attributes:
         motions: of the bodies.
@@ -229,12 +229,12 @@ def _on_tree_coordinate(each: PlacedConstraint) -> bool:
 
 @traced
 def _lasts(constraint: ContactConstraint, impulse: ContactImpulse) -> Expr:
-    """1 if a contact carried load and still does."""
+    """Return 1 if a contact carried load and still does."""
     return ca.logic_and(constraint.lasts, impulse.normal > constraint.load)
 
 
 def _push_all(fixed: PositionPass, state: Pushed) -> Pushed:
-    """One pass over all rigid contacts and limits."""
+    """Make one pass over all rigid contacts and limits."""
     along, pushes = list(state[0]), list(state[1])
     for k, (each, contact, lasts) in enumerate(fixed.rigid):
         own = tuple(along[i] for i in each.carriers)
@@ -266,7 +266,7 @@ def _push(
 def _unbounded_push(
     constraint: ContactConstraint, contact: Contact, moved: Displacements, old: Expr, share: float
 ) -> tuple[Expr, Expr]:
-    """The push that closes the gap, of either sign, and the effective mass."""
+    """Return the push that closes the gap, of either sign, and the effective mass."""
     gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else ZERO_DISPLACEMENT) + constraint.slack
     mass = constraint.normal_mass * constraint.separates
     return old - share * gap * mass, mass
@@ -275,7 +275,7 @@ def _unbounded_push(
 def _displace_pair(
     constraint: ContactConstraint, along: tuple[TreeDisplacement, ...], step: Expr
 ) -> tuple[TreeDisplacement, ...]:
-    """The displacements after a push (3,) of the first body."""
+    """Return the displacements after a push (3,) of the first body."""
     if constraint.same:
         after = along[0]
         for term in constraint.terms:
@@ -286,7 +286,7 @@ def _displace_pair(
 
 @dataclass(frozen=True)
 class Push:
-    """What ``_push`` does, for ``newton_start``.
+    """The push of a contact as a constraint of ``newton_start``.
 
     Attributes:
         constraint, contact: of the pair.
@@ -302,7 +302,7 @@ class Push:
     jacobians: tuple[BodyJacobian | None, ...]
 
     def rates(self, along: tuple[TreeDisplacement, ...]) -> Expr:
-        """(1,): how far displacements part the surfaces, to first order [m]."""
+        """Return how far displacements part the surfaces (1,), to first order [m]."""
         parted = ca.SX(0)
         for term, moved in zip(self.constraint.terms, self._moved(along), strict=True):
             shift = moved.linear + ca.cross(moved.angular, term.arm)
@@ -310,13 +310,13 @@ class Push:
         return parted
 
     def apply(self, along: tuple[TreeDisplacement, ...], impulse: JointImpulse) -> tuple[TreeDisplacement, ...]:
-        """The displacements after a push."""
+        """Return the displacements after a push."""
         return _displace_pair(self.constraint, along, impulse.numbers * self.constraint.normal)
 
     def project(
         self, along: tuple[TreeDisplacement, ...], old: JointImpulse
     ) -> tuple[tuple[TreeDisplacement, ...], JointImpulse]:
-        """The displacements after ``_push``, and what all pushes come to."""
+        """Return the displacements after ``_push``, and what all pushes come to."""
         after, new = _push(
             self.constraint, self.contact, self.lasts, self._moved(along), along, old.numbers, self.share
         )
@@ -325,7 +325,7 @@ class Push:
     def linearised(
         self, along: tuple[TreeDisplacement, ...], old: JointImpulse, by: Linearisation
     ) -> tuple[Expr, Expr]:
-        """(a (1,), B (1, 1)); see ``newton_start``."""
+        """Return a (1,) and B (1, 1); see ``newton_start``."""
         free, mass = _unbounded_push(self.constraint, self.contact, self._moved(along), old.numbers, self.share)
         acts = self.constraint.near * self.constraint.separates * either(self.lasts, by.within(free, mass))
         pushed = self.constraint.near * ca.if_else(ca.logic_or(self.lasts, free >= 0), free, 0)
@@ -346,7 +346,7 @@ def _displace(term: BodyTerm, along: TreeDisplacement, step: Expr) -> TreeDispla
 
 @traced
 def _enforce_limit(constraint: CoordinateConstraint, along: TreeDisplacement) -> GeneralizedVelocities:
-    """The displacement along a tree's coordinates that takes a limit of one back to where it is kept."""
+    """Return the displacement along a tree's coordinates that takes a limit of one back to where it is kept."""
     assert isinstance(along, GeneralizedVelocities) and constraint.of_tree is not None
     moved = ca.mtimes(constraint.of_tree.jacobian, along.numbers)
     return GeneralizedVelocities(
@@ -357,7 +357,7 @@ def _enforce_limit(constraint: CoordinateConstraint, along: TreeDisplacement) ->
 def unwrapped_angles(
     context: StepContext, paths: Sequence[JointPath], closed: CorrectedConfiguration, duration: Expr
 ) -> State:
-    """``Joint.unwrapped`` of all joints that turn, at the end of a substep of ``duration`` [s].
+    """Return ``Joint.unwrapped`` of all joints that turn, at the end of a substep of ``duration`` [s].
 
     The coordinate at the start plus its change in the step is its angle to third order in the step. Poses give the
     angle exactly up to whole turns, whose number follows from this estimate, however far a step turns.
@@ -381,7 +381,7 @@ def _gone_on(values: tuple[Expr, ...], moved: Expr) -> Expr:
 
 @traced
 def _turned(frames: JointFrames, turning: tuple[Expr, ...], duration: Expr) -> Expr:
-    """The change (count,) [rad] of the coordinates as the first body turned against the second."""
+    """Return the change (count,) [rad] of the coordinates as the first body turned against the second."""
     middle, zero = frames.placed(duration / 2), ca.SX.zeros(3)
     angular = turning[0] if len(turning) == 1 else turning[0] - turning[1]
     return ca.vertcat(*(free(each, middle).forwards(zero, angular) for each in frames.joint.kind.coordinates))

@@ -1,4 +1,4 @@
-"""How bodies move within a substep before its impulses, and the contacts on their ways."""
+"""Predicted motion of bodies within a substep before its impulses, and contacts along their paths."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 
 def detect_contacts(context: StepContext, motions: Sequence[PredictedMotion], duration: Expr) -> list[Contact]:
-    """The contacts on the way: one for each pair."""
+    """Return the contacts on the way: one for each pair."""
     return along_paths(collide, context, motions, duration)
 
 
@@ -45,22 +45,22 @@ def along_paths(
 
 
 def jointed_bodies(world: World) -> set[int]:
-    """The indices of the bodies that joints hold."""
+    """Return the indices of the bodies that joints hold."""
     return {index for joint in world.joints for index in joint.bodies}
 
 
 def bodies_of(pair: Pair) -> tuple[int, ...]:
-    """The indices of the bodies on the sides that can move."""
+    """Return the indices of the bodies on the sides that can move."""
     return tuple(side.body for side in (pair.first, pair.second) if side.body is not None)
 
 
 def free_motions(context: StepContext, x: State, duration: Expr) -> list[PredictedMotion]:
-    """Each body's free motion; the stored velocities are freed from the last half step's persistent forces."""
+    """Return each body's free motion; the stored velocities are freed from the last half step's persistent forces."""
     return _motions(context, x, duration, -1, 0)
 
 
 def predicted_motions(context: StepContext, x: State, duration: Expr) -> list[PredictedMotion]:
-    """Each body's motion from its true velocity under the persistent forces of the last step, as joints let it."""
+    """Return each body's motion from its true velocity under the last persistent forces, as joints let it."""
     from symphys.dynamics.articulated.forward_dynamics import accelerations, world_inertia
 
     found, joints = _motions(context, x, duration, 0, 1), context.world.joints
@@ -83,7 +83,7 @@ def _wrench(motion: PredictedMotion) -> tuple[Expr, Expr]:
 
 @traced
 def _as_held(motion: PredictedMotion, tensor: Expr, change: tuple[Expr, Expr], gravity: Expr) -> PredictedMotion:
-    """The motion with the accelerations that joints leave."""
+    """Return the motion with the accelerations that joints leave."""
     w = motion.angular_velocity
     torque = ca.mtimes(tensor, change[1]) + ca.cross(w, ca.mtimes(tensor, w))
     force = motion.mass * (change[0] - gravity)
@@ -92,7 +92,7 @@ def _as_held(motion: PredictedMotion, tensor: Expr, change: tuple[Expr, Expr], g
 
 
 def _motions(context: StepContext, x: State, duration: Expr, freed: int, share: int) -> list[PredictedMotion]:
-    """Motions with ``freed`` lags of the persistent forces in the velocities and ``share`` of them acting."""
+    """Return motions with ``freed`` lags of the persistent forces in the velocities and ``share`` of them acting."""
     zero, lag = ca.SX.zeros(3), x["lag"]
     motions, jointed = [], jointed_bodies(context.world)
     for index, body in enumerate(context.world.bodies):

@@ -24,11 +24,11 @@ from symphys.model.world import Scheme, World
 from symphys.types import Expr
 
 MAX_SPLITS_OFF_CENTRE = 2
-"""Of a step where bodies may be hit off their centres: a box seldom lands on one corner alone."""
+"""Splits of a step where bodies may be hit off their centres: a box seldom lands on one corner alone."""
 
 
 def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
-    """The state after one step, and the substeps and impacts that led there."""
+    """Return the state after one step, and the substeps and impacts that led there."""
     left: Expr = ca.SX(context.settings.scheme.dt)
     x = _with_unit_orientations(context, x)
     context = replace(context, near=near_pairs(context, x))
@@ -59,7 +59,10 @@ def take_step(context: StepContext, x: State) -> tuple[State, list[Substep]]:
 
 
 def _with_unit_orientations(context: StepContext, x: State) -> State:
-    """The state with orientations of length 1; optimisers that have states as variables leave them at any length."""
+    """Return the state with orientations of length 1.
+
+    Optimisers that have states as variables leave them at any length.
+    """
     names = [f"{body.name}.orientation" for body in context.world.bodies]
     return x | {name: _normalised(x[name]) for name in names}
 

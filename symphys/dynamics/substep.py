@@ -49,7 +49,7 @@ from symphys.types import Expr
 MAX_DETERMINED_POINTS = 3
 """Points whose loads follow from the resultant."""
 MIN_SPREAD_SHARE = 1e-12
-"""Of the points' spread: directions in which they spread less share no torque."""
+"""Least spread of the points along a direction that shares a torque, as a share of their largest."""
 ZERO = ca.SX(0)
 SLIDING_SHARE = 0.999
 """Surfaces count as sliding from this share of the largest friction on."""
@@ -82,7 +82,7 @@ class Substep:
 def advance(
     context: StepContext, x: State, duration: Expr, suppressed: Sequence[Expr] = (), plastic: Expr = ZERO
 ) -> Substep:
-    """The state after ``duration`` [s]; numbers are those of the equations in docs/time_step.md.
+    """Return the state after ``duration`` [s]; numbers are those of the equations in docs/time_step.md.
 
     Pairs whose ``suppressed`` is 1 give no impulse, since the substep ends as they meet. Where ``plastic`` is 1 nothing
     rebounds.
@@ -148,7 +148,7 @@ def _poses(
     closed: CorrectedConfiguration,
     momenta: Momenta,
 ) -> tuple[list[tuple[Expr, Expr]], Momenta]:
-    """(position, orientation) of all bodies at the end of the substep, and momenta that turn with pushes."""
+    """Return the poses of all bodies at the end of the substep, and momenta that turn with pushes."""
     poses, turned = list[tuple[Expr, Expr]](), list(momenta)
     jointed = jointed_bodies(context.world)
     for k, motion in enumerate(motions):
@@ -172,7 +172,7 @@ def _moving_bodies(
     poses: Sequence[tuple[Expr, Expr]],
     rotors: Rotors,
 ) -> State:
-    """The fields of all bodies at the end of the substep; of a frame only what acts on it counts."""
+    """Return the fields of all bodies at the end of the substep; of a frame only what acts on it counts."""
     values = State()
     counted = [ZERO_MOMENTUM if motion.massless else each for motion, each in zip(motions, momenta, strict=True)]
     ended = [_end_momentum(*parts) for parts in zip(motions, counted, reactions, strict=True)]
@@ -185,7 +185,7 @@ def _moving_bodies(
 
 
 def _stored_joint_forces(context: StepContext, joints: Sequence[JointConstraint], forces: State) -> State:
-    """The forces of joints that are stored: all of them with a warm start, else commands alone."""
+    """Return the forces of joints that are stored: all of them with a warm start, else commands alone."""
     warm = context.settings.scheme.warm_start
     kept = forces if warm else {name: ca.SX.zeros(*force.shape) for name, force in forces.items()}
     return kept | commanded(context, joints, forces)
@@ -193,14 +193,14 @@ def _stored_joint_forces(context: StepContext, joints: Sequence[JointConstraint]
 
 @traced
 def _times(duration: Expr, lag: Expr) -> tuple[Expr, Expr]:
-    """(the time over which impulses act as forces, the next lag) [s]; equation 2."""
+    """Return the time over which impulses act as forces, and the next lag [s]; equation 2."""
     return duration / 2 + lag, duration / 2
 
 
 def _warm_start(
     context: StepContext, constraints: Sequence[PlacedConstraint], x: State, kick: Expr
 ) -> list[ContactImpulse]:
-    """The last step's persistent forces, over this step's kick, in this step's frames."""
+    """Return the last step's persistent forces, over this step's kick, in this step's frames."""
     if not context.settings.scheme.warm_start:
         return [ZERO_IMPULSE for _ in constraints]
     impulses = []
@@ -233,7 +233,7 @@ def _store_forces(
     kick: Expr,
     values: State,
 ) -> list[tuple[Expr, Expr]]:
-    """Persistent contact forces (impacts left out) into ``values``; returns their sum on each body."""
+    """Store persistent contact forces (without impacts) in ``values``; return their sum on each body."""
     scheme = context.settings.scheme
     total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in context.world.bodies]
     for pair, each, impulse in zip(context.world.pairs, constraints, impulses, strict=True):
@@ -282,7 +282,7 @@ def _with_late_impulses(
 
 @traced
 def _late(constraint: ContactConstraint, impulse: ContactImpulse, momenta: Momenta) -> tuple[ContactImpulse, Momenta]:
-    """Impulse and momenta with the late normal impulse; friction of surfaces that slide grows in proportion."""
+    """Return impulse and momenta with the late normal impulse; friction of surfaces that slide grows in proportion."""
     assert constraint.soft is not None
     late = ca.if_else(impulse.normal > 0, constraint.soft.late, 0)
     slides = constraint.friction.beyond(impulse.tangent, impulse.normal, SLIDING_SHARE)
@@ -354,9 +354,9 @@ def distribute_loads(
     """Make normal impulses linear across each face; points that carry no load take no part.
 
     Rigid bodies leave open how four corners of a box share its weight: sweeps stop at one of many answers, which
-    depends on where they began, with warm start on all steps before. Friction depends on it once the box turns while it slides.
-    So loads are linear across the face, a + b . r, as under a rigid plate on an elastic foundation (Winkler, 1867): of
-    all loads with one resultant those with the least sum of squares. The sweeps start from them.
+    depends on where they began, with warm start on all steps before. Friction depends on it once the box turns while
+    it slides. So loads are linear across the face, a + b . r, as under a rigid plate on an elastic foundation (Winkler,
+    1867): of all loads with one resultant those with the least sum of squares. The sweeps start from them.
     """
     found = list(impulses)
     if not context.settings.scheme.load_sharing:
@@ -369,7 +369,7 @@ def distribute_loads(
 
 
 def faces(world: World) -> list[tuple[int, ...]]:
-    """Pairs, by index, whose points lie in a plane: of one body on a plane, or of two flat shapes."""
+    """Return pairs, by index, whose points lie in a plane: of one body on a plane, or of two flat shapes."""
     groups: dict[Any, list[int]] = {}
     for k, pair in enumerate(world.pairs):
         if not pair.law.soft:

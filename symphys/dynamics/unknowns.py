@@ -1,4 +1,4 @@
-"""What the sweeps solve for: velocities of bodies and kinematic trees, and impulses of constraints."""
+"""Unknowns of the sweeps: velocities of bodies and kinematic trees, and impulses of constraints."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class GeneralizedVelocities:
     numbers: Expr
 
     def along(self, matrix: Expr) -> Expr:
-        """(m,): ``matrix`` (m, n) times the rates; added in pairs, so that no term waits for all others."""
+        """Return ``matrix`` (m, n) times the rates, summed in pairs, so that no term waits for all others."""
         rows = []
         for i in range(matrix.size1()):
             terms = [matrix[i, j] * self.numbers[j] for j in range(matrix.size2()) if matrix.has_nz(i, j)]
@@ -43,7 +43,7 @@ class GeneralizedVelocities:
 
 
 Velocities = Momentum | GeneralizedVelocities | None
-"""Of a body; of a tree, at its root; None for the other bodies of a tree."""
+"""Velocities of a body, or of a tree, at its root; None for the other bodies of a tree."""
 Momenta = tuple[Momentum, ...]
 AllVelocities = tuple[Velocities, ...]
 
@@ -54,7 +54,7 @@ AnyImpulse = Any
 
 @dataclass(frozen=True)
 class Linearisation:
-    """How the constraints of a group are linearised; see ``newton_start``.
+    """Parameters of the linearisation of a group's constraints; see ``newton_start``.
 
     Attributes:
         softness: which rigid contacts get [1/kg]; other rigid constraints ``COMPLIANCE``.
@@ -68,27 +68,27 @@ class Linearisation:
     blur: Expr
 
     def within(self, distance: Expr, mass: Expr) -> Expr:
-        """1 if an impulse is inside a bound by ``distance`` [N s], 0 if beyond it, and between near it."""
+        """Return 1 if an impulse is inside a bound by ``distance`` [N s], 0 if beyond it, and between near it."""
         return ramp(distance, ca.sqrt(ca.fmax(mass, 0) + NO_MASS) * self.blur)
 
 
 class VelocityConstraint(Protocol):
-    """What a sweep projects. Implementations are frozen dataclasses."""
+    """A constraint that a sweep projects. Implementations are frozen dataclasses."""
 
     def project(self, momenta: AllVelocities, old: AnyImpulse) -> tuple[AllVelocities, AnyImpulse]:
-        """One projection: the momenta of the bodies, and the accumulated impulse after it."""
+        """Project once; return the momenta of the bodies and the accumulated impulse."""
         ...
 
     def apply(self, momenta: AllVelocities, impulse: AnyImpulse) -> AllVelocities:
-        """The momenta after an impulse."""
+        """Return the momenta after an impulse."""
         ...
 
     def rates(self, momenta: AllVelocities) -> Expr:
-        """(m,): the velocities that the projection looks at."""
+        """Return the velocities that the projection looks at (m,)."""
         ...
 
     def linearised(self, momenta: AllVelocities, old: AnyImpulse, by: Linearisation) -> tuple[Expr, Expr]:
-        """(a (k,), B (k, m)): the k numbers of its impulse change by a - B d rates.
+        """Return a (k,) and B (k, m): the k numbers of its impulse change by a - B d rates.
 
         Args:
             momenta: of the bodies.

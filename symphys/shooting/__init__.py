@@ -1,4 +1,4 @@
-"""What solvers see of a problem: as one function of z, or step by step."""
+"""Problems as solvers see them: one function of z, or step by step."""
 
 from symphys.shooting.shooting_problem import (
     Evaluator,

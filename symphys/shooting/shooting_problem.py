@@ -15,7 +15,7 @@ from symphys.types import Array, Ints
 Function = Any
 """casadi.Function"""
 GuessedStates = Callable[[Array, Ints, float], Array]
-"""See ``ShootingProblem.guessed_states``."""
+"""The type of ``ShootingProblem.guessed_states``."""
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,13 @@ class VariableBlock:
 
     @property
     def stop(self) -> int:
-        """One past the index of its last entry in z."""
+        """Return one past the index of its last entry in z."""
         return self.start + self.shape[0] * self.shape[1]
 
 
 @dataclass(frozen=True)
 class Values:
-    """What an evaluation of Z (batch, n) gave, row by row.
+    """Results of an evaluation of Z (batch, n), row by row.
 
     Attributes:
         merit, objective: (batch,).
@@ -77,19 +77,19 @@ class Evaluator(Protocol):
     """
 
     def value(self, Z: Array, smoothing: float) -> Values:
-        """Merits, objectives, errors, outputs."""
+        """Return merits, objectives, errors, outputs."""
         ...
 
     def gradient(self, Z: Array, smoothing: float) -> Values:
-        """These and the gradients of the merits."""
+        """Return the same and the gradients of the merits."""
         ...
 
     def residuals(self, Z: Array, smoothing: float) -> Values:
-        """Residuals with them; only where the problem has ``squares``."""
+        """Return the residuals, too; only where the problem has ``squares``."""
         ...
 
     def jacobian(self, Z: Array, smoothing: float) -> Values:
-        """Residuals and their Jacobians with them; only where the problem has ``squares``."""
+        """Return the residuals and their Jacobians, too; only where the problem has ``squares``."""
         ...
 
 
@@ -97,11 +97,11 @@ class WithoutResiduals:
     """The half of ``Evaluator`` that problems without ``squares`` lack."""
 
     def residuals(self, Z: Array, smoothing: float) -> Values:
-        """There are none: see ``ShootingProblem.squares``."""
+        """Raise: a problem without ``ShootingProblem.squares`` has no residuals."""
         raise NotImplementedError("this problem has no residuals")
 
     def jacobian(self, Z: Array, smoothing: float) -> Values:
-        """There is none."""
+        """Raise: a problem without ``ShootingProblem.squares`` has no Jacobian."""
         raise NotImplementedError("this problem has no residuals to differentiate")
 
 
@@ -130,14 +130,14 @@ class ScenarioEvaluator(Protocol):
     grids: tuple[str, ...]
 
     def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> ScenarioSamples:
-        """``count`` samples: the first is the problem's own, the others vary ``width`` times as widely as its tables.
+        """Draw ``count`` samples: first the problem's own, then others, ``width`` times as wide as its tables.
 
         The same stream gives the same samples on every grid.
         """
         ...
 
     def value(self, Z: Array, samples: ScenarioSamples, smoothing: float, /) -> Values:
-        """Z (batch, n), or (1, n) for all: merits, objectives, errors, alive."""
+        """Return merits, objectives, errors and alive at Z (batch, n), or (1, n) for all."""
         ...
 
     def gradient(
@@ -149,7 +149,7 @@ class ScenarioEvaluator(Protocol):
         adjoint_discount: float = 0.0,
         horizon: float = math.inf,
     ) -> Values:
-        """These and the gradients of the merits.
+        """Return the same and the gradients of the merits.
 
         With ``adjoint_discount`` [1/s] above 0 the adjoint of the state decays like exp(-adjoint_discount t) on its way
         back, and ends where a motion was over: no derivative, but what descends where derivatives explode. After
@@ -181,7 +181,7 @@ class LaterNlp(Nlp):
     """An ``Nlp`` that is made when somebody asks for one of its functions: few solvers do."""
 
     def __init__(self, make: Callable[[], Nlp]) -> None:
-        """``make`` is called once."""
+        """Keep ``make``, which is called once."""
         object.__setattr__(self, "_make", make)
 
     def _part(self, name: str) -> Any:
@@ -246,15 +246,18 @@ class ShootingProblem:
 
     @property
     def n(self) -> int:
-        """Length of z."""
+        """Return the length of z."""
         return self.blocks[-1].stop if self.blocks else 0
 
     def stacked(self, name: str) -> Array:
-        """(n,): ``guess``, ``lower``, ``upper``, ``scale`` or ``spread`` of all blocks in the order of z."""
+        """Return ``guess``, ``lower``, ``upper``, ``scale`` or ``spread`` (n,) of all blocks in the order of z."""
         return np.concatenate([getattr(block, name) for block in self.blocks] or [np.zeros(0)])
 
     def start(self, seed: int) -> Array:
-        """(n,): the guess; seeds above 0 perturb it by ``spread`` times standard normals, clipped into the bounds."""
+        """Return the guess (n,).
+
+        Seeds above 0 perturb it by ``spread`` times standard normals, clipped into the bounds.
+        """
         guess = self.stacked("guess")
         if seed > 0:
             noise = np.random.default_rng([seed, 0]).standard_normal(self.n)
@@ -262,11 +265,11 @@ class ShootingProblem:
         return np.clip(guess, self.stacked("lower"), self.stacked("upper"))
 
     def by_block(self, z: Array) -> dict[str, Array]:
-        """Z cut into (components, knots) arrays by name."""
+        """Split ``z`` into arrays (components, knots) by name."""
         return {b.name: z[b.start : b.stop].reshape(b.shape, order="F") for b in self.blocks}
 
     def from_blocks(self, values: Mapping[str, Array]) -> Array:
-        """(n,): the inverse of ``by_block``."""
+        """Return the inverse of ``by_block`` (n,)."""
         return np.concatenate([np.asarray(values[b.name], float).ravel(order="F") for b in self.blocks])
 
     def met(self, errors: Array) -> bool:
@@ -274,6 +277,6 @@ class ShootingProblem:
         return errors.size > 0 and bool(np.all(errors <= 1))
 
     def violation(self, errors: Array) -> float:
-        """The largest error of a constraint, 0 where all constraints are met."""
+        """Return the largest error of a constraint, 0 where all constraints are met."""
         largest = float(np.max(errors[self.limits], initial=0.0))
         return 0.0 if largest <= 1 else largest

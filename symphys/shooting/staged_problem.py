@@ -143,15 +143,15 @@ class StagedProblem(Protocol):
     squares: bool
 
     def start(self, Z: Array) -> Array:
-        """(B, len(z)) -> (B, nx): first states."""
+        """Return the first states (B, nx) of Z (B, len(z))."""
         ...
 
     def step(self, k: int, X: Array, U: Array, Z: Array, smoothing: float) -> Array:
-        """(B, nx), (B, m), (B, len(z)) -> (B, nx): states after step k."""
+        """Return the states (B, nx) after step k, from X (B, nx), U (B, m) and Z (B, len(z))."""
         ...
 
     def roll_out(self, z: Array, smoothing: float) -> StagedMotion:
-        """The motion of (len(z),)."""
+        """Return the motion of ``z`` (len(z),)."""
         ...
 
     def follow(
@@ -163,7 +163,7 @@ class StagedProblem(Protocol):
         smoothing: float,
         shares: Array | float = 1.0,
     ) -> Followed | None:
-        """The motions of step lengths (B,) under a policy, all steps at once; None where steps are to be taken singly.
+        """Return the motions of step lengths (B,) under a policy; None where steps must be taken singly.
 
         ``about``: (len(z),) where the policy was made; ``Z``: (B, len(z)) whose static entries hold; ``shares``: (B,)
         of the feedback.
@@ -171,30 +171,30 @@ class StagedProblem(Protocol):
         ...
 
     def linearize(self, motion: StagedMotion) -> Linearized:
-        """Slopes of all steps."""
+        """Return slopes of all steps."""
         ...
 
     def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
-        """The same in runs of steps, the last run first, each as soon as it is known.
+        """Yield the slopes in runs of steps, the last run first, each as soon as it is known.
 
         Slopes are computed in the background from the call on, where there are threads for it.
         """
         ...
 
     def retract(self, X: Array, D: Array) -> Array:
-        """(B, nx), (B, n) -> (B, nx): the states that are so far from others; places, velocities, forces."""
+        """Return the states (B, nx) displaced from X (B, nx) by D (B, n): places, velocities, forces."""
         ...
 
     def difference(self, X: Array, Y: Array) -> Array:
-        """(B, nx), (B, nx) -> (B, n): the inverse: D with retract(X, D) = Y."""
+        """Return D (B, n) with retract(X, D) = Y."""
         ...
 
     def measure(self, Z: Array, X: Array, U: Array) -> tuple[Array, Array]:
-        """(B, len(z)), (B, N + 1, nx), (B, N, m) -> objectives (B,) and limits (B, c)."""
+        """Return objectives (B,) and limits (B, c) of Z (B, len(z)), X (B, N + 1, nx) and U (B, N, m)."""
         ...
 
     def expand(self, motion: StagedMotion, multipliers: Array, penalties: Array) -> Expansion:
-        """The objective and, for each limit g within [lower, upper], its augmented Lagrangian.
+        """Return the objective and, for each limit g within [lower, upper], its augmented Lagrangian.
 
         That is penalty / 2 times the squared distance of g + multiplier / penalty from the bounds; ``multipliers`` and
         ``penalties`` are (c,), and a penalty of 0 leaves a limit out.
@@ -202,5 +202,5 @@ class StagedProblem(Protocol):
         ...
 
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Sparse, Sparse, Sparse]:
-        """Limits (c,), and their slopes by all states (c, (N + 1) * n), inputs (c, N * m) and static entries (c, s)."""
+        """Return limits (c,) and slopes by states (c, (N + 1) * n), inputs (c, N * m), static entries (c, s)."""
         ...

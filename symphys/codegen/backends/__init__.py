@@ -1,4 +1,4 @@
-"""What evaluates a shooting problem: casadi's virtual machine, casadi's C, or a kernel, on the processor or on a GPU.
+"""Backends evaluate a shooting problem: casadi's virtual machine, casadi's C, or a kernel on a processor or a GPU.
 
 ``choose`` takes the one that is asked for, or the best that this machine has.
 """

@@ -50,7 +50,7 @@ def parts(nlp: Function) -> dict[str, Function]:
 
 
 def written(name: str, function: Function) -> str:
-    """The C text of a function under this name."""
+    """Return the C text of a function under this name."""
     generator = ca.CodeGenerator(name)
     arguments = [ca.MX.sym("z", function.sparsity_in(0)), ca.MX.sym("smoothing")]
     same = function if function.name() == name else ca.Function(name, arguments, function.call(arguments))

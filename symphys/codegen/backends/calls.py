@@ -40,7 +40,7 @@ class BufferedFunction:
 
 
 def row_by_row(function: Function, *arguments: Array) -> list[Array]:
-    """Arguments (B, n), dense -> of each result (B, its size); RuntimeError where casadi fails.
+    """Return a function of dense arguments (B, n) with results (B, size); RuntimeError where casadi fails.
 
     Numbers go from arrays to arrays: casadi takes half a millisecond to hand over 16,000 of them as a ``DM``.
     """
@@ -63,14 +63,14 @@ def row_by_row(function: Function, *arguments: Array) -> list[Array]:
 
 
 def mapped(function: Function, batch: int, threads: int) -> Function:
-    """The function for so many columns at once."""
+    """Return the function for so many columns at once."""
     if batch == 1:
         return function
     return function.map(batch) if threads == 1 else function.map(batch, "thread", min(batch, threads))
 
 
 def dense(shape: tuple[int, int, int], places: NDArray[np.int_], nonzeros: Array) -> Array:
-    """A dense copy of a result of which only the nonzeros are stored, at ``places`` counted column after column."""
+    """Return a dense copy of a result whose nonzeros are stored, at ``places`` counted column after column."""
     full = np.zeros(shape)
     full.reshape(-1)[places] = nonzeros
     return full[:, 0] if shape[1] == 1 else full.transpose(0, 2, 1)

@@ -47,12 +47,12 @@ class FunctionEvaluator:
 
 
 def squared(r: Array) -> Array:
-    """(batch,) r . r, each row by itself, so that it does not depend on the others."""
+    """Return r . r (batch,), each row by itself, so that it does not depend on the others."""
     with np.errstate(all="ignore"):  # a rollout that is not finite is no fault here
         return np.array([row @ row for row in r])
 
 
 def casadi(source: BackendSource, threads: int) -> Backend:
-    """The virtual machine; ``threads`` share a batch."""
+    """Make the backend of the virtual machine; ``threads`` share a batch."""
     evaluator = FunctionEvaluator(source.functions, threads)
     return Backend(Description("casadi", threads=threads), evaluator, LaterNlp(lambda: Nlp(source.functions.nlp)))

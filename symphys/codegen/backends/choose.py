@@ -30,13 +30,13 @@ NAMES = tuple(BACKENDS)
 
 
 def require_backend(name: str, valid: Sequence[str] = NAMES) -> None:
-    """SymphysError that names those that are valid, where this one is not."""
+    """Raise a SymphysError that names the valid backends, unless this is one."""
     if name not in valid:
         raise SymphysError(f"there is no backend {name!r}; valid: {', '.join(valid)}")
 
 
 def choose(name: str, source: BackendSource, threads: int | None = None) -> Backend:
-    """The backend of this name for a problem; one that cannot be built here gives way to casadi, and its note says why.
+    """Return the backend of this name for a problem; casadi where that cannot be built, with a note that says why.
 
     Args:
         name: one of NAMES; "auto" is the fastest: simd, and cuda for large batches where there is a GPU.

@@ -1,4 +1,4 @@
-"""What every backend is made from, and what it gives."""
+"""Source and interface of all backends."""
 
 from __future__ import annotations
 
@@ -18,23 +18,26 @@ class ProblemFunctions(Protocol):
 
     @property
     def value(self) -> Function:
-        """-> (merit, objective, errors, outputs)."""
+        """Return the function -> (merit, objective, errors, outputs)."""
 
     @property
     def gradient(self) -> Function:
-        """-> (merit, objective, errors, d merit / dz (n,), outputs)."""
+        """Return the function -> (merit, objective, errors, d merit / dz (n,), outputs)."""
 
     @property
     def residuals(self) -> Function | None:
-        """-> (r, objective, errors, outputs) with merit = r . r; None where a cost is no sum of squares."""
+        """Return the function -> (r, objective, errors, outputs), merit = r . r.
+
+        None where a cost is no sum of squares.
+        """
 
     @property
     def jacobian(self) -> Function | None:
-        """-> (r, objective, errors, dr/dz (m, n), outputs); None likewise."""
+        """Return the function -> (r, objective, errors, dr/dz (m, n), outputs); None likewise."""
 
     @property
     def nlp(self) -> Function:
-        """-> (objective, constraints)."""
+        """Return the function -> (objective, constraints)."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ def joined(*notes: str) -> str:
 
 @dataclass(frozen=True)
 class Description:
-    """What evaluates, for results.
+    """Description of a backend, for results.
 
     Attributes:
         name: of the backend.
@@ -105,7 +108,7 @@ class Description:
         return joined(*parts, self.note)
 
     def said(self) -> str:
-        """The note, with what was decided since."""
+        """Return the note, with what was decided since."""
         return joined(self.note, self.later())
 
 

@@ -62,7 +62,7 @@ class FastestKernel(ProcessorKernel):
             super()._run(batch)
 
     def _reached(self) -> DeviceKernel | None:
-        """The GPU's kernel, if there is a GPU; it is looked for once."""
+        """Return the GPU's kernel, if there is a GPU; it is looked for once."""
         if not self._sought:
             self._sought = True
             try:
@@ -73,7 +73,7 @@ class FastestKernel(ProcessorKernel):
         return self._device
 
     def _expected(self, batch: RolloutBatch) -> float:
-        """[s] of the processor, from a block for each thread."""
+        """Return the expected time [s] of the processor, from a block for each thread."""
         self.widths.finish()  # an interpreter says nothing of the processor
         width = self.widths.ready(batch.rows)
         lanes, rows = width.lanes, min(batch.rows, self.threads * width.lanes)
@@ -102,14 +102,14 @@ PRECISIONS: dict[str, Literal["double", "single"]] = {
     "cuda": "double",
     "cuda32": "single",
 }
-"""Of the backends that are kernels."""
+"""Precisions of the backends that are kernels."""
 ON_DEVICE = ("cuda", "cuda32")
 
 
 def build_kernel(
     name: str, program: Program | ProgramSource, seeded: Sequence[str], threads: int, wait: bool = False
 ) -> Kernel:
-    """The kernel of a program, whose outputs ``seeded`` can be differentiated; KernelUnavailable if that cannot be.
+    """Build the kernel of a program, whose outputs ``seeded`` can be differentiated, or raise KernelUnavailable.
 
     Where there is no GPU for it, it is one for the processor, and the note of its report says why. ``threads`` share
     the blocks of a batch there. Of a source those of ``seeded`` that it has. "auto" is the processor's, which takes
@@ -152,7 +152,7 @@ def _on_device(
 
 
 def require_kernels(name: str) -> None:
-    """KernelUnavailable, with what to install, if this machine has nothing that compiles kernels for a backend.
+    """Raise KernelUnavailable, with the package to install, if nothing here compiles kernels for a backend.
 
     Nothing is compiled. ``name``: of ``PRECISIONS``.
     """
@@ -173,7 +173,7 @@ def require_kernels(name: str) -> None:
 
 
 def described(kernel: Kernel, seconds: float, precision: str | None = None, note: str = "") -> Description:
-    """A kernel for results; ``precision``: where it is not the kernel's alone."""
+    """Describe a kernel for results; ``precision``: where it is not the kernel's alone."""
     report, wanted = kernel.report, precision or kernel.report.precision
     kind = "simd" if isinstance(kernel, ProcessorKernel) else "cuda"
     return Description(

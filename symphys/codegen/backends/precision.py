@@ -44,7 +44,7 @@ class PrecisionCheck:
         self._program, self._seeded = program, seeded
 
     def __call__(self, gradient: Array, arguments: tuple[Any, ...]) -> str:
-        """A warning if gradients (batch, n) are off by more than ``MAX_ERROR``, or could not be compared; else empty.
+        """Return a warning if gradients (batch, n) are off by over ``MAX_ERROR``, or could not be compared; else empty.
 
         ``arguments``: those of ``Kernel.gradient``, by which they were computed.
         """
@@ -73,13 +73,16 @@ def warn(subject: str, doubt: str) -> None:
 
 
 def first_rows(values: ArrayLike, rows: int) -> Array:
-    """The first rows of (batch, n), or one (n,) for all."""
+    """Return the first rows of (batch, n), or one (n,) for all."""
     array = np.asarray(values, float)
     return array[:rows] if array.ndim == 2 else array
 
 
 def largest_error(found: Array, exact: Array) -> float:
-    """Largest error of gradients (rows, n) by their lengths, of finite rows of ``exact``; inf if ``found`` is not."""
+    """Return largest error of gradients (rows, n) by their lengths, of finite rows of ``exact``.
+
+    Inf if ``found`` is not.
+    """
     known = np.isfinite(exact).all(axis=1)
     if not known.any():
         return 0.0
@@ -93,7 +96,7 @@ def largest_error(found: Array, exact: Array) -> float:
 
 
 def in_words(error: float) -> str:
-    """A relative error in words: ``60 %``, ``96 times``."""
+    """Return a relative error in words: ``60 %``, ``96 times``."""
     if not np.isfinite(error):
         return "any multiple"
     return f"{100 * error:.0f} %" if error < 2 else f"{error:.0f} times"

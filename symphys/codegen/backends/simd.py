@@ -9,20 +9,20 @@ import ctypes
 import shutil
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from symphys import codegen
 from symphys.codegen import Fixed, Kernel, KernelUnavailable, ProcessorKernel
 from symphys.codegen.backends.casadi_ import squared
 from symphys.codegen.backends.interface import Backend, BackendSource, Function, joined
 from symphys.codegen.backends.kernels import build_kernel, described
-from symphys.codegen.backends.seeds import Seeds
 from symphys.codegen.runtime.kernel import Outputs
 from symphys.codegen.toolchain.build import temporary_folder
 from symphys.codegen.toolchain.processes import ELSEWHERE
@@ -33,6 +33,62 @@ from symphys.types import Array
 SEEDED = ("merit", "objective", "residuals", "constraints")
 ROOM = "symphys.codegen.backends"
 NAMES = ("nlp", "nlp_gradient", "nlp_jacobian")
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Seeds of a Jacobian (m, n): rows that share no variable share a lane (Curtis, Powell, Reid 1974).
+
+    Attributes:
+        words: (lanes, seeded words) the seed of each lane.
+        shape: (m, n).
+        rows, columns: (nonzeros,) where the Jacobian may differ from zero, column after column.
+        lanes: (nonzeros,) the lane that tells each.
+    """
+
+    words: Array
+    shape: tuple[int, int]
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    lanes: NDArray[np.int64]
+
+    @classmethod
+    def whole(cls, kernel: Kernel, name: str) -> Seeds:
+        """Give each row a lane of its own."""
+        m, n = kernel.program.outputs[name].size, kernel.program.z.size
+        columns, rows = np.divmod(np.arange(m * n), m)
+        return cls(_words(kernel, name, np.eye(m)), (m, n), rows, columns, rows)
+
+    @classmethod
+    def compressed(cls, kernel: Kernel, name: str, function: Callable[[], Function], index: int) -> Seeds:
+        """Color the sparsity of the result ``index`` of ``function()`` into as few lanes as possible."""
+        m, n = kernel.program.outputs[name].size, kernel.program.z.size
+        if m <= kernel.report.lanes:
+            return cls.whole(kernel, name)
+        sparsity = function().jac_sparsity(index, 0)
+        shared = sparsity.T.uni_coloring()  # (m, lanes): a nonzero where a row goes into a lane
+        row, lane = (np.array(part, dtype=np.int64) for part in (shared.get_triplet()))
+        lane_of = np.zeros(m, dtype=np.int64)
+        lane_of[row] = lane
+        seeds = np.zeros((shared.size2(), m))
+        seeds[lane, row] = 1
+        rows, columns = (np.array(part, dtype=np.int64) for part in sparsity.get_triplet())
+        return cls(_words(kernel, name, seeds), (m, n), rows, columns, lane_of[rows])
+
+    def spread(self, slopes: Array) -> Array:
+        """Return the Jacobians (batch, m, n) from the lanes' gradients (batch, lanes, n)."""
+        jacobian = np.zeros((len(slopes), *self.shape))
+        jacobian[:, self.rows, self.columns] = slopes[:, self.lanes, self.columns]
+        return jacobian
+
+
+def _words(kernel: Kernel, name: str, seeds: Array) -> Array:
+    """Return the seeds of one output among those of all that can be differentiated."""
+    sizes = [kernel.program.outputs[other].size for other in kernel.seeded]
+    start = sum(sizes[: kernel.seeded.index(name)])
+    words = np.zeros((len(seeds), sum(sizes)))
+    words[:, start : start + seeds.shape[1]] = seeds
+    return words
 
 
 class Task(ctypes.Structure):
@@ -48,7 +104,7 @@ class External:
     """The functions of external.c over a kernel; they work as long as this lives."""
 
     def __init__(self, made: ProcessorKernel, rows: Seeds | None) -> None:
-        """``rows``: of the constraints, where there are any."""
+        """Bind a kernel; ``rows``: of the constraints, where there are any."""
         seeds = [Seeds.whole(made, "objective").words, *([rows.words] if rows else [])]
         self.fixed = [made.fixed(), *map(made.fixed, seeds)]
         part = made.program.output_slices()
@@ -66,7 +122,7 @@ class External:
 
 
 def external_nlp(made: ProcessorKernel, expression: Function, rows: Seeds | None) -> Nlp:
-    """Objective and constraints by the kernel; ``rows``: of the constraints, where there are any.
+    """Return objective and constraints by the kernel; ``rows``: of the constraints, where there are any.
 
     KernelUnavailable where there is no room for the library, or none that may be loaded.
     """
@@ -83,7 +139,7 @@ def task(fixed: Fixed, first: Array, second: Array) -> Task:
 
 
 def load(sizes: dict[str, int], tasks: Sequence[Task]) -> list[Function]:
-    """The functions, bound to their tasks. A library loaded from a copy has a binding of its own."""
+    """Return the functions, bound to their tasks. A library loaded from a copy has a binding of its own."""
     head = "".join(f"#define {name} {size}\n" for name, size in sizes.items())
     text = head + files(ROOM).joinpath("external.c").read_text(encoding="utf-8")
     with (
@@ -102,7 +158,7 @@ def load(sizes: dict[str, int], tasks: Sequence[Task]) -> list[Function]:
 
 
 def sparse(slopes: Function, rows: Seeds) -> Function:
-    """(z, smoothing) -> (constraints, Jacobian (m, n)) from the gradients of the lanes (n, lanes)."""
+    """Return (z, smoothing) -> (constraints, Jacobian (m, n)) from the gradients of the lanes (n, lanes)."""
     m, n = rows.shape
     z, smoothing = ca.MX.sym("z", n), ca.MX.sym("smoothing")
     constraints, lanes = slopes(z, smoothing)
@@ -116,12 +172,12 @@ class KernelEvaluator:
     """Evaluates with a kernel; see ``Evaluator``."""
 
     def __init__(self, kernel: Kernel, rows: Callable[[], Seeds] | None, exact: bool) -> None:
-        """``rows``: of the residuals, where there are any; ``exact``: for smoothing 0 only."""
+        """Bind a kernel; ``rows``: of the residuals, if any; ``exact``: for smoothing 0 only."""
         self.kernel, self.rows, self.exact = kernel, rows, exact
         self.steepest = Seeds.whole(kernel, "merit").words[0]
 
     def parameters(self, smoothing: float) -> tuple[float]:
-        """The kernel's parameters."""
+        """Return the kernel's parameters."""
         if self.exact and smoothing != 0:
             raise ValueError(f"this kernel is for smoothing 0 only, not for {smoothing:g}")
         return (smoothing,)
@@ -157,12 +213,12 @@ class KernelEvaluator:
 
 
 def probed(kernel: Kernel, outputs: Outputs) -> Array | None:
-    """(batch,) of the number whose gradient is examined; None in single precision, which cannot be differenced."""
+    """Return the number (batch,) whose gradient is examined; None in single precision, which has no differences."""
     return outputs["probe"][:, 0] if "probe" in outputs and kernel.report.precision == "double" else None
 
 
 def common(outputs: Outputs) -> tuple[Array, Array, Array, Array]:
-    """Merits, objectives, errors, and what is told."""
+    """Return merits, objectives, errors and outputs."""
     merit = outputs["merit"]
     none = merit[:, :0]
     return merit[:, 0], outputs["objective"][:, 0], outputs.get("errors", none), outputs.get("outputs", none)
@@ -191,7 +247,7 @@ def by_kernel(source: BackendSource, threads: int, name: str) -> Backend:
 
 
 def _nlp(kernel: ProcessorKernel, expression: Function, rows: Callable[[], Seeds] | None, told: list[str]) -> Nlp:
-    """Objective and constraints by the kernel, or by the expression, and why is added to ``told``."""
+    """Return objective and constraints by the kernel; else by the expression, and add the reason to ``told``."""
     try:
         return external_nlp(kernel, expression, rows and rows())
     except KernelUnavailable as error:

@@ -1,4 +1,4 @@
-"""What the launcher of kernels needs of a device."""
+"""The interface of a device that launches kernels."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ class Device(Protocol):
     lanes: int
 
     def load(self, texts: Sequence[str]) -> tuple[Module, str, bool, str]:
-        """Kernels from their texts: with the compiler, whether they came from a cache, and a note or nothing."""
+        """Return kernels from their texts: with the compiler, whether they came from a cache, and a note or nothing."""
 
     def free(self) -> int:
-        """Bytes that an array can have."""
+        """Return the bytes that an array can have."""
 
     def put(self, values: NDArray[Any]) -> Array:
-        """A copy on the device."""
+        """Return a copy on the device."""
 
     def empty(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
-        """Memory."""
+        """Return memory with any values."""
 
     def lacks(self) -> str:
         """Return in one line why the device cannot multiply its arrays; empty if it can."""
@@ -43,10 +43,10 @@ class Device(Protocol):
         """Return the address of the array's first word."""
 
     def get(self, array: Array) -> NDArray[Any]:
-        """A copy of an array, once all that was launched is done."""
+        """Return a copy of an array, once all that was launched is done."""
 
     def launch(self, module: Module, name: str, blocks: int, threads: tuple[int, int], job: Array) -> None:
         """Begin to run a kernel of one argument, the address of its job."""
 
     def wait(self) -> None:
-        """Until all that was launched is done."""
+        """Wait until all that was launched is done."""

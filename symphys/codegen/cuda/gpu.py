@@ -30,7 +30,7 @@ FLAGS = ("--std=c++17", "--fmad=false", "--relocatable-device-code=true")
 
 @dataclass(frozen=True)
 class Image:
-    """What a device loads.
+    """A linked image that a device loads.
 
     Attributes:
         path: of the file.
@@ -46,7 +46,10 @@ class Image:
 
 
 def image(texts: Sequence[str], architecture: str, cache: Cache, folder: Path) -> Image:
-    """Linked texts for an architecture such as "sm_90", from the cache or compiled; ``folder`` if the cache refuses."""
+    """Return linked texts for an architecture such as "sm_90", from the cache or compiled.
+
+    ``folder`` if the cache refuses.
+    """
     nvrtc, _ = _libraries()
     version = "nvrtc {}.{}".format(*_checked(nvrtc, nvrtc.nvrtcVersion()))
     own = replace(cache, suffix=KINDS[1])
@@ -80,7 +83,7 @@ def compiled(texts: Sequence[str], architecture: str, flags: Sequence[str] = ())
 
 
 def linked(objects: Sequence[bytes], architecture: str) -> bytes:
-    """One image of all objects."""
+    """Return one image of all objects."""
     _, nvjitlink = _libraries()
     handle = nvjitlink.create(1, [f"-arch={architecture}"])
     try:
@@ -133,7 +136,7 @@ def _libraries() -> tuple[Any, Any]:
 
 
 class Gpu:
-    """See ``Device``."""
+    """A GPU by CuPy; implements ``Device``."""
 
     def __init__(self, cupy: Any, cache: Cache) -> None:
         """Use ``find_gpu``."""
@@ -209,7 +212,7 @@ class Gpu:
 
 
 def find_gpu(cache: Cache | None = None) -> Gpu:
-    """The GPU that CUDA names first; KernelUnavailable says what is missing."""
+    """Return the GPU that CUDA names first; KernelUnavailable says what is missing."""
     try:
         import cupy
     except ImportError as error:

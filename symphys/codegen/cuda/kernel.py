@@ -9,24 +9,34 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any, Literal
 
 import numpy as np
 
 from symphys.codegen.cuda.device import Device
-from symphys.codegen.cuda.schedule import Schedule, schedules
 from symphys.codegen.emit import source
-from symphys.codegen.emit.alternatives import LEFT_OUT
+from symphys.codegen.emit.alternatives import (
+    ALWAYS,
+    LEFT_OUT,
+    Alternatives,
+    Span,
+    entries_of,
+    of_adjoint,
+    of_call,
+    word_of,
+)
 from symphys.codegen.emit.dialect import DEVICE
+from symphys.codegen.emit.guarding import TABLES as GUARDED
 from symphys.codegen.emit.plan import FAST_MEMORY, plan
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.writer import write
 from symphys.codegen.errors import KernelUnavailable
-from symphys.codegen.program.program import Program
+from symphys.codegen.program.program import FunctionCall, Program
 from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.runtime.kernel import BuildReport, Kernel
-from symphys.codegen.runtime.library import WORD, List, RowSource, data_places, program_fields, strided
+from symphys.codegen.runtime.library import TABLES, WORD, List, RowSource, data_places, program_fields, strided
 from symphys.codegen.toolchain.build import names_of
 from symphys.types import Ints
 
@@ -34,10 +44,164 @@ ROOM = "symphys.codegen.cuda"
 MAX_FILES = 24
 SIGNATURE = "(V *m, V *b, const word *t, word k)"
 WARPS_PER_BLOCK = 4
-"""Of a block. The table robot's step has 102 levels, whose dearest shares are 2.2 times less work than all calls with
-4 warps, 2.6 times with 8, which leaves a thread half the registers."""
+"""Warps of a block. The table robot's step has 102 levels, whose dearest shares are 2.2 times less work than all calls
+with 4 warps, 2.6 times with 8, which leaves a thread half the registers."""
 STEPS_PER_LAUNCH = 64
-"""In one launch: between launches a user can interrupt, and a display can be drawn."""
+"""Steps in one launch: between launches a user can interrupt, and a display can be drawn."""
+LOOPED = ("body", "again", "back_body")
+"""Phases of every step."""
+CALL_COST = 40
+"""Cost of a call besides its operations, in operations: a jump, its table entry."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """A phase for a number of warps.
+
+    Attributes:
+        spans: (levels, warps, 2) for each warp where its calls begin and end among ``entries``.
+        entries: of the calls: number, length, then offset and stride of each place; see ``entries_of``.
+        work, longest: operations of all calls, and of the warps that the others wait for, one level after the other.
+        words: that are read and written.
+    """
+
+    spans: Ints
+    entries: Ints
+    work: int
+    longest: int
+    words: int
+
+
+@dataclass(frozen=True)
+class _Call:
+    """A call to be scheduled: its words at step 0, its strides, and its alternatives."""
+
+    entry: list[int]
+    cost: int
+    reads: Ints
+    writes: Ints
+    places: tuple[Span, ...]
+    alternatives: Alternatives
+
+
+def schedules(planned: Plan, program: Program, warps: int) -> dict[str, Schedule]:
+    """Schedule all phases of a planned program: levels of calls that meet in no word that one of them writes.
+
+    The calls of a robot's step form a graph: legs do not touch each other, nor do contacts of different bodies. A block
+    of the device has several warps, each with a thread for every robot of the block; a warp takes its share of a level,
+    then all synchronise. The calls of each word stay in the order of the program, so numbers do not depend on the count
+    of warps. Before calls with a section or a guard stands an entry that skips them where that word is 0 for all robots
+    of the block (``alternatives``).
+    """
+    return {
+        phase: _schedule(list(_calls(planned, program, phase)), 2 * program.size + planned.tape, steps, warps)
+        for phase, steps in {name: program.steps if name in LOOPED else 1 for name in TABLES}.items()
+    }
+
+
+def _schedule(calls: Sequence[_Call], memory: int, steps: int, warps: int) -> Schedule:
+    levels = _levels(calls, memory, steps)
+    shares = [_shared(level, warps) for level in levels]
+    spans, entries, start = [], [], 0
+    for share in shares:
+        for own in share:
+            words = _entries(own)
+            spans.append((start, start + len(words)))
+            entries += words
+            start += len(words)
+    return Schedule(
+        spans=np.array(spans, np.int64).reshape(len(levels), warps, 2),
+        entries=np.array(entries, np.int64),
+        work=sum(call.cost for call in calls),
+        longest=sum(max(sum(call.cost for call in own) for own in share) for share in shares),
+        words=sum(len(call.reads) + len(call.writes) for call in calls),
+    )
+
+
+def _entries(calls: Sequence[_Call]) -> list[int]:
+    """Return the entries of a warp's calls of a level; those that are left out together follow one another."""
+    together = sorted(calls, key=lambda call: tuple(map(word_of, call.alternatives)))
+    return entries_of([(call.entry, call.alternatives) for call in together])
+
+
+def _calls(planned: Plan, program: Program, phase: str) -> Iterator[_Call]:
+    count, table = planned.tables[phase]
+    guarded: list[FunctionCall | None] = [None] * count
+    if planned.guarding is not None and phase in GUARDED:
+        first = planned.guarding.first  # those before compute guards
+        guarded = [program.body[k] if k >= first else None for k in planned.guarding.calls_of(phase).tolist()]
+    costs = {}
+    at, far = 0, program.size + planned.tape
+    for call in guarded:
+        number, length = int(table[at]), int(table[at + 1])
+        graph, form = planned.functions[number]
+        pairs = table[at + 2 : at + length].reshape(-1, 2).tolist()
+        sizes = [*graph.sizes, *map(len, graph.results)]
+        spans = [Span(offset, stride, size) for (offset, stride), size in zip(pairs, sizes, strict=True)]
+        own, given = spans[: form.primal], spans[form.primal : len(graph.sizes)]
+        results = spans[len(graph.sizes) :]
+        alternatives = ALWAYS
+        if call is not None:
+            alternatives = of_adjoint(call, given, results) if form.backward else of_call(call)
+        also = [span for other in alternatives if other is not None for span in other.reads]
+        if form.backward:
+            given, results = ([span._replace(offset=span.offset + far) for span in each] for each in (given, results))
+        if number not in costs:
+            costs[number] = CALL_COST + sum(graph.nodes[x].op not in ("const", "input") for x in graph.needed())
+        yield _Call(
+            entry=table[at : at + length].tolist(),
+            cost=costs[number],
+            reads=_words([*own, *given, *also, *(results if form.adds else [])]),
+            writes=_words([*results, *(given if form.clears else [])]),
+            places=(*own, *given, *also, *results),
+            alternatives=alternatives,
+        )
+        at += length
+
+
+def _levels(calls: Sequence[_Call], words: int, steps: int) -> list[list[_Call]]:
+    """Put each call as early as the words allow; one by one where places move through time at different speeds."""
+    if not _apart(calls, words, steps):
+        return [[call] for call in calls]
+    written, read = np.zeros(words, np.int64), np.zeros(words, np.int64)
+    levels: list[list[_Call]] = []
+    for call in calls:
+        after = max(
+            written[call.reads].max(initial=0), written[call.writes].max(initial=0), read[call.writes].max(initial=0)
+        )
+        if after == len(levels):
+            levels.append([])
+        levels[after].append(call)
+        written[call.writes] = after + 1
+        read[call.reads] = np.maximum(read[call.reads], after + 1)
+    return levels
+
+
+def _apart(calls: Sequence[_Call], words: int, steps: int) -> bool:
+    """Whether places of different strides never meet: then those that are apart at step 0 always are."""
+    taken = np.full(words, -1, np.int64)
+    for offset, stride, size in {place for call in calls for place in call.places} if steps > 1 else ():
+        own = np.arange(offset, offset + size) + stride * np.arange(steps)[:, None]
+        if ((taken[own] != -1) & (taken[own] != stride)).any():
+            return False
+        taken[own] = stride
+    return True
+
+
+def _shared(level: Sequence[_Call], warps: int) -> list[list[_Call]]:
+    """Distribute the calls of a level, each to the warp with the least work: those that always run, dearest first."""
+    shares: list[list[_Call]] = [[] for _ in range(warps)]
+    loads = [0] * warps
+    for call in sorted(level, key=lambda call: (any(call.alternatives), -call.cost)):
+        least = loads.index(min(loads))
+        shares[least].append(call)
+        loads[least] += call.cost
+    return shares
+
+
+def _words(spans: Sequence[Span]) -> Ints:
+    """Return the words of these places at step 0, in order."""
+    return np.concatenate([np.zeros(0, np.int64), *(np.arange(span.offset, span.offset + span.size) for span in spans)])
 
 
 class DevicePhase(ctypes.Structure):
@@ -105,13 +269,16 @@ class Tables:
         self.address = device.address(self._kept[-1])
 
     def _put(self, words: Ints) -> int:
-        """The address of a copy."""
+        """Return the address of a copy."""
         self._kept.append(self.device.put(words if words.size else np.zeros(1, np.int64)))
         return self.device.address(self._kept[-1])
 
 
 def interleaved(entries: Ints, lanes: int) -> Ints:
-    """Entries whose offsets and strides count the words of all lanes; those of what is copied count robots' words."""
+    """Return entries whose offsets and strides count the words of all lanes.
+
+    Those of what is copied count robots' words.
+    """
     found, at = entries.copy(), 0
     while at < len(found):
         length = int(found[at + 1])
@@ -149,7 +316,7 @@ def _meet(a: Ints, size: int, b: Ints, other: int, steps: int) -> bool:
 
 
 def device_sources(planned: Plan, steps: int, lanes: int, warps: int, single: bool) -> list[str]:
-    """The texts of a plan's kernels, for blocks of so many robots and warps; the last one is the driver's."""
+    """Return the texts of a plan's kernels, for blocks of so many robots and warps; the last one is the driver's."""
     head = f"#define LANES {lanes}\n#define WARPS {warps}\n#define SINGLE {int(single)}\n{resource('device.h')}"
     apart = results_apart(planned, steps)
     texts = [
@@ -169,7 +336,7 @@ def device_sources(planned: Plan, steps: int, lanes: int, warps: int, single: bo
 
 
 def resource(name: str) -> str:
-    """The text of a file of this room."""
+    """Return the text of a file of this room."""
     return files(ROOM).joinpath(name).read_text(encoding="utf-8")
 
 
@@ -195,7 +362,7 @@ class DeviceKernel(Kernel):
             self._wave(batch, start, min(start + wave, batch.rows))
 
     def _room(self, wanted: int) -> int:
-        """Blocks of a wave, at most as many as are wanted, in memory that is kept."""
+        """Return blocks of a wave, at most as many as are wanted, in memory that is kept."""
         if wanted > self._blocks:
             self._memory, self._blocks = None, 0  # before the device is asked what is free
             device = self.device
@@ -210,7 +377,7 @@ class DeviceKernel(Kernel):
         return min(wanted, self._blocks)
 
     def _wave(self, batch: RolloutBatch, start: int, end: int) -> None:
-        """Rows from start to end."""
+        """Run the rows from start to end."""
         device, rows, kept = self.device, end - start, []
         job = DeviceJob(program=self.tables.address, memory=device.address(self._memory), rows=rows)
         for name, array in batch.inputs.items():
@@ -229,7 +396,7 @@ class DeviceKernel(Kernel):
             batch.results[name][start:end] = device.get(array)
 
     def _phases(self, steps: int, gradient: bool) -> Iterator[tuple[str, int, int]]:
-        """Kernels with the steps that they are for."""
+        """Yield kernels with the steps that they are for."""
         chunks = [(first, min(first + STEPS_PER_LAUNCH, steps)) for first in range(0, steps, STEPS_PER_LAUNCH)]
         skipped = [(steps, steps)] * (steps < self.program.steps)
         yield "begin", 0, 0

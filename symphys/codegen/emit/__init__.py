@@ -1,1 +1,1 @@
-"""From a program to C sources."""
+"""C sources of programs."""

@@ -1,4 +1,4 @@
-"""What is done in place of a call that is without effect, where all words must hold what they would have held.
+"""Alternatives of calls without effect: copies, after which all words hold the values that the call would give.
 
 What stands for its results is copied. The processor's driver for rollouts copies nothing, as it sends readers elsewhere
 (``guarding.py``). On a device, and in Jacobians of a step, places are given.
@@ -14,7 +14,7 @@ from symphys.codegen.program.program import FunctionCall, Place
 
 NONE = -1
 LEFT_OUT = -1
-"""In place of the number of a function."""
+"""Stands for the number of a function in an entry of copies."""
 
 
 class Span(NamedTuple):
@@ -26,7 +26,7 @@ class Span(NamedTuple):
 
 
 class Copy(NamedTuple):
-    """From ``source`` to ``offset``; adjoints are added the other way, and a source of -1 is one that has none."""
+    """A copy from ``source`` to ``offset``; adjoints are added the other way, and a source of -1 has none."""
 
     offset: int
     source: int
@@ -35,7 +35,7 @@ class Copy(NamedTuple):
 
 
 class Alternative(NamedTuple):
-    """When a call may be left out, and what is copied then.
+    """The word at whose 0 a call may be skipped, and the copies that replace it.
 
     Attributes:
         word: where this is 0.
@@ -49,7 +49,7 @@ class Alternative(NamedTuple):
 
 
 Alternatives = tuple[Alternative | None, Alternative | None]
-"""By the section and by the guard of a call."""
+"""Alternatives by the section and by the guard of a call."""
 ALWAYS: Alternatives = (None, None)
 """Those of a call that is never left out."""
 
@@ -65,12 +65,12 @@ def of_adjoint(call: FunctionCall, results: Sequence[Span], arguments: Sequence[
 
 
 def word_of(alternative: Alternative | None) -> int:
-    """-1 if there is none."""
+    """Return the word of an alternative; -1 if there is none."""
     return NONE if alternative is None else alternative.word
 
 
 def entries_of(calls: Sequence[tuple[list[int], Alternatives]], depth: int = 0) -> list[int]:
-    """The entries of calls that follow one another; those that share a word come after one that leaves them out.
+    """Return the entries of calls that follow one another; those that share a word come after one that leaves them out.
 
     That one is LEFT_OUT, its length, words from its begin to what comes after these calls, the word, the copies.
     """

@@ -18,7 +18,7 @@ from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import FORMS
 
 WORD_BITS = 21
-"""Of an operand, for the word; the others are for the place."""
+"""Bits of an operand for the word; the others are for the place."""
 REGISTERS, CONSTANTS, PLACES = 0, 1, 2
 """Places of an operand: values that the function keeps, constants, and from here on those of the call."""
 MAX_REGISTERS = 4096
@@ -45,7 +45,7 @@ class Codes:
 
 
 def codes_of(plan: Plan) -> Codes:
-    """The codes of a plan's functions; KernelUnavailable where a function is too large for them."""
+    """Return the codes of a plan's functions; KernelUnavailable where a function is too large for them."""
     words, starts, numbers = array("I"), list[int](), dict[str, int]()
     for graph, form in plan.functions:
         starts.append(len(words))
@@ -56,7 +56,7 @@ def codes_of(plan: Plan) -> Codes:
 
 
 def interpreter(lanes: int, single: bool) -> SourceFile:
-    """The C file: it depends on nothing of a program."""
+    """Return the C file: it depends on nothing of a program."""
     cases = "".join(f"{name}_op: {{ {_case(name)} NEXT; }}\n" for name in FORMS)
     labels = ", ".join([*(f"&&{name}" for name in OWN_CODES), *(f"&&{name}_op" for name in FORMS)])
     text = resource("interpreter.c").replace("OPERATIONS", labels).replace("CASES", cases)
@@ -75,7 +75,7 @@ class _Encoder:
     """One function."""
 
     def __init__(self, cut: Cut, form: Form, numbers: dict[str, int]) -> None:
-        """``numbers``: of constants so far."""
+        """Start without codes; ``numbers``: of constants so far."""
         self.cut, self.form, self.numbers = cut, form, numbers
         self.where: dict[int, int] = {}
         self.free: list[int] = []

@@ -1,4 +1,4 @@
-"""How functions are written for vectors of lanes, for single numbers in plain C, and for a thread of a device."""
+"""Dialects of C: vectors of lanes, single numbers in plain C, a thread of a device."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Dialect:
 
     @property
     def table(self) -> str:
-        """Type of the table of places."""
+        """Return the type of the table of places."""
         return "const int32_t *" if self.dense else "const word *"
 
 

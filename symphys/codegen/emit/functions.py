@@ -20,7 +20,7 @@ Key = tuple[object, ...]
 
 @dataclass
 class DistinctFunctions:
-    """What is to be compiled, in the order of its numbers, and what is known about each casadi Function."""
+    """The functions to compile, in the order of their numbers, and the graphs of each casadi Function."""
 
     listed: list[tuple[Graph, Form]] = field(default_factory=list)
     _numbers: dict[Key, int] = field(default_factory=dict)
@@ -33,12 +33,12 @@ class DistinctFunctions:
     _dependences: dict[int, list[NDArray[np.bool_]]] = field(default_factory=dict)
 
     def entry(self, graph: Graph, form: Form, places: Sequence[Place]) -> list[int]:
-        """The table entry of a call: number, length, then offset and stride of each place."""
+        """Return the table entry of a call: number, length, then offset and stride of each place."""
         pairs = [x for place in places for x in (place.offset, place.stride)]
         return [self.number(graph, form), 2 + len(pairs), *pairs]
 
     def number(self, graph: Graph, form: Form) -> int:
-        """The number of a function, a new one where it is met first."""
+        """Return the number of a function, a new one where it is met first."""
         key = (self._identity(graph), form)
         if key not in self._numbers:
             self._numbers[key] = len(self.listed)
@@ -46,14 +46,14 @@ class DistinctFunctions:
         return self._numbers[key]
 
     def forward(self, function: Function) -> Graph:
-        """The graph of a function."""
+        """Return the graph of a function."""
         identity = function.__hash__()
         if identity not in self._forward:
             self._forward[identity] = graph_of(function)
         return self._forward[identity]
 
     def adjoint(self, function: Function, inputs: Mask, outputs: Mask, tabled: bool = False) -> Graph:
-        """The adjoint graph for these arguments and results; ``tabled``: as ``adjoint_graph`` has it."""
+        """Return the adjoint graph for these arguments and results; ``tabled``: as ``adjoint_graph`` has it."""
         forward = self.forward(function)
         key = (self._identity(forward), inputs, outputs, tabled)
         if key not in self._adjoints:
@@ -61,7 +61,7 @@ class DistinctFunctions:
         return self._adjoints[key]
 
     def taped(self, forward: Graph, adjoint: Graph) -> Taped | None:
-        """The two with a tape between them; None if nothing is worth it."""
+        """Return the two with a tape between them; None if nothing is worth it."""
         key = (id(forward), id(adjoint))
         if key not in self._taped:
             self._taped[key] = taped(forward, adjoint)
@@ -81,13 +81,13 @@ class DistinctFunctions:
         return self._dependences[id(graph)]
 
     def arguments(self, graph: Graph) -> frozenset[int]:
-        """The arguments that a graph reads."""
+        """Return the arguments that a graph reads."""
         if id(graph) not in self._arguments:
             self._arguments[id(graph)] = frozenset(graph.nodes[x].at[0] for x in graph.needed())
         return self._arguments[id(graph)]
 
     def _identity(self, graph: Graph) -> int:
-        """A number that equal graphs share; graphs live as long as this object, so that addresses name them."""
+        """Return a number that equal graphs share; graphs live as long as this object, so that addresses name them."""
         if id(graph) not in self._identities:
             self._identities[id(graph)] = self._distinct.setdefault(graph.key(), len(self._distinct))
         return self._identities[id(graph)]

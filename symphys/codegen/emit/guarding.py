@@ -1,4 +1,4 @@
-"""What the driver needs to leave out calls that are without effect.
+"""Tables by which the driver skips calls without effect.
 
 A guard is a word that is 0 where a call changes nothing. A result of a call that is left out stands for another place:
 that of an argument, or of zeros. Results that stand for one another form a chain, such as the velocity of a body after
@@ -27,7 +27,7 @@ from symphys.types import Ints
 NONE = -1
 TABLES = ("body", "again", "back_body")
 LOOKAHEAD = 16
-"""As in ``guards.c``."""
+"""Entries of lookahead, the same as in ``guards.c``."""
 WIDTHS = {"guards": 1, "groups": 1, "calls": 7, "reads": 2, "writes": 2, "chains": 2, "sections": 5, "copies": 5}
 WIDTHS |= {"late": 2, "parents": 1}
 
@@ -59,11 +59,11 @@ class Guarding:
     arena: int
 
     def count(self, name: str) -> int:
-        """Rows of a kind; of calls without the last."""
+        """Return the number of rows of a kind; of calls without the last."""
         return len(self.rows[name]) // WIDTHS[name] - (name == "calls")
 
     def calls_of(self, table: str) -> Ints:
-        """The numbers of the calls that one of ``TABLES`` has, in its order."""
+        """Return the numbers of the calls that one of ``TABLES`` has, in its order."""
         starts = self.rows["calls"].reshape(-1, WIDTHS["calls"])[:-1, TABLES.index(table)]
         order = np.argsort(starts, kind="stable")
         return order[np.count_nonzero(starts == NONE) :]
@@ -104,7 +104,7 @@ class _Rows:
         self._words = 0
 
     def lay(self, tables: Mapping[str, Table]) -> None:
-        """Go through the calls as they follow one another, then through their entries in all tables."""
+        """Lay out the calls as they follow one another, then their entries in all tables."""
         before: list[tuple[int, int]] = []
         for k, call in enumerate(self._body):
             if call.section is not None:
@@ -126,7 +126,7 @@ class _Rows:
         self._put(np.concatenate(found, axis=1), forward)
 
     def _read(self, table: Table, chain: Ints) -> Iterator[Ints]:
-        """(3, reads) call, position and chain where entries have a place of a chain."""
+        """Return call, position and chain (3, reads) where entries have a place of a chain."""
         inputs = self._program.phases[1].inputs
         whole = np.where((inputs.stride == 0) & (inputs.size > 0), chain[inputs.offset % max(len(chain), 1)], NONE)
         for rows, (_, columns) in zip(table.rows, table.recipes, strict=True):
@@ -138,7 +138,7 @@ class _Rows:
                     yield np.stack([calls[on], at[on] + 2 + 2 * k, own[on]])
 
     def _put(self, found: Ints, forward: int) -> None:
-        """Reads by their calls; of each call those of the first ``forward`` first."""
+        """Add reads by their calls; of each call those of the first ``forward`` first."""
         counts = [np.bincount(each, minlength=len(self._body)) for each in (found[0, :forward], found[0, forward:])]
         ends = np.cumsum(counts[0] + counts[1])
         self._starts[:-1, 3] = ends - counts[0] - counts[1]
@@ -162,7 +162,7 @@ class _Rows:
             self._sections.append((k, end, *self._chains.source(call.section)))
 
     def guarding(self) -> Guarding:
-        """All rows."""
+        """Return all rows."""
         word = {offset: g for g, offset in enumerate(self._guards)}
         groups: list[list[int]] = [[] for _ in range(len(word) + 1)]
         for k, call in enumerate(self._body):
@@ -209,7 +209,7 @@ class _Rows:
             each[each != NONE] = number[each[each != NONE]]
 
     def _late(self, first: int, word: Mapping[int, int]) -> dict[str, list[tuple[int, ...]]]:
-        """The rows of those calls of the first that have a guard, and of the guards that they compute."""
+        """Return the rows of those calls of the first that have a guard, and of the guards that they compute."""
         late, parents = list[tuple[int, ...]](), list[tuple[int, ...]]([(NONE,)] * len(self._guards))
         for k, call in enumerate(self._body[:first]):
             if call.guard is None:
@@ -238,7 +238,7 @@ class _Chains:
         return self._chain
 
     def of(self, place: Place) -> int:
-        """The chain whose newest result has this place, all of it or a part; NONE if it is part of none."""
+        """Return the chain whose newest result has this place, all of it or a part; NONE if it is part of none."""
         return NONE if place.stride or not place.size else self._chain[place.offset]
 
     def follows(self, place: Place) -> bool:
@@ -260,14 +260,17 @@ class _Chains:
         return newest.offset <= place.offset and place.offset + place.size <= newest.offset + newest.size
 
     def source(self, place: Place) -> tuple[int, int, int]:
-        """(chain, offset in it, 0), or (NONE, offset, stride)."""
+        """Return (chain, offset in it, 0), or (NONE, offset, stride)."""
         chain = self.of(place)
         if chain == NONE:
             return NONE, place.offset, place.stride
         return chain, place.offset - self._newest[chain].offset, 0
 
     def extend(self, place: Place, other: Place) -> int:
-        """The chain that a result goes on with, for which ``other`` may stand; a new one if that is part of none."""
+        """Return the chain that a result goes on with, for which ``other`` may stand.
+
+        A new one if that is part of none.
+        """
         chain = self.of(other)
         if chain == NONE:
             chain = len(self.roots)
@@ -279,7 +282,7 @@ class _Chains:
 
 
 def _followed(program: Program) -> list[FunctionCall]:
-    """The body without those guards whose chains somebody reads elsewhere than at their ends."""
+    """Return the body without those guards whose chains somebody reads elsewhere than at their ends."""
     body = list(program.body)
     for call in body:
         _check(call)
@@ -289,7 +292,7 @@ def _followed(program: Program) -> list[FunctionCall]:
 
 
 def _unfollowed(size: int, body: Sequence[FunctionCall]) -> Place | None:
-    """A guard whose results are read where they are not the newest."""
+    """Return a guard whose results are read where they are not the newest."""
     chains, guards = _Chains(size), dict[int, Place]()
     for call in body:
         copied = [place for place in (call.section, *call.beside) if place is not None]

@@ -240,7 +240,7 @@ def _entries(count: int, table: Ints) -> Iterator[_Entry]:
 
 
 class _Layout:
-    """Where the words of a program lie: ``to`` has their places, by those that the program gives them."""
+    """The memory layout of a library of one lane: ``to`` maps the words of the program to their places."""
 
     def __init__(self, planned: Plan, program: Program) -> None:
         self._planned, self._program = planned, program
@@ -276,7 +276,7 @@ class _Layout:
         return [words for number, words in enumerate(found) if self._family[words[0, 0]] == number]
 
     def _broken(self) -> set[int]:
-        """Families of which a place of a call has some words, besides others."""
+        """Return families of which a place of a call has some words, besides others."""
         body, broken = self._program.phases[1], set[int]()
         places = np.concatenate([np.stack([spans.offset, spans.size]) for spans in (body.inputs, body.outputs)], axis=1)
         for offset, size in np.unique(places[:, places[1] > 0], axis=1).T.tolist():
@@ -321,7 +321,7 @@ class _Tables:
         self._numbers: dict[tuple[int, Shape], int] = {}
 
     def table(self, name: str, entries: Sequence[_Entry]) -> tuple[int, Ints]:
-        """One table: calls, and their entries."""
+        """Return one table: calls, and their entries."""
         lanes_of = dict(self._planned.packs)
         backward = name == "back_body"
         if backward:
@@ -368,7 +368,7 @@ class _Tables:
         return _Entry(self._number(entry.number, Shape(1, tuple(accesses))), pairs)
 
     def _pack_entry(self, own: Sequence[_Entry]) -> _Entry | None:
-        """One entry for all lanes; None where the order of what they add would not be kept."""
+        """Return one entry for all lanes; None where the order of what they add would not be kept."""
         lanes, pairs, accesses = len(own), [], []
         for i, size in enumerate(self._sizes(own[0].number)):
             strides = {entry.pairs[i][1] for entry in own}

@@ -1,4 +1,4 @@
-"""What a function computes, in which order: graphs cut where a compiler's register allocation would take too long."""
+"""Pieces of functions: graphs in order, cut where a compiler's register allocation would take too long."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MIN_RUN = 8
 
 @dataclass(frozen=True)
 class Form:
-    """How a graph meets the memory.
+    """The way in which a graph reads and writes the memory.
 
     Attributes:
         primal: how many of its arguments are places of the memory; the others are places of the adjoint memory.
@@ -90,7 +90,7 @@ def _cut(graph: Graph, fused: set[int]) -> list[GraphPiece]:
 
 
 def _runs(graph: Graph, result: Sequence[int]) -> Iterator[tuple[int, int, int]]:
-    """(value, first word, number of words) of a result; words are together where one constant fills many of them."""
+    """Return (value, first word, number of words) of a result; many words of one constant are together."""
     first = 0
     for x, words in groupby(result):
         count = len(list(words))

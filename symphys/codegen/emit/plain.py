@@ -18,7 +18,7 @@ from symphys.codegen.runtime.library import data_places
 
 RANGES = ("z", "parameters", "zeroed", "constants", "outputs", "seeded")
 TABLES = ("prologue", "body", "epilogue", "again", "back_body", "back_prologue", "back_epilogue")
-"""In the order of the driver's ``program``."""
+"""Tables in the order of the driver's ``program``."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class PlainSource:
 
 
 def plain_source(program: Program, seeded: Sequence[str], further: Mapping[str, Function]) -> PlainSource:
-    """The program, the gradient of the seeded outputs, and further functions of their own."""
+    """Return the program, the gradient of the seeded outputs, and further functions of their own."""
     planned = plan(program, seeded)
     texts = [write(f"f{number}", graph, form, NUMBERS) for number, (graph, form) in enumerate(planned.functions)]
     for name, function in further.items():
@@ -60,7 +60,7 @@ def plain_source(program: Program, seeded: Sequence[str], further: Mapping[str, 
 
 
 def _guarding(guarding: Guarding | None) -> tuple[list[str], list[str]]:
-    """The arrays of what may be left out, and the fields of the program that name them."""
+    """Return the arrays of what may be left out, and the fields of the program that name them."""
     if guarding is None:
         return [], []
     arrays = [_array("word", f"{name.upper()}[]", map(str, words)) for name, words in guarding.rows.items()]
@@ -69,7 +69,7 @@ def _guarding(guarding: Guarding | None) -> tuple[list[str], list[str]]:
 
 
 def plain_functions(functions: Mapping[str, Function]) -> str:
-    """Functions ``name(m, b, t, k)`` alone, in a C file of their own."""
+    """Return functions ``name(m, b, t, k)`` alone, in a C file of their own."""
     texts = [
         write(name, graph_of(function), Form(primal=function.n_in(), adds=False), NUMBERS)
         for name, function in functions.items()
@@ -78,12 +78,12 @@ def plain_functions(functions: Mapping[str, Function]) -> str:
 
 
 def table(places: Iterable[Place]) -> str:
-    """The places of a call as C numbers: offset and stride of each."""
+    """Return the places of a call as C numbers: offset and stride of each."""
     return ", ".join(f"{place.offset}, {place.stride}" for place in places)
 
 
 def _array(kind: str, name: str, items: Iterable[str]) -> str:
-    """A constant with its values; C knows no empty ones."""
+    """Return a constant with its values; C knows no empty ones."""
     const = "" if kind.startswith("void") else "const "
     body = textwrap.fill(", ".join(items) or "0", 118, initial_indent="  ", subsequent_indent="  ")
     return f"static {const}{kind} {name} = {{\n{body}\n}};\n"

@@ -1,4 +1,4 @@
-"""From a program to what is compiled, and to the tables that the driver walks."""
+"""Plans a program: the functions to compile, and the tables that the driver walks."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
 def with_adjoints(
     program: Program, seeded: Sequence[str], functions: DistinctFunctions, varying: Sequence[Place] = ()
 ) -> tuple[list[PlannedPhase], LivenessGraph]:
-    """The phases of a program, with the adjoints of what matters to the seeded outputs and depends on z.
+    """Return the phases of a program, with the adjoints of what matters to the seeded outputs and depends on z.
 
     What is in ``varying`` counts as dependent too.
     """
@@ -106,7 +106,7 @@ class PlannedPhase:
     """
 
     def __init__(self, calls: PhaseCalls, steps: int) -> None:
-        """No adjoints are known yet."""
+        """Start without adjoints."""
         self.calls, self.steps = calls, steps
         self.kinds: list[_Kind] = []
         self.kind = np.full(len(calls), NONE, np.int64)
@@ -135,7 +135,7 @@ class PlannedPhase:
             self.kinds.append(_Kind(function, inputs, outputs, functions.adjoint(function, inputs, outputs)))
 
     def pushes(self, functions: DistinctFunctions, calls: Ints | None = None) -> Table:
-        """The table of calls; None: of all, without tapes."""
+        """Return the table of calls; None: of all, without tapes."""
         count, again = len(self.calls.functions), calls is not None
         chosen = np.arange(len(self.calls)) if calls is None else calls
         plain = 2 * self.calls.number[chosen] + self.calls.accumulate[chosen]
@@ -154,7 +154,7 @@ class PlannedPhase:
         return table_of(self.calls, chosen, kinds, recipe, self.tape)
 
     def pulls(self, functions: DistinctFunctions) -> Table:
-        """The table of adjoints."""
+        """Return the table of adjoints."""
         chosen = np.flatnonzero(self.kind != NONE)[::-1]
 
         def recipe(number: int) -> Recipe:
@@ -174,7 +174,7 @@ def _columns(side: str, mask: Sequence[bool]) -> list[tuple[str, int]]:
 
 
 def _alike(marks: NDArray[np.bool_]) -> list[Ints]:
-    """Rows that are equal, in order."""
+    """Return rows that are equal, in order."""
     bits = np.ascontiguousarray(np.packbits(marks, axis=1))
     if not bits.size:
         return [np.arange(len(marks))]
@@ -183,7 +183,7 @@ def _alike(marks: NDArray[np.bool_]) -> list[Ints]:
 
 
 def _any(before: Ints, spans: Spans, steps: int) -> NDArray[np.bool_]:
-    """(places,) whether one of its words is active at any step; ``before`` each word so many are."""
+    """Return for each place (places,) whether a word is active at any step; ``before``: active words before each."""
     found: NDArray[np.bool_] = before[spans.offset + spans.size] > before[spans.offset]
     if steps == 1:
         return found
@@ -205,7 +205,7 @@ def _taped_at_once(program: Program) -> bool:
 def _again(
     program: Program, body: PlannedPhase, reach: LivenessGraph, functions: DistinctFunctions, noted: bool
 ) -> NDArray[np.bool_]:
-    """(calls,) which must be run again before the adjoints of a step: those whose scratch is read."""
+    """Return flags (calls,) of those to run again before the adjoints of a step: those whose scratch is read."""
     spans = body.calls.inputs
     used = [[i for i in range(kind.function.n_in()) if i in functions.arguments(kind.graph)] for kind in body.kinds]
     read = [np.zeros(0, np.int64)]

@@ -1,4 +1,4 @@
-"""What is compiled, and the tables that the driver walks; a second start reads them from a file."""
+"""A plan: the functions to compile, and the tables that the driver walks; a second start reads these from a file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plan:
-    """What the compiler and the driver need.
+    """The functions and tables of a program, for the compiler and the driver.
 
     Attributes:
         functions: the C functions, in the order of their numbers.

@@ -1,4 +1,4 @@
-"""Where the words of a function's places lie, and how many calls it does at once, in a library of one lane."""
+"""Shapes of functions in a library of one lane: calls at once, and the access to the words of their places."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ BROADCAST, INTERLEAVED, GATHER, GATHER_ALIASED = "all", "beside", "each", "turns
 
 
 class Access(NamedTuple):
-    """How the words of an argument or result are reached.
+    """The access to the words of an argument or result.
 
     Attributes:
         kind: see above.
@@ -21,7 +21,7 @@ class Access(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """How a function does one call, or several of them side by side.
+    """The shape of a function that computes one call, or several at once.
 
     Attributes:
         lanes: calls at once.
@@ -36,7 +36,7 @@ class PlaceWords:
     """C for the words of a function's places: ``i3`` is the fourth argument, ``o0`` the first result."""
 
     def __init__(self, word: str) -> None:
-        """``word``: of a place, by the place's name and the number of the word."""
+        """Keep the format ``word`` of a word, by the place's name and the number of the word."""
         self._word = word
 
     def pointers(self, name: str) -> list[str]:
@@ -44,7 +44,7 @@ class PlaceWords:
         return [name]
 
     def load(self, name: str, word: int | str) -> str:
-        """The value of a word."""
+        """Return the value of a word."""
         return self._word.format(name, word)
 
     def store(self, name: str, word: int | str, value: str) -> str:
@@ -62,14 +62,14 @@ class PlaceWords:
 
 
 class PackWords(PlaceWords):
-    """The same for one rollout alone, where words may lie apart and lanes are calls.
+    """Words of places in a library of one lane, where they may lie apart and lanes are calls.
 
     Results that several lanes add to are added to lane by lane, in the order of the calls: with whole vectors, of which
     one lane is kept.
     """
 
     def __init__(self, shape: Shape, arguments: int, backward: bool) -> None:
-        """``arguments``: how many accesses belong to them; ``backward``: calls come in turn from the last lane on."""
+        """Keep the accesses; ``arguments``: the number of theirs; ``backward``: calls go from the last lane on."""
         self._lanes = shape.lanes
         names = [f"i{i}" for i in range(arguments)] + [f"o{i}" for i in range(len(shape.accesses) - arguments)]
         self._access = dict(zip(names, shape.accesses, strict=True))
@@ -87,7 +87,7 @@ class PackWords(PlaceWords):
         return [name]
 
     def load(self, name: str, word: int | str) -> str:
-        """The value of a word."""
+        """Return the value of a word."""
         kind, at = self._access[name].kind, self._words(name, word)
         if self.single:
             return at[0]
@@ -128,7 +128,7 @@ class PackWords(PlaceWords):
         return f"{{ {' '.join(f'{at} = 0;' for at in dict.fromkeys(self._words(name, word)))} }}"
 
     def _words(self, name: str, word: int | str) -> list[str]:
-        """The word of each lane; of lanes that are beside each other, or share a place, that of the first."""
+        """Return the word of each lane; of lanes that are beside each other, or share a place, that of the first."""
         kind, steps = self._access[name]
         index = [word * step if isinstance(word, int) else f"{step} * {word}" for step in steps]
         pointers = self.pointers(name)

@@ -36,7 +36,7 @@ class SourceFile:
 
 
 def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[SourceFile]:
-    """The C files; each compiles alone. Values have no fused products, so that they are casadi's to the bit.
+    """Return the C files; each compiles alone. Values have no fused products, so that they are casadi's to the bit.
 
     ``narrow``: of fewer lanes than a vector register has.
     """
@@ -57,7 +57,7 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
 
 
 def listed(count: int, dialect: Dialect = VECTORS) -> str:
-    """The functions f0, f1 .. in C, by number, as a driver calls them."""
+    """Return the functions f0, f1 .. in C, by number, as a driver calls them."""
     names = [f"f{number}" for number in range(count)]
     declared = "".join(f"void {name}(V *m, V *b, {dialect.table}t, word k);\n" for name in names)
     table = ", ".join(names) or "0"
@@ -95,5 +95,5 @@ def spread(texts: Sequence[str], work: Sequence[int], most: int) -> list[list[st
 
 
 def resource(name: str) -> str:
-    """The text of a C file of this room."""
+    """Return the text of a C file of this room."""
     return files(ROOM).joinpath(name).read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ from symphys.types import Ints
 
 
 class Recipe(NamedTuple):
-    """How the entries of one kind are made.
+    """The recipe of the entries of one kind.
 
     Attributes:
         number: of the function.
@@ -47,18 +47,18 @@ class Table:
     recipes: Sequence[Recipe]
 
     def start_of(self, count: int) -> Ints:
-        """(count,) where the entry of each call of the phase begins; -1: it has none."""
+        """Return where the entry of each call of the phase begins (count,); -1: it has none."""
         found = np.full(count, -1, np.int64)
         found[self.calls] = self.starts
         return found
 
     def filled(self) -> Ints:
-        """The words; one 0 where there are none, since C knows no empty arrays."""
+        """Return the words; one 0 where there are none, since C knows no empty arrays."""
         return self.words if len(self.words) else np.zeros(1, np.int64)
 
 
 def table_of(phase: PhaseCalls, calls: Ints, kinds: Ints, recipe: Callable[[int], Recipe], tape: Ints) -> Table:
-    """The entries of calls.
+    """Return the entries of calls.
 
     Args:
         phase: what they are part of.

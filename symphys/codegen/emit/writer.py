@@ -1,4 +1,4 @@
-"""From graphs to C functions.
+"""C functions of graphs.
 
 Statements come in order: loads where they are used, or many of them at once, ahead of what uses them. A processor
 looks ahead by itself. A thread of a device waits at the first value that is not there yet, and its compiler moves no
@@ -21,7 +21,7 @@ class Lines:
     """Statements as they come, in groups: of each group first all loads, then what is computed, then all stores."""
 
     def __init__(self, ahead: int) -> None:
-        """``ahead``: loads of a group; 0: every statement stays where it is."""
+        """Start without statements; ``ahead``: loads of a group, 0: statements stay where they are."""
         self._ahead = ahead
         self._done: list[str] = []
         self._loads: list[str] = []
@@ -31,17 +31,17 @@ class Lines:
         self._count = 0
 
     def load(self, line: str) -> None:
-        """A statement that reads a place."""
+        """Add a statement that reads a place."""
         self._loads.append(line)
         self._next()
 
     def compute(self, line: str) -> None:
-        """A statement that meets no place."""
+        """Add a statement that reads and writes no place."""
         self._computed.append(line)
         self._next()
 
     def store(self, line: str) -> None:
-        """A statement that writes a place."""
+        """Add a statement that writes a place."""
         self._stores.append(line)
         self._next()
 
@@ -54,7 +54,7 @@ class Lines:
         self._next()
 
     def all(self) -> list[str]:
-        """The statements in their order."""
+        """Return the statements in their order."""
         self._close()
         return self._done
 
@@ -78,7 +78,7 @@ def write(
     shape: Shape | None = None,
     apart: Collection[int] = (),
 ) -> str:
-    """The C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step.
+    """Return the C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step.
 
     ``moving``: the pairs that may have a stride; None: all. ``shape``: of a function for one rollout alone. ``apart``:
     the results that meet no other in any call.
@@ -111,7 +111,7 @@ class _Written:
     apart: Collection[int] = ()
 
     def statements(self, graph: Graph, form: Form) -> list[str]:
-        """Its C statements."""
+        """Return the C statements of the piece."""
         names: dict[int, str] = {}
         lines = Lines(self.dialect.ahead)
         piece, both = self.piece, self._both(graph)
@@ -137,7 +137,7 @@ class _Written:
         return lines.all()
 
     def _both(self, graph: Graph) -> dict[int, tuple[int, int]]:
-        """Sines, and cosines of the same numbers, that are computed together."""
+        """Return sines, and cosines of the same numbers, that are computed together."""
         if not self.dialect.both:
             return {}
         found: dict[int, dict[str, int]] = {}
@@ -178,7 +178,7 @@ def _type(op: str) -> str:
 
 
 def _pointers(graph: Graph, form: Form, dialect: Dialect, words: PlaceWords) -> list[tuple[str, str, str]]:
-    """(type, name, memory) of every argument and result; adjoints of arguments may coincide, all others may not."""
+    """Return (type, name, memory) of every argument and result; only adjoints of arguments may coincide."""
     kind, memory = ("const R *", "(const R *)m") if form.shared else (dialect.reads, "m")
     primal = [(kind, f"i{i}", memory) for i in range(form.primal)]
     seeds = [(dialect.writes, f"i{i}", "b") for i in range(form.primal, len(graph.sizes))]
@@ -194,7 +194,10 @@ def _entry(
     dialect: Dialect,
     moving: Collection[int] | None,
 ) -> str:
-    """The function itself; pieces of one that is cut are called apart, and each finds the places that it needs."""
+    """Return the function itself.
+
+    Pieces of one that is cut are called apart, and each finds the places that it needs.
+    """
     each, moving = (1, ()) if dialect.dense else (2, moving)
     steps = [f" + k * t[{2 * i + 1}]" if moving is None or i in moving else "" for i in range(len(pointers))]
     places = [f"{memory} + t[{each * i}]{steps[i]}" for i, (_, _, memory) in enumerate(pointers)]
@@ -213,7 +216,7 @@ def _entry(
 
 
 def literal(value: str) -> str:
-    """A constant in all lanes."""
+    """Return a constant in all lanes."""
     number = float.fromhex(value)
     if number != number:
         return "S(NAN)"

@@ -20,11 +20,11 @@ from symphys.codegen.program.spans import Spans, stretches
 from symphys.types import Bools, Ints
 
 Words = slice | NDArray[np.int64]
-"""Of a place at all steps: neighbours, or (steps, size)."""
+"""Words of a place at all steps: neighbours, or (steps, size)."""
 
 
 def words_of(place: Place, steps: int) -> Words:
-    """The words of a place that is met in so many steps."""
+    """Return the words of a place that is met in so many steps."""
     if place.stride and steps != 1:
         return place.words(steps)
     return slice(place.offset, place.offset + place.size)
@@ -168,7 +168,7 @@ class Lists:
         return cls(sizes, np.concatenate([np.zeros(0, np.int64), *parts]))
 
     def at(self, keys: Ints) -> tuple[Ints, Ints]:
-        """All lists of some numbers, one after the other, and which number each item is of."""
+        """Return all lists of some numbers, one after the other, and which number each item is of."""
         first = self.starts[keys]
         counts = self.starts[keys + 1] - first
         return self.items[stretches(first, counts)], np.repeat(np.arange(len(keys)), counts)
@@ -197,7 +197,7 @@ class _Places:
     steps: Ints
 
     def words(self) -> Lists:
-        """The words of each, step after step."""
+        """Return the words of each, step after step."""
         step = stretches(np.zeros(len(self.steps), np.int64), self.steps)
         first = np.repeat(self.offset, self.steps) + step * np.repeat(self.stride, self.steps)
         starts = np.concatenate([[0], np.cumsum(self.size * self.steps)])
@@ -208,7 +208,7 @@ class LivenessGraph:
     """The calls of all phases as a graph of words, places and calls."""
 
     def __init__(self, size: int, phases: Sequence[AnnotatedCalls]) -> None:
-        """``size`` words of memory."""
+        """Build the graph; ``size``: words of memory."""
         inputs = [(phase.calls.inputs, phase.steps) for phase in phases]
         outputs = [(phase.calls.outputs, phase.steps) for phase in phases]
         counts = [len(phase.calls) for phase in phases]
@@ -245,7 +245,7 @@ class LivenessGraph:
         self._writers = Lists.inverse(covered.items, size)
 
     def forwards(self, words: Ints) -> Bools:
-        """(size,): which words depend on these, and these."""
+        """Return flags (size,) of these words and of those that depend on them."""
         seen, moving = _MarkedNumbers(self._size), _MarkedNumbers(len(self.read.offset))
         fresh = seen.fresh(words)
         while fresh.size:
@@ -256,7 +256,7 @@ class LivenessGraph:
         return seen.flags
 
     def backwards(self, words: Ints) -> Bools:
-        """(size,): which words these depend on, and these."""
+        """Return flags (size,) of these words and of those that they depend on."""
         seen, useful = _MarkedNumbers(self._size), _MarkedNumbers(len(self.read.offset))
         fresh = seen.fresh(words)
         while fresh.size:
@@ -270,7 +270,7 @@ class LivenessGraph:
         return seen.flags
 
     def producers(self, read: Ints, words: Ints, through: Bools, phase: int) -> Bools:
-        """(calls of a phase,): which of them write what is read.
+        """Return flags (calls of a phase,) of those that write the words that are read.
 
         Args:
             read: arguments of the phase, by the numbers of their places.
@@ -295,7 +295,7 @@ class LivenessGraph:
         return taken.flags[first:last]
 
     def _words(self, numbers: Ints) -> Ints:
-        """The words of the memory that these words of results are, at all steps."""
+        """Return the words of the memory that these words of results are, at all steps."""
         results = np.searchsorted(self._end, numbers, side="right")
         first, stride = self._out.offset[results] + self._within[numbers], self._out.stride[results]
         if not stride.any():
@@ -305,7 +305,7 @@ class LivenessGraph:
 
 
 class _MarkedNumbers:
-    """Which of some numbers have been seen."""
+    """A set of marked numbers."""
 
     def __init__(self, count: int) -> None:
         self.flags: Bools = np.zeros(count, bool)
@@ -322,13 +322,13 @@ class _MarkedNumbers:
 
 
 def _renumber(parts: Sequence[Ints], counts: Sequence[int]) -> Ints:
-    """Numbers of things in several lists, as numbers in all of them together."""
+    """Return numbers of things in several lists, as numbers in all of them together."""
     before = np.cumsum([0, *counts]).tolist()
     return np.concatenate([part + start for part, start in zip(parts, before[:-1], strict=True)])
 
 
 def _join_places(parts: Sequence[tuple[Spans, int]]) -> _Places:
-    """The places of all phases; those without stride, or in phases of one step, at one step."""
+    """Return the places of all phases; those without stride, or in phases of one step, at one step."""
     offset, size = (np.concatenate([getattr(spans, name) for spans, _ in parts]) for name in ("offset", "size"))
     stride = np.concatenate([spans.stride if steps != 1 else 0 * spans.stride for spans, steps in parts])
     steps = np.concatenate([np.where(spans.stride != 0, steps, 1) for spans, steps in parts])
@@ -336,7 +336,7 @@ def _join_places(parts: Sequence[tuple[Spans, int]]) -> _Places:
 
 
 def _distinct(places: _Places) -> tuple[_Places, Ints]:
-    """Places, each once, and which of them is whose."""
+    """Return places, each once, and which of them is whose."""
     strides, kind = np.unique(places.stride, return_inverse=True)
     key = (places.offset * (places.size.max(initial=0) + 1) + places.size) * max(len(strides), 1) + kind
     _, first, whose = np.unique(key, return_index=True, return_inverse=True)

@@ -26,7 +26,7 @@ Term = tuple[int, int]
 
 
 def with_early_sums(graph: Graph, primal: int) -> Graph:
-    """The graph of an adjoint, with its sums of adjoints in such an order; what depends on arguments alone stays.
+    """Return the graph of an adjoint with its sums in that order; sums of arguments alone stay as they are.
 
     ``primal``: how many arguments are no adjoints.
     """
@@ -78,7 +78,7 @@ def _times(graph: Graph, ready: list[int]) -> list[int]:
 
 
 def _summed(graph: Graph, terms: Sequence[Term], ready: Sequence[int]) -> int:
-    """A node for the sum: as it was, or first two sums of the terms that come early, then those that come late."""
+    """Return a node for the sum: as it was, or two sums of the early terms first, then the late ones."""
     early = sorted(terms, key=lambda term: ready[term[1]])
     at = [ready[x] for _, x in early]
     best, found = _chained([ready[x] for _, x in terms]) - MIN_GAIN, 0
@@ -102,7 +102,7 @@ def _chained(at: Sequence[int]) -> int:
 
 
 def _added(graph: Graph, terms: Sequence[Term]) -> Term:
-    """The sum of terms one after the other."""
+    """Return the sum of terms one after the other."""
     sign, x = terms[0]
     for other, y in terms[1:]:
         if sign == other:
@@ -122,7 +122,7 @@ Mask = tuple[bool, ...]
 
 
 def adjoint_graph(function: Function, forward: Graph, inputs: Mask, outputs: Mask, tabled: bool = False) -> Graph:
-    """Graph with the arguments, then the adjoints of the marked results; it gives one result a marked argument.
+    """Return a graph of the arguments, then the adjoints of the marked results; one result for each marked argument.
 
     ``forward`` is the function's own graph. ``tabled``: all slopes are computed, then multiplied with the adjoints:
     more to compute, but of it only the products depend on the adjoints.

@@ -17,12 +17,12 @@ COMMUTE = frozenset({"add", "mul", "eq", "ne", "and", "or", "hypot"})
 
 
 def _reciprocal(x: float) -> float | None:
-    """1 / x of a power of two, with which a product is the division to the last bit; None for other numbers."""
+    """Return 1 / x of a power of two, whose product is the division to the last bit; None for other numbers."""
     return 1 / x if abs(frexp(x)[0]) == 0.5 and abs(frexp(x)[1]) < MAX_EXPONENT else None
 
 
 def ordered(op: str, operands: tuple[int, ...]) -> tuple[int, ...]:
-    """The operands as equal values have them, whichever way round they were written."""
+    """Return the operands as equal values have them, whichever way round they were written."""
     return tuple(sorted(operands)) if op in COMMUTE else operands
 
 
@@ -52,18 +52,18 @@ class Graph:
     numbers: dict[Node, int] = field(default_factory=dict)
 
     def put(self, node: Node) -> int:
-        """The number of a node, a new one if there is none like it."""
+        """Return the number of a node, a new one if there is none like it."""
         number = self.numbers.setdefault(node, len(self.nodes))
         if number == len(self.nodes):
             self.nodes.append(node)
         return number
 
     def constant(self, value: float) -> int:
-        """A constant."""
+        """Return a constant."""
         return self.put(Node("const", value=float(value).hex()))
 
     def add(self, op: str, *operands: int) -> int:
-        """A value, simplified where that is cheap; operands are cast to what the operation takes."""
+        """Return a value, simplified where that is cheap; operands are cast to what the operation takes."""
         if op in ("and", "or", "not"):
             operands = tuple(self.mask(x) for x in operands)
         elif op == "iez":
@@ -77,14 +77,14 @@ class Graph:
         return self.put(Node(op, operands)) if simpler is None else simpler
 
     def mask(self, x: int) -> int:
-        """The node as a mask: itself, what it was made from, or x != 0."""
+        """Return the node as a mask: itself, what it was made from, or x != 0."""
         node = self.nodes[x]
         if node.op in MASKS:
             return x
         return node.operands[0] if node.op == "one" else self.put(Node("isnt0", (x,)))
 
     def number(self, x: int) -> int:
-        """The node as a number: a mask becomes 0 or 1."""
+        """Return the node as a number: a mask becomes 0 or 1."""
         return self.put(Node("one", (x,))) if self.nodes[x].op in MASKS else x
 
     def _simpler(self, op: str, operands: tuple[int, ...]) -> int | None:
@@ -100,7 +100,7 @@ class Graph:
         return None
 
     def _select(self, a: Node, b: Node) -> int | None:
-        """(c ? x : 0) + (not c ? y : 0) is one select."""
+        """Simplify (c ? x : 0) + (not c ? y : 0) to one select."""
         if self.nodes[b.operands[0]] == Node("not", (a.operands[0],)):
             return self.add("select", a.operands[0], a.operands[1], b.operands[1])
         if self.nodes[a.operands[0]] == Node("not", (b.operands[0],)):
@@ -108,7 +108,7 @@ class Graph:
         return None
 
     def _share(self, p: int, total: Node) -> int | None:
-        """p / (p + q) of truth values, which the derivatives of fmin and fmax hold, without the division."""
+        """Simplify p / (p + q) of truth values, as in derivatives of fmin and fmax, without the division."""
         q = total.operands[1] if total.operands[0] == p else total.operands[0]
         if self.nodes[q].op != "one":
             return None
@@ -117,7 +117,7 @@ class Graph:
         return self.add("select", self.mask(p), share, other)
 
     def needed(self) -> list[int]:
-        """The nodes that results are made from, in order."""
+        """Return the nodes that results are made from, in order."""
         wanted = {x for result in self.results for x in result}
         for x in range(len(self.nodes) - 1, -1, -1):
             if x in wanted:

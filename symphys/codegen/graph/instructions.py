@@ -1,4 +1,4 @@
-"""From an SX Function's instructions to a graph.
+"""Graphs from the instructions of SX Functions.
 
 fmin and fmax let a NaN through, unlike those of C and casadi: a NaN must be seen, not clamped away. With a constant
 operand that costs nothing.
@@ -15,7 +15,7 @@ from symphys.codegen.program.program import Function
 
 
 def graph_of(function: Function) -> Graph:
-    """The graph of a function; KernelUnavailable if an operation has no counterpart."""
+    """Return the graph of a function; KernelUnavailable if an operation has no counterpart."""
     graph = Graph(tuple(function.numel_in(i) for i in range(function.n_in())))
     graph.results = [[-1] * function.numel_out(i) for i in range(function.n_out())]
     work: dict[int, int] = {}

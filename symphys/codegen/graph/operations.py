@@ -1,4 +1,4 @@
-"""What each operation of an SX Function is called here, and how it is written in C."""
+"""Names of the operations of SX Functions, and their forms in C."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ PLAIN = (
         "fabs": "fabs({0})",
     }
 )
-"""The same for single numbers in plain C, where a mask is 0 or 1."""
+"""C expressions of operands for single numbers in plain C, where a mask is 0 or 1."""
 SCALAR = (
     FORMS | {name: PLAIN[name] for name in ("not", "isnt0", "one", "iez", "select", *COMPARE)} | {"fabs": "fabs_({0})"}
 )
-"""The same for blocks of one lane, in either precision."""
+"""C expressions of operands for blocks of one lane, in either precision."""

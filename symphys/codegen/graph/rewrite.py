@@ -25,7 +25,7 @@ def rewritten(graph: Graph, into: Graph, change: Change) -> dict[int, int]:
 
 
 def with_reciprocals(graph: Graph, forward: Graph) -> Graph:
-    """Several divisions of adjoints by one value become one, and products with its reciprocal.
+    """Replace several divisions of adjoints by one value by products with its reciprocal.
 
     What the call itself computes, ``forward``, stays as it is, so that it need not be computed twice.
     """
@@ -45,7 +45,7 @@ def with_reciprocals(graph: Graph, forward: Graph) -> Graph:
 
 
 def with_fused_products(graph: Graph, adds: bool) -> Graph:
-    """Products that are only added or subtracted become one rounding with their sums: fma, fms and fnma.
+    """Fuse products that are only added or subtracted with their sums into one rounding: fma, fms and fnma.
 
     Nodes keep their numbers. ``adds``: results are added to what is there, so that products among them are fused there.
     """
@@ -69,13 +69,13 @@ def with_fused_products(graph: Graph, adds: bool) -> Graph:
 
 
 def fused_results(graph: Graph) -> set[int]:
-    """Products that nothing but results has, after ``with_fused_products``: where they are added it is one rounding."""
+    """Return products that only results have, after ``with_fused_products``: adding them is one rounding."""
     used = {y for x in graph.needed() for y in graph.nodes[x].operands}
     return {x for result in graph.results for x in result if graph.nodes[x].op == "mul" and x not in used}
 
 
 def _found_in(graph: Graph, other: Graph) -> dict[int, int]:
-    """The nodes that another graph has too, and their numbers there."""
+    """Return the nodes that another graph has too, and their numbers there."""
     found: dict[int, int] = {}
     for x, node in enumerate(graph.nodes):
         if all(y in found for y in node.operands):

@@ -24,16 +24,16 @@ class Place:
     stride: int = 0
 
     def words(self, steps: int) -> NDArray[np.int64]:
-        """(steps, size) or, without stride, (1, size): the words that it covers, a row for each step."""
+        """Return the words that it covers (steps, size), a row for each step; (1, size) without stride."""
         count = steps if self.stride else 1
         return self.offset + self.stride * np.arange(count)[:, None] + np.arange(self.size)
 
     def still(self) -> Place:
-        """The place at step 0, for calls outside the body."""
+        """Return the place at step 0, for calls outside the body."""
         return Place(self.offset, self.size)
 
     def later(self, steps: int = 1) -> Place:
-        """The place that many steps later: with a stride, what the next step finds under its own number."""
+        """Return the place that many steps later: with a stride, what the next step finds under its own number."""
         return Place(self.offset + steps * self.stride, self.size, self.stride)
 
 
@@ -63,7 +63,7 @@ class FunctionCall:
 
 @dataclass(frozen=True)
 class AdjointDiscount:
-    """What adjoints may lose on their way back through time.
+    """The discount of adjoints on their way back through time.
 
     Attributes:
         state: of a step, with a stride: its adjoint is shortened when the adjoint of the step before begins.

@@ -12,13 +12,13 @@ from symphys.types import Array
 
 
 def interpret(program: Program, z: ArrayLike, parameters: ArrayLike = ()) -> dict[str, Array]:
-    """The outputs of one rollout."""
+    """Return the outputs of one rollout."""
     memory = remember(program, z, parameters)
     return {name: at(memory, place, 0).copy() for name, place in program.outputs.items()}
 
 
 def remember(program: Program, z: ArrayLike, parameters: ArrayLike = ()) -> Array:
-    """(size,) the memory after one rollout: trajectories lie in it."""
+    """Return the memory (size,) after one rollout, with all trajectories."""
     memory = np.full(program.size, np.nan)
     for place in program.zeroed:
         at(memory, place, 0)[:] = 0
@@ -32,7 +32,7 @@ def remember(program: Program, z: ArrayLike, parameters: ArrayLike = ()) -> Arra
 
 
 def at(memory: Array, place: Place, k: int) -> Array:
-    """A view of the words of a place at step k."""
+    """Return a view of the words of a place at step k."""
     start = place.offset + k * place.stride
     return memory[start : start + place.size]
 

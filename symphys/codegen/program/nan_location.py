@@ -1,4 +1,4 @@
-"""Where a rollout first gave a value that is not finite."""
+"""Location of the first value of a rollout that is not finite."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _stretches(program: Program) -> Iterator[tuple[str, int, Sequence[FunctionCa
 
 
 def _culprit(phase: str, k: int, calls: Sequence[FunctionCall], lane: NDArray[np.floating]) -> Bad | None:
-    """The first call with such a result; calls that add are asked for what they add."""
+    """Return the first call with such a result; calls that add are asked for what they add."""
     for i, call in enumerate(calls):
         for r, place in enumerate(call.outputs):
             word = _not_finite(lane, place, k)

@@ -45,7 +45,7 @@ class PhaseCalls:
         return len(self.calls)
 
     def by_function(self) -> Iterator[tuple[int, Ints]]:
-        """The number of each function, and its calls in order."""
+        """Yield the number of each function, and its calls in order."""
         yield from enumerate(grouped(self.number, len(self.functions)))
 
 
@@ -57,7 +57,7 @@ def grouped(numbers: Ints, count: int) -> list[Ints]:
 
 
 def rows_of(spans: Spans, calls: Ints) -> Ints:
-    """(calls, places): where the places of calls of one function lie among those of all."""
+    """Return the positions (calls, places) of the places of calls of one function among those of all."""
     if not len(calls):
         return np.zeros((0, 0), np.int64)
     count = int(spans.starts[calls[0] + 1] - spans.starts[calls[0]])

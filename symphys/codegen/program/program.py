@@ -68,16 +68,16 @@ class Program:
 
     @property
     def calls(self) -> tuple[FunctionCall, ...]:
-        """All calls, each once."""
+        """Return all calls, each once."""
         return (*self.prologue, *self.body, *self.epilogue)
 
     @cached_property
     def phases(self) -> tuple[PhaseCalls, PhaseCalls, PhaseCalls]:
-        """Prologue, body and epilogue as arrays."""
+        """Return prologue, body and epilogue as arrays."""
         return PhaseCalls(self.prologue), PhaseCalls(self.body), PhaseCalls(self.epilogue)
 
     def scratch(self) -> NDArray[np.bool_]:
-        """(size,) which words hold for one step of the body only."""
+        """Return flags (size,) of the words that hold for one step of the body only."""
         flags, body = np.zeros(self.size, dtype=bool), self.phases[1]
         written = (body.outputs.stride == 0) & ~body.accumulate[body.outputs.call]
         flags[stretches(body.outputs.offset[written], body.outputs.size[written])] = True
@@ -100,13 +100,13 @@ class MemoryLayout:
         self.size = 0
 
     def take(self, size: int) -> Place:
-        """Words for a vector."""
+        """Take words for a vector."""
         place = Place(self.size, size)
         self.size += size
         return place
 
     def series(self, size: int, count: int) -> Place:
-        """Words for ``count`` vectors one after the other, with the stride that leads from each to the next."""
+        """Take words for ``count`` vectors in a row, with the stride from each to the next."""
         place = Place(self.size, size, size)
         self.size += size * count
         return place
@@ -146,7 +146,7 @@ class Verification:
             raise ProgramError(f"{who}: {span(words)} lie outside the memory of {self.program.size} words")
 
     def phases(self) -> Iterator[_Phase]:
-        """Prologue, body and epilogue."""
+        """Yield prologue, body and epilogue."""
         program = self.program
         start, length = len(program.prologue), len(program.body)
         prologue, body, epilogue = program.phases
@@ -196,7 +196,7 @@ class Verification:
         return not np.any(written >= when)  # NEVER is later than all
 
     def cover(self, who: str, place: Place, period: int) -> Ints:
-        """The words of a place, all inside the memory."""
+        """Return the words of a place, all inside the memory."""
         words = (place if period else place.still()).words(self.program.steps)
         self.inside(who, words)
         return words
@@ -293,11 +293,11 @@ class _Phase:
             _signature(self.who(k), self.calls[k])
 
     def who(self, k: int) -> str:
-        """A call for a message."""
+        """Return the name of a call for a message."""
         return f"{self.name} call {k} ({self.calls[k].function.name()})"
 
     def runs(self) -> Iterator[tuple[int, int]]:
-        """(first, after the last) of calls that all write, or one that adds."""
+        """Yield (first, after the last) of calls that all write, or of one that adds."""
         first = 0
         for k in [*np.flatnonzero(self.phase.accumulate).tolist(), len(self.calls)]:
             yield from ((start, min(start + CHUNK, k)) for start in range(first, k, CHUNK))
@@ -331,5 +331,5 @@ def _signature(who: str, call: FunctionCall) -> None:
 
 
 def span(words: Ints) -> str:
-    """Words for a message."""
+    """Return the text of words for a message."""
     return f"words {words.min()} to {words.max()}" if words.size else "no words"

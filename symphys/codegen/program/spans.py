@@ -47,7 +47,7 @@ class Spans:
         return Spans(self.starts[first : last + 1] - begin, *rows)
 
     def words(self, steps: int = 1) -> tuple[Ints, Ints, Ints]:
-        """The words that they cover, of each the call and the step; places with a stride at all steps."""
+        """Return the words that they cover, of each the call and the step; places with a stride at all steps."""
         count = np.where(self.stride != 0, steps, 1)
         step = stretches(np.zeros(len(count), np.int64), count)
         offset = np.repeat(self.offset, count) + step * np.repeat(self.stride, count)
@@ -56,7 +56,7 @@ class Spans:
 
 
 def stretches(first: Ints, count: Ints) -> Ints:
-    """``count`` numbers that follow one another from each ``first``, side by side."""
+    """Return ``count`` consecutive numbers from each ``first``, side by side."""
     ends = np.cumsum(count)
     total = int(ends[-1]) if len(ends) else 0
     return np.repeat(first - ends + count, count) + np.arange(total)

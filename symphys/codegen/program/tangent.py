@@ -24,12 +24,12 @@ Mask = tuple[bool, ...]
 
 
 def tangent_name(output: str) -> str:
-    """The output that holds the derivatives of another: (size * directions,), all directions of a number together."""
+    """Return the output with the derivatives of another (size * directions,), all directions of a number together."""
     return f"{output}.{TANGENT}"
 
 
 def tangent_program(program: Program, directions: int, outputs: Sequence[str]) -> Program:
-    """A program with the same outputs, and with derivatives of some of them along given directions.
+    """Return a program with the same outputs, and with derivatives of some of them along given directions.
 
     Its parameters are those of the program, and after them the directions (size of z * directions,): how z changes
     along each of them, all directions of a number together.
@@ -92,7 +92,7 @@ class _TangentWriter:
         return Place(self.program.size + d * place.offset, d * place.size, d * place.stride)
 
     def _call(self, reach: CallActivity) -> FunctionCall:
-        """The call with the derivatives of what is active."""
+        """Return the call with the derivatives of what is active."""
         call = reach.call
         inputs, outputs = self.activity.marks(reach.inputs), self.activity.marks(reach.outputs)
         if not any(outputs) or (call.accumulate and not any(inputs)):
@@ -110,7 +110,7 @@ class _TangentWriter:
         return FunctionCall(self._made[key], (*call.inputs, *seeds), (*call.outputs, *found), call.accumulate)
 
     def _zeroed(self) -> list[Place]:
-        """Derivatives that are read or added to, and that no call writes."""
+        """Return derivatives that are read or added to, and that no call writes."""
         return [self.tangent(Place(first, count)) for first, count in _runs(self.read & ~self.carried)]
 
 
@@ -132,7 +132,7 @@ def with_derivatives(function: Function, inputs: Mask, outputs: Mask, directions
 
 
 def _copied(source: Place, target: Place) -> list[FunctionCall]:
-    """Calls that copy, most of them of the same function: one for all words would be as long as they are."""
+    """Return calls that copy, most of them of the same function: one for all words would be as long as they are."""
     calls = []
     for first in range(0, source.size, COPY_SIZE):
         x = ca.SX.sym("x", min(COPY_SIZE, source.size - first))
@@ -142,6 +142,6 @@ def _copied(source: Place, target: Place) -> list[FunctionCall]:
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First word and length of each run of words that are marked."""
+    """Return first word and length of each run of words that are marked."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return [(int(a), int(b - a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

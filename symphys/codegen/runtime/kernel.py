@@ -89,7 +89,7 @@ class Fixed:
 
     @property
     def addresses(self) -> tuple[int, int, int, int]:
-        """The addresses of the function, the program, the batch and the memory."""
+        """Return the addresses of the function, the program, the batch and the memory."""
         function, data = self.loaded.addresses
         return function, data, ctypes.addressof(self.batch), int(self.memory.ctypes.data)
 
@@ -169,7 +169,7 @@ class Kernel(ABC):
 
     @property
     def chosen(self) -> str:
-        """Findings since the kernel was made, in a line, or empty."""
+        """Return findings since the kernel was made, in a line, or empty."""
         return self.doubt
 
     def jacobian(self, z: ArrayLike, name: str, parameters: ArrayLike = ()) -> Array:
@@ -230,7 +230,7 @@ class ProcessorKernel(Kernel):
 
     @property
     def chosen(self) -> str:
-        """Decisions since the kernel was made, in a line, or empty."""
+        """Return decisions since the kernel was made, in a line, or empty."""
         return "; ".join(filter(None, (self.widths.note, self.doubt)))
 
     def fixed(self, seed: ArrayLike = ()) -> Fixed:

@@ -90,7 +90,7 @@ class LinkedCodes:
 
     @property
     def pointer(self) -> Any:
-        """Pointer to the address of each function."""
+        """Return the pointer to the address of each function."""
         return self._addresses.ctypes.data_as(ctypes.c_void_p)
 
 
@@ -141,7 +141,7 @@ class Loaded:
 
     @property
     def words(self) -> int:
-        """Words of memory of a lane: values, tape and adjoints."""
+        """Return the words of memory of a lane: values, tape and adjoints."""
         return int(2 * self.data.size + self.data.tape)
 
     def _list(self, count: int, words: Any) -> List:
@@ -150,7 +150,7 @@ class Loaded:
 
     @property
     def addresses(self) -> tuple[int, int]:
-        """Addresses of the driver's ``evaluate`` and of its program."""
+        """Return the addresses of the driver's ``evaluate`` and of its program."""
         return ctypes.cast(self._evaluate, ctypes.c_void_p).value or 0, ctypes.addressof(self.data)
 
     def prepare(self, memory: Memory) -> None:

@@ -95,12 +95,12 @@ class Widths:
 
     @property
     def loaded(self) -> dict[int, LoadedWidth]:
-        """The loaded libraries, by lanes."""
+        """Return the loaded libraries, by lanes."""
         return dict(self._widths)
 
     @property
     def note(self) -> str:
-        """A message for the user on the library that was compiled meanwhile, or empty."""
+        """Return a message for the user on the library that was compiled meanwhile, or empty."""
         return self._note
 
     def compile(self, parts: Sequence[SourceFile], texts: str, cache: Cache, load: Callable[[Path], Loaded]) -> None:

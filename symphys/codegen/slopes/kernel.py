@@ -34,7 +34,7 @@ SHARED = "#define ALL(x) ((R)(x) - (V){0})\n"
 ITEM_BYTES = 40
 """Bytes of what is done for a block of rows: the driver's ``item``."""
 PARTS_PER_THREAD = 4
-"""Of a batch for each thread; see ``RolloutBatch``."""
+"""Parts of a batch for each thread; see ``RolloutBatch``."""
 
 
 class _Block(ctypes.Structure):
@@ -104,7 +104,7 @@ class SlopeKernel:
         return (found[a:b] for (a, b), wait in zip(runs, waits, strict=True) if wait() is None)
 
     def _arguments(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None) -> tuple[Array, Array, Array]:
-        """Both checked, and where the Jacobians go."""
+        """Check both; return them and the array of the Jacobians."""
         z, given = (np.ascontiguousarray(each, float) for each in (Z, parameters))
         self._check("Z", z, (2,), self.program.z.size)
         self._check("parameters", given, (1, 2), self.program.parameters.size)
@@ -215,7 +215,7 @@ def _kernel(
 
 
 def _sources(planned: SlopePlan, lanes: int) -> list[SourceFile]:
-    """The C files. Values have no fused products, so that they are casadi's to the bit."""
+    """Return the C files. Values have no fused products, so that they are casadi's to the bit."""
     head = f"#define LANES {lanes}\n#define SINGLE 0\n{resource('vector.h')}{SHARED}"
     texts = [write(f"f{number}", graph, form) for number, (graph, form) in enumerate(planned.functions)]
     found = []

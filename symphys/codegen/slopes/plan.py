@@ -14,24 +14,147 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
+from typing import Literal
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen.emit.alternatives import ALWAYS, NONE, entries_of, of_call, word_of
+from symphys.codegen.emit.alternatives import ALWAYS, NONE, Alternatives, Span, entries_of, of_adjoint, of_call, word_of
 from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.pieces import Form
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.graph.activity import Activity, CallActivity
+from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
+from symphys.codegen.graph.rewrite import Taped
 from symphys.codegen.program.program import Function, FunctionCall, Place, Program
-from symphys.codegen.slopes.pulls import Pull, Pulls, sparsity
 from symphys.types import Bools, Ints
 
 MAX_MERGED_CALLS = 4
 MIN_INSTRUCTIONS = 400
 """Instructions of a function below which its calls are left as they are."""
+TABLE_COST = 1.5
+"""Operations of products with slopes on the tape that take as long as one of other adjoints, which store more."""
+ALWAYS_TRIED = 100
+"""Slopes of a call: so many are tried."""
+COUNT_CORRECTION = 0.95
+"""Correction of the operations counted for a slope: products with 1 are none. Measured in large calls: 0.99."""
+MAX_SLOPES = 6000
+"""Slopes of a call beyond which it is not asked whether a table of them is less."""
+
+
+@dataclass
+class Pull:
+    """The adjoint of a call with respect to the marked arguments and results.
+
+    Attributes:
+        reach: the call.
+        graph: its adjoint.
+        inputs, outputs: the marks.
+        taped: its functions with a tape; None: it needs none.
+        tape: where that lies.
+        alternatives: when it may be left out.
+    """
+
+    reach: CallActivity
+    graph: Graph
+    inputs: Mask
+    outputs: Mask
+    taped: Taped | None
+    tape: Place
+    alternatives: Alternatives = ALWAYS
+
+    def marked(self, side: Literal["inputs", "outputs"]) -> list[Place]:
+        """Return the places whose adjoints it writes, or reads and zeroes."""
+        places, marks = getattr(self.reach.call, side), getattr(self, side)
+        return [place for place, on in zip(places, marks, strict=True) if on and place.size]
+
+    @property
+    def work(self) -> int:
+        """Return operations of a block."""
+        return _operations(self.graph, self.taped)
+
+
+class Pulls:
+    """Adjoints of the calls of a program, each with its tape after that of the one before.
+
+    Attributes:
+        end: words of the program and of the tapes.
+    """
+
+    def __init__(self, activity: Activity, functions: DistinctFunctions, size: int) -> None:
+        """Start without pulls for a program of ``size`` words."""
+        self.end = size
+        self._activity, self._functions = activity, functions
+        self._known = dict[tuple[int, Mask, Mask], tuple[Graph, Taped | None]]()
+
+    def of(self, reach: CallActivity, left: bool) -> Pull | None:
+        """Return the adjoint of a call; None if nothing that matters goes through it. ``left``: it may be left out."""
+        inputs, outputs = self._activity.marks(reach.inputs), self._activity.marks(reach.outputs)
+        if not any(inputs) or not any(outputs):
+            return None
+        key = id(self._functions.forward(reach.call.function)), inputs, outputs
+        if key not in self._known:
+            self._known[key] = _cheaper(reach.call.function, inputs, outputs, self._functions)
+        graph, taped = self._known[key]
+        found = Pull(reach, graph, inputs, outputs, taped, Place(self.end, taped.size if taped else 0))
+        self.end += found.tape.size
+        if left:
+            results, arguments = (
+                [Span(place.offset, place.stride, place.size) for place in found.marked(side)]
+                for side in ("outputs", "inputs")
+            )
+            found.alternatives = of_adjoint(reach.call, results, arguments)
+        return found
+
+
+def sparsity(graph: Graph) -> NDArray[np.float32]:
+    """Return the matrix (words of all results, words of all arguments): 1 where one depends on the other."""
+    starts = np.cumsum([0, *graph.sizes]).tolist()
+    bits: list[int] = []
+    for node in graph.nodes:
+        own = 1 << (starts[node.at[0]] + node.at[1]) if node.op == "input" else 0
+        for x in node.operands:
+            own |= bits[x]
+        bits.append(own)
+    rows = [bits[x].to_bytes(starts[-1] // 8 + 1, "little") for result in graph.results for x in result]
+    flags = np.frombuffer(b"".join(rows), np.uint8).reshape(len(rows), -1)
+    return np.unpackbits(flags, axis=1, count=starts[-1], bitorder="little").astype(np.float32)
+
+
+def _operations(graph: Graph, taped: Taped | None) -> int:
+    """Write the adjoint of a call for a block of rows."""
+    found = taped.adjoint if taped else graph
+    return sum(found.nodes[x].op not in ("input", "const") for x in found.needed())
+
+
+def _cheaper(
+    function: Function, inputs: Mask, outputs: Mask, functions: DistinctFunctions
+) -> tuple[Graph, Taped | None]:
+    """Return the cheaper adjoint for a block of rows: the function's own, or products with a table of its slopes."""
+    forward = functions.forward(function)
+    graph = functions.adjoint(function, inputs, outputs)
+    taped = functions.taped(forward, graph)
+    most, slopes = TABLE_COST * _operations(graph, taped), sparsity(forward)
+    if slopes.sum() > MAX_SLOPES or _products(forward, slopes, inputs, outputs) > most:
+        return graph, taped
+    table = functions.adjoint(function, inputs, outputs, tabled=True)
+    other = functions.taped(forward, table)
+    return (table, other) if _operations(table, other) < most else (graph, taped)
+
+
+def _products(forward: Graph, slopes: NDArray[np.float32], inputs: Mask, outputs: Mask) -> float:
+    """Return operations of products with a table of that many slopes, which takes long to make.
+
+    0 where it is soon made.
+    """
+    by = np.repeat(inputs, forward.sizes)
+    of = np.repeat(outputs, [len(result) for result in forward.results])
+    counts = slopes[of][:, by].sum(axis=0)
+    return float(COUNT_CORRECTION * (counts + np.maximum(counts - 1, 0)).sum()) if counts.sum() > ALWAYS_TRIED else 0.0
+
+
 Key = tuple[int, int]
 """Offset and size of a place."""
 Guards = tuple[int, int]
@@ -39,7 +162,7 @@ Guards = tuple[int, int]
 
 
 class PointPlaces:
-    """Where the values of one point lie that adjoints read: in the order in which they read them."""
+    """Places of the values of one point that adjoints read, in the order in which they read them."""
 
     def __init__(self) -> None:
         """Start with no place read."""
@@ -47,7 +170,7 @@ class PointPlaces:
         self.size = 0
 
     def of(self, place: Place, guards: Guards) -> int:
-        """The first word of a place, which is read by an adjoint with these guards."""
+        """Return the first word of a place, which is read by an adjoint with these guards."""
         key = place.offset, place.size
         at, before = self._found.get(key, (self.size, guards))
         if key not in self._found:
@@ -56,7 +179,7 @@ class PointPlaces:
         return at
 
     def read(self) -> list[tuple[int, int, int, int]]:
-        """(first, count, section, guard) of what is read; it is not where one of these words is 0."""
+        """Return (first, count, section, guard) of what is read, except where section or guard is 0."""
         return [(*key, *guards) for key, (_, guards) in self._found.items()]
 
 
@@ -78,7 +201,7 @@ class Cell:
 
 
 class AdjointPlaces:
-    """Where adjoints lie: those that are not needed at the same time share words, so that all stay in fast memory.
+    """Places of adjoints: those of disjoint lifetimes share words, so that all stay in fast memory.
 
     A result that calls read as a whole lives from the adjoint of its last reader to that of its writer, which leaves it
     zeroed. All other words have places of their own.
@@ -89,7 +212,7 @@ class AdjointPlaces:
     """
 
     def __init__(self, program: Program, target: Place, backward: Sequence[Pull]) -> None:
-        """Hand out the words; ``backward`` in the order in which adjoints are computed."""
+        """Allocate the words; ``backward``: adjoints in the order in which they are computed."""
         read, written = dict[Key, list[int]](), dict[Key, int]()
         parts: Ints = np.zeros(program.size, np.int64)
         for i, pull in enumerate(backward):
@@ -133,7 +256,7 @@ class AdjointPlaces:
             self.cells[number].members.append(before)
 
     def _share(self, whole: dict[Key, Key]) -> None:
-        """Places for what lives for a while: from the first of its readers to its writer."""
+        """Allocate places of limited life: from the first reader to the writer."""
         alone = [(whole[key], key[1], key, NONE) for key in whole if key not in self._of_key]
         for number, cell in enumerate(self.cells):
             lives = [whole[key] for key in cell.members]
@@ -161,15 +284,15 @@ class AdjointPlaces:
         self._word[key[0] : sum(key)] = at + np.arange(key[1])
 
     def of(self, offset: int, size: int) -> int:
-        """The first word of a place."""
+        """Return the first word of a place."""
         return int(self._word[offset]) if size else 0
 
     def cell(self, offset: int, size: int) -> tuple[int, int]:
-        """The number of the cell of a place and in which of its two places it lies; -1: it has none."""
+        """Return the number of the cell of a place and in which of its two places it lies; -1: it has none."""
         return self._of_key.get((offset, size), (NONE, 0))
 
     def ranges(self, place: Place) -> list[tuple[int, int]]:
-        """(first, count) where the adjoint of a place may lie."""
+        """Return (first, count) of the places where the adjoint of a place may lie."""
         number, _ = self.cell(place.offset, place.size)
         if number == NONE:
             return [(self.of(place.offset, place.size), place.size)]
@@ -178,7 +301,7 @@ class AdjointPlaces:
 
 
 def merged(program: Program) -> list[FunctionCall]:
-    """The calls of a program of one step, in order."""
+    """Return the calls of a program of one step, in order."""
     calls, found = list(program.calls), list[FunctionCall]()
     reads = np.zeros(program.size, np.int64)
     for call in calls:
@@ -199,7 +322,7 @@ def merged(program: Program) -> list[FunctionCall]:
 def _together(
     calls: Sequence[FunctionCall], reads: NDArray[np.int64], known: dict[tuple[object, ...], Function]
 ) -> FunctionCall:
-    """One call that does all of these; ``reads``: by how many calls and outputs each word is read."""
+    """Return one call that does all of these; ``reads``: by how many calls and outputs each word is read."""
     inside = np.zeros_like(reads)
     for call in calls:
         _count(inside, call.inputs, 1)
@@ -280,7 +403,7 @@ class Adjoints:
 
 @dataclass(frozen=True)
 class SlopePlan:
-    """What the compiler and the driver need.
+    """Functions, entries and blocks of a Jacobian, for the compiler and the driver.
 
     Attributes:
         functions: the C functions, in the order of their numbers.
@@ -342,7 +465,7 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
 
 
 def _after_guards(calls: Sequence[FunctionCall]) -> int:
-    """Calls up to the last that computes a guard: they are not left out."""
+    """Return calls up to the last that computes a guard: they are not left out."""
     guards = {call.guard.offset for call in calls if call.guard is not None}
     computing = [k for k, call in enumerate(calls) if any(place.offset in guards for place in call.outputs)]
     return 1 + max(computing, default=NONE)
@@ -377,7 +500,7 @@ def table(rows: Sequence[Sequence[int]], columns: int) -> Ints:
 
 
 def _left(program: Program, pulls: Sequence[Pull]) -> list[Place]:
-    """Places that these adjoints write, and do not read and zero; without that of z."""
+    """Return places that these adjoints write, and do not read and zero; without that of z."""
     read = np.zeros(program.size, bool)
     read[program.z.offset : program.z.offset + program.z.size] = True
     for pull in pulls:
@@ -409,7 +532,7 @@ def _entry(pull: Pull, places: AdjointPlaces, values: PointPlaces, functions: Di
 def row_blocks(
     program: Program, target: Place, backward: Sequence[Pull], lanes: int, functions: DistinctFunctions
 ) -> list[tuple[list[int], Bools]]:
-    """Rows in blocks, and which of the adjoints each block takes: each row beside those with which it shares most."""
+    """Group rows into blocks, each row beside those with which it shares most adjoints; return those of each block."""
     taken = _taken(program, target, backward, functions)
     work = np.array([pull.work for pull in backward], float)
     left, blocks = list(range(target.size)), []
@@ -424,7 +547,7 @@ def row_blocks(
 
 
 def _taken(program: Program, target: Place, backward: Sequence[Pull], functions: DistinctFunctions) -> Bools:
-    """(rows, adjoints): which adjoints a seed on each word of the output reaches."""
+    """Return the matrix (rows, adjoints): which adjoints a seed on each word of the output reaches."""
     useful = np.zeros((target.size, program.size), np.float32)
     useful[:, target.offset : target.offset + target.size] = np.eye(target.size)
     found, known = np.zeros((target.size, len(backward)), bool), dict[int, NDArray[np.float32]]()

@@ -1,4 +1,4 @@
-"""From a program to a kernel: plan, source, key, then the cache or the compiler."""
+"""Builds the kernel of a program: plan, source, key, then the cache or the compiler."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class BlockWidth:
 
     @property
     def real(self) -> int:
-        """Bytes of a number."""
+        """Return the bytes of a number."""
         return 4 if self.single else 8
 
 

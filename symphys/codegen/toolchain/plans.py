@@ -33,17 +33,17 @@ class KeptProgram(Program):
 
     @property
     def prologue(self) -> tuple[FunctionCall, ...]:
-        """The calls before the first step."""
+        """Return the calls before the first step."""
         return self._whole().prologue
 
     @property
     def body(self) -> tuple[FunctionCall, ...]:
-        """The calls of a step."""
+        """Return the calls of a step."""
         return self._whole().body
 
     @property
     def epilogue(self) -> tuple[FunctionCall, ...]:
-        """The calls after the last step."""
+        """Return the calls after the last step."""
         return self._whole().epilogue
 
 

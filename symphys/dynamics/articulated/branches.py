@@ -26,7 +26,7 @@ from symphys.types import Expr
 
 @dataclass(frozen=True)
 class Branch:
-    """What hangs on one link that hangs on the root.
+    """A branch: the links below one child of the root.
 
     Attributes:
         links: among those of the tree.
@@ -44,7 +44,7 @@ class Branch:
 
 
 def branches_of(kinematic_tree: KinematicTree) -> tuple[Branch, ...]:
-    """The branches of a tree."""
+    """Return the branches of a tree."""
     place = {link.body: k for k, link in enumerate(kinematic_tree.links)}
     members: list[list[int]] = []
     branch_of: dict[int, list[int]] = {}
@@ -80,18 +80,18 @@ class Tree:
 
     @property
     def branches(self) -> tuple[Branch, ...]:
-        """Its branches."""
+        """Return the branches of the tree."""
         return branches_of(self.kinematic_tree)
 
     def axes(self, branch: Branch) -> MotionSubspaces:
-        """The motion subspaces of a branch and of the root."""
+        """Return the motion subspaces of a branch and of the root."""
         if self.given is None:
             return MotionSubspaces(branch.of(self.seen), self.seen[0])
         return MotionSubspaces(branch.of(self.seen), self.seen[0], branch.of(self.given), self.given[0])
 
     @property
     def impulses(self) -> Columns:
-        """The motion subspaces at the time of the impulses."""
+        """Return the motion subspaces at the time of the impulses."""
         return self.seen if self.given is None else self.given
 
 
@@ -114,7 +114,7 @@ class TreeRates:
 def axes_at(
     kinematic_tree: KinematicTree, joints: spatial.Joints, body_paths: Sequence[PredictedPath], t: Expr, origin: Expr
 ) -> Columns:
-    """The motion subspaces of all links at time t."""
+    """Return the motion subspaces of all links at time t."""
     place = {link.body: k for k, link in enumerate(kinematic_tree.links)}
     found = []
     for link, joint, body_path in zip(kinematic_tree.links, joints, body_paths, strict=True):
@@ -137,7 +137,7 @@ def tree_matrix(tree: Tree, inertias: Sequence[SpatialInertia]) -> TreeMatrix:
 def solve(
     tree: Tree, matrix: TreeMatrix, momenta: Sequence[SpatialVector], rates: Sequence[Expr | None] = ()
 ) -> TreeRates:
-    """The rates that momenta, or forces, of all bodies stand for; ``rates`` (count,) are those of rotors."""
+    """Return the rates that momenta, or forces, of all bodies stand for; ``rates`` (count,) are those of rotors."""
     given, found = tree.impulses, []
     rotors = tuple(
         None if rate is None else _rotor_momentum(armature, rate)

@@ -33,7 +33,7 @@ CORRECTION_STEPS = 2
 
 @dataclass(frozen=True)
 class JointCorrection:
-    """What joints did to a body's displacement, as momenta times a time: a displacement, inertia times a rotation.
+    """Change of a body's displacement by joints, as momenta times a time: a displacement, inertia times a rotation.
 
     Attributes:
         by_tree: the joints of its tree.
@@ -46,7 +46,7 @@ class JointCorrection:
 
 @dataclass(frozen=True)
 class Deviation:
-    """What a body's displacement has beside that along the coordinates.
+    """Deviation of a body's displacement from that along the coordinates.
 
     Attributes:
         made: as a momentum times a time, see ``JointCorrection``.
@@ -58,12 +58,12 @@ class Deviation:
 
 
 NO_DEVIATION = Deviation(Momentum(ca.SX.zeros(3), ca.SX.zeros(3)), SpatialVector(ca.SX(6, 1)))
-"""Of a frame."""
+"""The deviation of a frame, which has no mass."""
 
 
 @dataclass(frozen=True)
 class RotorCorrection:
-    """What joints did to the displacements of rotors: of each link (count,) [rad] or [m], None where there is none.
+    """Change of the displacements of rotors by joints: of each link (count,) [rad] or [m], None without a rotor.
 
     Attributes:
         by_tree: the joints of the tree.

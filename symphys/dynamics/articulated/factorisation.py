@@ -34,12 +34,12 @@ class Factorisation:
     pivots: Expr
 
     def matrix(self) -> Expr:
-        """The matrix (n, n) that was factored."""
+        """Return the matrix (n, n) that was factored."""
         unit = ca.SX.eye(self.pivots.size1())
         return ca.mtimes(unit + self.lower, ca.mtimes(ca.diag(1 / self.pivots), unit + self.upper.T))
 
     def solve(self, right: Mapping[int, Expr]) -> Sparse:
-        """The solution for a right hand side."""
+        """Return the solution for a right hand side."""
         reduced = dict(right)
         n = self.pivots.size1()
         for k in reversed(range(n)):
@@ -55,12 +55,12 @@ class Factorisation:
 
 
 def reciprocal(x: Expr) -> Expr:
-    """1 / x, so written that products with it stay products: casadi makes x / y of x times 1 / y."""
+    """Return 1 / x, written so that products with it stay products: casadi makes x / y of x times 1 / y."""
     return 2 / (2 * x)
 
 
 def factorise(rows: Sequence[Mapping[int, Expr]], symmetric: bool = False) -> Factorisation:
-    """The factors of a matrix by its rows; of a symmetric one those of one half serve both."""
+    """Return the factors of a matrix by its rows; of a symmetric one those of one half serve both."""
     left, n = [dict(row) for row in rows], len(rows)
     lower, upper, pivots = ca.SX(n, n), ca.SX(n, n), ca.SX(n, 1)
     for k in reversed(range(n)):

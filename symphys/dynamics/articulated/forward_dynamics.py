@@ -66,7 +66,7 @@ def consistent(
     momenta: Sequence[Momentum],
     rates: Sequence[Expr | None],
 ) -> tuple[Wrench, ...]:
-    """Velocity and angular velocity of each body: those that fit the joints and have the momenta along free motions.
+    """Return velocities and angular velocities that fit the joints and have the momenta along free motions.
 
     ``inertials``: mass and inertia of each body, 0 of a frame. ``rates``: of the joints with armature, whose rotors
     have momenta too.
@@ -127,7 +127,7 @@ def _at_place(screw: SpatialVector, position: Expr, origin: Expr) -> Wrench:
 
 
 def _biases(tree: Tree, joints: spatial.Joints, now: TreeMotion) -> list[SpatialVector]:
-    """(6,) rates of change of the bodies' spatial vectors while the coordinates' rates do not change."""
+    """Return the rates of change (6,) of the bodies' spatial vectors while the coordinates' rates do not change."""
     place = {link.body: k for k, link in enumerate(tree.kinematic_tree.links)}
     found: list[SpatialVector] = []
     for k, (link, joint) in enumerate(zip(tree.kinematic_tree.links, joints, strict=True)):
@@ -172,13 +172,13 @@ def _axis_moves_with_child(link: Link, joint: Joint, coordinate: int) -> bool:
 
 
 def _axis_rate(carrier: Expr, screw: Expr) -> Expr:
-    """(6,): how a spatial vector fixed in a body changes as the body moves."""
+    """Return how a spatial vector fixed in a body changes as the body moves (6,)."""
     w, v = carrier[:3], carrier[3:]
     return ca.vertcat(ca.cross(w, screw[:3]), ca.cross(w, screw[3:]) + ca.cross(v, screw[:3]))
 
 
 def _at(change: Expr, screw: Expr, place: Expr) -> Wrench:
-    """Acceleration of the centre of mass, at ``place``, and angular acceleration, from a spatial velocity's rate."""
+    """Return the accelerations of the centre of mass, at ``place``, from the rate of a spatial velocity."""
     velocity = spatial.at_place(screw, place)[0]
     return change[3:] + ca.cross(change[:3], place) + ca.cross(screw[:3], velocity), change[:3]
 
@@ -186,5 +186,5 @@ def _at(change: Expr, screw: Expr, place: Expr) -> Wrench:
 @traced
 @traced
 def world_inertia(inertia: Expr, turned: Expr) -> Expr:
-    """(3, 3), world frame."""
+    """Return the inertia (3, 3), world frame."""
     return in_world(inertia_matrix(inertia), turned)

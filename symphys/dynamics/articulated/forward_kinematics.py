@@ -1,4 +1,4 @@
-"""Where the bodies of a tree come to: from joint to joint, so that all joints fit whatever the coordinates are.
+"""Forward kinematics: final poses of a tree from joint to joint, so that all joints fit at any coordinates.
 
 Rotations are quaternions from the start of the substep to its end, world frame.
 """
@@ -21,7 +21,7 @@ from symphys.types import Expr
 
 @dataclass(frozen=True)
 class FinalPose:
-    """Where a body comes to: (3,) its centre of mass, (4,) how it has turned since the start."""
+    """The final pose of a body: its centre of mass (3,), and its rotation (4,) since the start."""
 
     position: Expr
     turn: Expr

@@ -67,7 +67,7 @@ def generalized_coordinates(
     middle: Expr,
     acting: Sequence[bool],
 ) -> GeneralizedCoordinates:
-    """The coordinates of a tree.
+    """Return the coordinates of a tree.
 
     Args:
         kinematic_tree: the tree.
@@ -124,7 +124,7 @@ def _momentum(screw: SpatialVector, body: BodyPlace) -> Momentum:
 def _body_at_mid_step(
     motion: PredictedMotion, free: Momentum, origin: Expr, middle: Expr
 ) -> tuple[BodyPlace, SpatialInertia, SpatialVector]:
-    """A body at mid-step, its inertia from velocities at mid-step to momenta at the start, and its free momentum.
+    """Return a body at mid-step, its inertia from velocities there to momenta at the start, and its free momentum.
 
     Of a frame only what acts on it counts.
     """
@@ -143,7 +143,7 @@ def _body_at_mid_step(
 
 @traced
 def mass_matrix(coordinates: GeneralizedCoordinates) -> Expr:
-    """The mass matrix (n, n) of a tree by its generalized velocities, in which root and branches are decoupled."""
+    """Return the mass matrix (n, n) of a tree by its generalized velocities; root and branches are decoupled."""
     places, parts = numbering(coordinates.tree), coordinates.matrix
     n = coordinates.tree.kinematic_tree.size
     found = ca.SX(n, n)
@@ -160,6 +160,6 @@ def _join_rates(numbering: Numbering, rates: TreeRates) -> Expr:
 @traced
 @traced
 def split_rates(numbering: Numbering, numbers: Expr) -> TreeRates:
-    """Generalized velocities of a tree, by its root and branches."""
+    """Return generalized velocities of a tree, by its root and branches."""
     r, *z = (numbers[list(each), 0] for each in numbering)
     return TreeRates(r, tuple(z))

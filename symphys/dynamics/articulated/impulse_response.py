@@ -1,4 +1,4 @@
-"""What impulses along the coordinates of a tree, and on its bodies, do to its generalized velocities."""
+"""Responses of a tree's generalized velocities to impulses along its coordinates and on its bodies."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from symphys.types import Expr
 Response = tuple[Expr, Expr]
 """The rate of a coordinate by the numbers (1, n), and what a unit impulse along it does to them (n,)."""
 Numbering = tuple[tuple[int, ...], ...]
-"""Which of the n numbers are those of the root, and of each branch."""
+"""The indices, among the n numbers, of the root's and of each branch's."""
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,15 @@ class BodyPlace:
 
 
 def numbering(tree: Tree) -> Numbering:
-    """The numbers are in the order of the coordinates."""
+    """Return the numbers of root and branches, which are in the order of the coordinates."""
     return tuple(tree.kinematic_tree.links[0].coordinates), *(branch.coordinates for branch in tree.branches)
 
 
 def scatter(places: Numbering, parts: Sequence[Expr], n: int | None = None) -> Expr:
-    """(n, k): rows of parts at their places among all numbers, zeros left out; n None: as many as there are places."""
+    """Return the rows of parts at their places among all numbers (n, k), zeros left out.
+
+    N None: as many as there are places.
+    """
     found = ca.SX(sum(map(len, places)) if n is None else n, parts[0].size2())
     for each, part in zip(places, parts, strict=True):
         for row, i in enumerate(each):
@@ -87,7 +90,10 @@ def _scatter_response(k: int, n: int, places: Numbering, follows: Expr, given: t
 def body_jacobians(
     tree: Tree, matrix: TreeMatrix, bodies: Sequence[tuple[Expr, BodyPlace] | None]
 ) -> tuple[BodyJacobian | None, ...]:
-    """The Jacobian of each link's body, from its place at the time of impulses (3,) and of velocities; None: none."""
+    """Return the Jacobian of each link's body, from its place at the time of impulses (3,) and of velocities.
+
+    None: none.
+    """
     found: list[BodyJacobian | None] = [None for _ in bodies]
     (root, *_), n, given = numbering(tree), tree.kinematic_tree.size, tree.impulses
     if bodies[0] is not None:
@@ -125,7 +131,7 @@ def _branch_jacobian(above: Parents, link: int, follows: Expr, axes: Columns, ro
 
 
 def _at_place(columns: Expr, place: Expr) -> Expr:
-    """(6, k) spatial vectors as velocity at a place above angular velocity."""
+    """Return spatial vectors (6, k) as velocity at a place above angular velocity."""
     return ca.vertcat(columns[3:, :] - ca.mtimes(cross_matrix(place), columns[:3, :]), columns[:3, :])
 
 
@@ -139,7 +145,7 @@ def _root_response(root: Factorisation, axes: Expr, place: Expr) -> Columns:
 def _branch_response(
     above: Parents, link: int, matrix: BranchMatrix, root: Factorisation, axes: Columns, root_axes: Expr, place: Expr
 ) -> Columns:
-    """(m, 6), (n, 6): of the numbers of the root and of the branch."""
+    """Return the responses (m, 6) of the root and (n, 6) of the branch."""
     impulses, own = _unit_impulses(place), _side_by_side(axes)
     path, n = paths(above, axes)[link], own.size2()
     z = [dense(matrix.block.solve({k: ca.dot(own[:, k], impulses[:, i]) for k in path}), n) for i in range(6)]
@@ -152,6 +158,6 @@ def _side_by_side(axes: Columns) -> Expr:
 
 
 def _unit_impulses(place: Expr) -> Expr:
-    """(6, 6): about the origin, of unit impulses at a place and of unit torque impulses."""
+    """Return the spatial momenta (6, 6) about the origin of unit impulses at a place and of unit torque impulses."""
     unit = ca.SX.eye(3)
     return ca.vertcat(ca.horzcat(cross_matrix(place), unit), ca.horzcat(unit, ca.SX(3, 3)))

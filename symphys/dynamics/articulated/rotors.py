@@ -20,7 +20,7 @@ from symphys.model.scalar import is_zero
 from symphys.types import Expr
 
 Rates = tuple[Expr | None, ...]
-"""Of each link (count,); None where no rotor turns with it."""
+"""Rates of the rotors of each link (count,); None without a rotor."""
 
 
 def has_rotor(joint: Joint | None) -> bool:
@@ -55,7 +55,7 @@ def _moving(motion: PredictedMotion) -> tuple[Expr, Expr, Expr]:
 
 @traced
 def _rate(turning: bool, axes: Expr, own: tuple[Expr, Expr, Expr], parent: tuple[Expr, Expr, Expr] | None) -> Expr:
-    """(count,): axes of one joint that turn are perpendicular to each other, and one that slides is alone."""
+    """Return the rates (count,) of a joint; its turning axes are perpendicular, and a sliding axis is single."""
     place, velocity, spin = own
     if parent is not None:
         velocity = velocity - parent[1] - ca.cross(parent[2], place - parent[0])

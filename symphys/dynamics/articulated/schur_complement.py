@@ -39,7 +39,7 @@ class MotionSubspaces:
 
     @property
     def impulses(self) -> tuple[Columns, Expr]:
-        """The motion subspaces at the time of the impulses, of the links and of the root."""
+        """Return the motion subspaces at the time of the impulses, of the links and of the root."""
         if self.given is None or self.root_given is None:
             return self.seen, self.root_seen
         return self.given, self.root_given
@@ -47,7 +47,7 @@ class MotionSubspaces:
 
 @dataclass(frozen=True)
 class BranchMatrix:
-    """What a branch of n coordinates does on a root of m.
+    """A branch of n coordinates as seen from a root of m.
 
     Attributes:
         block: its own mass matrix.
@@ -121,7 +121,7 @@ def branch_matrix(
 def root_matrix(
     inertia: SpatialInertia, axes: tuple[Expr, Expr | None], branches: tuple[Expr, ...], armature: Expr | None
 ) -> Factorisation:
-    """S, from the root's inertia, its motion subspaces for velocities and impulses, and the branches' shares.
+    """Return S, from the root's inertia, its motion subspaces for velocities and impulses, and the branches' shares.
 
     ``armature`` is added to the diagonal.
     """
@@ -143,7 +143,7 @@ def branch_load(
     momenta: Sequence[SpatialVector],
     rotors: tuple[Expr | None, ...],
 ) -> tuple[Expr, Expr]:
-    """(z (n,), what reaches the root (m,)) of momenta, or forces, of a branch's bodies and (count,) of its rotors."""
+    """Return z (n,) and the load on the root (m,) of momenta, or forces, of a branch's bodies and rotors."""
     total, base = summed_up(above, [momentum.parts for momentum in momenta])
     right, start = dict[int, Expr](), 0
     for columns, screw, rotor in zip(given, total, rotors, strict=True):
@@ -158,7 +158,7 @@ def branch_load(
 def root_rates(
     matrix: Factorisation, given: Expr, momentum: SpatialVector, branches: tuple[Expr, ...], rotor: Expr | None
 ) -> Expr:
-    """r (m,): of the root's own momentum, that of its rotor and what branches pass on."""
+    """Return r (m,) of the root's own momentum, of that of its rotor and of the loads of branches."""
     right = ca.mtimes(given.T, momentum.parts) + (0 if rotor is None else rotor)
     for each in branches:
         right += each
@@ -166,13 +166,13 @@ def root_rates(
 
 
 def solve_factored(matrix: Factorisation, right: Expr) -> Expr:
-    """(n,) for a right hand side (n,)."""
+    """Return the solution (n,) for a right hand side (n,)."""
     n = right.size1()
     return dense(matrix.solve({k: right[k] for k in range(n) if right.has_nz(k, 0)}), n)
 
 
 def branch_rates(matrix: BranchMatrix, z: Expr, r: Expr) -> Expr:
-    """(n,) of a branch's coordinates."""
+    """Return the rates (n,) of a branch's coordinates."""
     return z + ca.mtimes(matrix.follows, r)
 
 
@@ -186,7 +186,7 @@ def summed_up(above: Parents, parts: Sequence[Expr]) -> tuple[list[Expr], Expr]:
 
 
 def summed_down(above: Parents, axes: Columns, rates: Expr, root: Expr) -> list[Expr]:
-    """(6,) for each link of a branch: its spatial velocity, from the branch's rates and the root's spatial velocity."""
+    """Return the spatial velocity (6,) of each link of a branch, from the branch's rates and the root's velocity."""
     found: list[Expr] = []
     start = 0
     for parent, columns in zip(above, axes, strict=True):
@@ -197,12 +197,12 @@ def summed_down(above: Parents, axes: Columns, rates: Expr, root: Expr) -> list[
 
 
 def symmetric_copy(matrix: Expr) -> Expr:
-    """A symmetric matrix whose halves are the same expressions."""
+    """Return a symmetric matrix whose halves are the same expressions."""
     return ca.triu2symm(ca.triu(ca.densify(matrix)))
 
 
 def dense(entries: Mapping[int, Expr], n: int) -> Expr:
-    """(n,) of a sparse vector, zeros left out."""
+    """Return a sparse vector (n,), zeros left out."""
     found = ca.SX(n, 1)
     for k, value in entries.items():
         found[k] = value

@@ -25,7 +25,10 @@ Joints = Sequence[Joint | None]
 
 @traced
 def axes_of(joint: Joint | None, sign: int, body_paths: tuple[PredictedPath, ...], t: Expr, origin: Expr) -> Expr:
-    """(6, count): the motion subspace of a link at time t; ``body_paths`` of the link's body and of its parent's."""
+    """Return the motion subspace of a link at time t (6, count).
+
+    ``body_paths`` of the link's body and of its parent's.
+    """
     if joint is None:
         return floating(body_paths[0].centre().at(t) - origin)
     frames = joint_frames_on(joint, body_paths if sign > 0 else body_paths[::-1])
@@ -41,7 +44,7 @@ def floating(place: Expr) -> Expr:
 
 
 def joint_point(frames: JointFrames, t: Expr) -> Expr:
-    """(3,): midway between both frames; at the first one's for what slides."""
+    """Return the point (3,) midway between both frames; that of the first frame for a joint that slides."""
     first, second = (c + a for c, a in zip(frames.centres, frames.arms, strict=True))
     if frames.joint.kind.travels:
         return first.at(t)
@@ -49,7 +52,7 @@ def joint_point(frames: JointFrames, t: Expr) -> Expr:
 
 
 def inertia_of(mass: Expr, inertia: Expr, counted: Expr, seen: Expr) -> Expr:
-    """(6, 6): spatial momentum for a spatial velocity, the centre of mass at two places: of momenta, of velocities.
+    """Return the spatial inertia (6, 6), with the centre of mass at one place for momenta, at one for velocities.
 
     ``inertia``: (3, 3) about the centre of mass, world frame.
     """
@@ -59,10 +62,10 @@ def inertia_of(mass: Expr, inertia: Expr, counted: Expr, seen: Expr) -> Expr:
 
 
 def about_origin(place: Expr, linear: Expr, angular: Expr) -> Expr:
-    """(6,): a momentum or force about the origin, from that about ``place``."""
+    """Return a momentum or force about the origin (6,), from that about ``place``."""
     return ca.vertcat(angular + ca.cross(place, linear), linear)
 
 
 def at_place(screw: Expr, place: Expr) -> tuple[Expr, Expr]:
-    """Velocity of the body's point at ``place``, and angular velocity."""
+    """Return velocity of the body's point at ``place``, and angular velocity."""
     return screw[3:] + ca.cross(screw[:3], place), screw[:3]

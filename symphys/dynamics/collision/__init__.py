@@ -64,7 +64,7 @@ RULES: dict[tuple[type, type], Rule] = {
     (Capsule, Cylinder): capsule_cylinder,
     (Capsule, Ellipsoid): capsule_ellipsoid,
 }
-"""Which rule covers which surfaces; ``shapes.POINTS`` says how many points each returns."""
+"""The rule of each pair of surfaces; ``shapes.POINTS`` says how many points each returns."""
 
 
 SEPARATE_POINTS = frozenset({(Capsule, Plane), (Box, Plane), (Capsule, Capsule)})
@@ -72,7 +72,7 @@ SEPARATE_POINTS = frozenset({(Capsule, Plane), (Box, Plane), (Capsule, Capsule)}
 
 
 def collide(first: Surface, second: Surface, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """The contacts of two surfaces, carried along a and b, in this step: one for each point."""
+    """Return the contacts of two surfaces, carried along a and b, in this step: one for each point."""
     kinds = type(first), type(second)
     if kinds in SEPARATE_POINTS:
         return [_point(k, first, second, a, b) for k in range(points_of_kinds(*kinds))]

@@ -17,7 +17,7 @@ from symphys.types import Expr
 PARALLEL = 1e-6
 """Square of the sine of the angle below which edges count as parallel."""
 EDGE_MARGIN = 1e-6
-"""Of the boxes' size: how much farther apart than faces edges must be for a contact of edges."""
+"""Share of the boxes' size by which edges must be farther apart than faces for a contact of edges."""
 TINY_CHANGE = 1e-15
 """[m] a distance that changes less than this over the step does not change."""
 MAX_STEP_UP = 0.0015
@@ -67,25 +67,25 @@ class Face:
     half_v: Expr
 
     def point(self, x: Expr, y: Expr) -> Parabola:
-        """The path of the point at x, y [m] from its centre."""
+        """Return the path of the point at x, y [m] from its centre."""
         body_path: Parabola = self.centre + x * self.u + y * self.v
         return body_path
 
     def corners(self) -> list[Parabola]:
-        """The paths of its corners, in order around it."""
+        """Return the paths of its corners, in order around it."""
         signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
         return [self.point(su * self.half_u, sv * self.half_v) for su, sv in signs]
 
 
 def moving_box(shape: Box | Capsule, body_path: PredictedPath) -> MovingBox:
-    """A box, or the axis of a capsule as one without width, that is carried along a path."""
+    """Return a box, or the axis of a capsule as one without width, that is carried along a path."""
     halves = shape.half_sizes if isinstance(shape, Box) else (0.0, 0.0, shape.half_length)
     velocity = body_path.true_velocity_of(shape.centre)
     return MovingBox(body_path.path(shape.centre), axes(body_path, shape), halves, velocity, body_path.gravity)
 
 
 def nearest_face(box: MovingBox, direction: Expr, t: Expr) -> Face:
-    """The face whose outward normal is nearest to ``direction`` at time t."""
+    """Return the face whose outward normal is nearest to ``direction`` at time t."""
     along = [ca.dot(axis.at(t), direction) for axis in box.axes]
     first = ca.logic_and(ca.fabs(along[0]) >= ca.fabs(along[1]), ca.fabs(along[0]) >= ca.fabs(along[2]))
     second = ca.logic_and(ca.logic_not(first), ca.fabs(along[1]) >= ca.fabs(along[2]))
@@ -110,13 +110,13 @@ def nearest_face(box: MovingBox, direction: Expr, t: Expr) -> Face:
 
 
 def faces_and_edges(a: MovingBox, b: MovingBox) -> tuple[list[Parabola], list[Parabola]]:
-    """The directions along which two boxes can be apart: face normals of both, and edge across edge."""
+    """Return the directions along which two boxes can be apart: face normals of both, and edge across edge."""
     return [*a.axes, *b.axes], [one.cross(other) for one in a.axes for other in b.axes]
 
 
 @dataclass(frozen=True)
 class BoxOverlap:
-    """How two boxes come to overlap, along the direction along which they do so last.
+    """The overlap of two boxes along the direction in which it begins last.
 
     Attributes:
         direction: its path, from the second to the first.
@@ -175,7 +175,7 @@ def tolerances(a: MovingBox, b: MovingBox, directions: list[Parabola]) -> list[E
 
 
 def is_nearly_vertical(direction: Expr, gravity: Expr) -> Expr:
-    """1 if a direction (3,) is near the vertical, which there is only with gravity."""
+    """Return 1 if a direction (3,) is near the vertical, which there is only with gravity."""
     lean = ca.dot(direction, gravity)
     return lean * lean > MIN_VERTICAL_COSINE * MIN_VERTICAL_COSINE * ca.dot(direction, direction) * ca.dot(
         gravity, gravity
@@ -183,18 +183,18 @@ def is_nearly_vertical(direction: Expr, gravity: Expr) -> Expr:
 
 
 def shortest(halves: list[Expr]) -> Expr:
-    """The smallest half size that is not 0, as those of a line are."""
+    """Return the smallest half size that is not 0, as those of a line are."""
     wide = [ca.SX(half) for half in halves if not is_zero(half)]
     return ca.mmin(ca.vertcat(*wide))
 
 
 def overlaps_from(start: Expr, end: Expr) -> Expr:
-    """The share of the step after which a distance that changes linearly is negative; 0 if it is negative at once."""
+    """Return the share of the step after which a linear distance is negative; 0 if it is negative at once."""
     return ca.if_else(start > 0, crossed(start, end), 0)
 
 
 def crossed(start: Expr, end: Expr) -> Expr:
-    """The share of the step after which a distance that changes evenly is 0; 1 if it never is."""
+    """Return the share of the step after which a linear distance is 0; 1 if it never is."""
     crosses = ca.logic_and(start * end <= 0, ca.fabs(start - end) > TINY_CHANGE)
     return ca.if_else(crosses, start / ca.if_else(crosses, start - end, 1), 1)
 

@@ -36,12 +36,12 @@ MIN_PAIRS = 12
 """Pairs of surfaces from which on looking for those that are far costs less than it saves."""
 UNIT_VECTORS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 FACE_CORNERS = 4
-"""Of a face."""
+"""Corners of a face of a box."""
 
 
 @dataclass(frozen=True)
 class MotionBound:
-    """What the broad phase needs of a body.
+    """Bounds of a body's motion within a step, for the broad phase.
 
     Attributes:
         position, velocity: (3,) [m], [m/s].
@@ -59,26 +59,26 @@ class MotionBound:
     spin: Expr | None = None
 
     def swing_speed(self, arm: float) -> Expr:
-        """The speed that turning gives to a point that far from the centre of mass [m/s]."""
+        """Return the speed that turning gives to a point that far from the centre of mass [m/s]."""
         return 0 if self.spin is None else arm * self.spin
 
     def point(self, offset: Sequence[float]) -> Expr:
-        """(3,) [m], of a point in the body's frame."""
+        """Return the position (3,) [m] of a point of the body's frame."""
         return self.position if all(is_zero(c) for c in offset) else self.position + self.turned(offset)
 
     def turned(self, vector: Sequence[float]) -> Expr:
-        """(3,): a vector of the body's frame in the world's."""
+        """Return a vector of the body's frame in the world's (3,)."""
         assert self.rotation is not None
         return ca.mtimes(self.rotation, ca.vertcat(*vector))
 
     def axes(self, shape: SolidShape) -> list[Expr]:
-        """(3,) each: a shape's own axes."""
+        """Return a shape's own axes (3,) each."""
         return [self.turned(turned_by(shape.orientation, unit)) for unit in UNIT_VECTORS]
 
 
 @dataclass(frozen=True)
 class SweptBound:
-    """How far surfaces come towards each other within a step of ``dt`` [s]; ``fastest``: what may strike them [m/s]."""
+    """Bound of the approach of surfaces in a step of ``dt`` [s]; ``fastest``: speed of a body that may strike them."""
 
     dt: Expr
     fastest: Expr
@@ -151,7 +151,7 @@ def _arm(shape: Surface) -> float:
 
 
 def _on_plane(shape: Capsule | Box, plane: Plane, a: MotionBound, _: None) -> list[Expr]:
-    """Heights of a capsule's ends, or of a box's corners."""
+    """Return heights of a capsule's ends, or of a box's corners."""
     radius, points = (shape.radius, ends(shape)) if isinstance(shape, Capsule) else (shape.edge, corners(shape))
     normal = ca.vertcat(*plane.normal)
     return [ca.dot(normal, a.point(point)) - plane.offset - radius for point in points]
@@ -162,7 +162,7 @@ def _ball_on_plane(ball: Sphere, plane: Plane, a: MotionBound, _: None) -> list[
 
 
 def _capsules(first: Capsule, second: Capsule, a: MotionBound, b: MotionBound) -> list[Expr]:
-    """The ends of the first, of the second, and between: there what is nearest at all."""
+    """Return the ends of the first, of the second, and between: there what is nearest at all."""
     reach = first.radius + second.radius
     sides = [(first, a), (second, b)]
     found = []
@@ -200,7 +200,7 @@ def _distance_to_box(point: Expr, box: Box, b: MotionBound) -> Expr:
 
 
 def _capsule_and_box(capsule: Capsule, box: Box, a: MotionBound, b: MotionBound) -> list[Expr]:
-    """The round ends; then what is not measured by itself: how far they are apart along the faces of the box."""
+    """Return the round ends; then what is not measured by itself: how far they are apart along the faces of the box."""
     tips = [_distance_to_box(a.point(end), box, b) - capsule.radius for end in ends(capsule)]
     rod = [capsule.half_length * a.axes(capsule)[2]]
     least = ca.fmin(ca.mmin(ca.vertcat(*tips)), _box_separation(a, capsule, rod, b, box) - capsule.radius)
@@ -218,7 +218,7 @@ def _box_separation(a: MotionBound, shape: SolidShape, halves: Sequence[Expr], b
 
 
 def _boxes(first: Box, second: Box, a: MotionBound, b: MotionBound) -> list[Expr]:
-    """All points are as far as the boxes are along their faces."""
+    """Return for all points the distance of the boxes along their faces."""
     halves = [
         [h * axis for h, axis in zip(box.half_sizes, own.axes(box), strict=True)]
         for box, own in ((first, a), (second, b))
@@ -237,7 +237,7 @@ RULES: dict[tuple[type, type], Callable[..., list[Expr]]] = {
     (Capsule, Box): _capsule_and_box,
     (Box, Box): _boxes,
 }
-"""How far the points of two shapes are apart [m], in the order of the rule in ``collision.RULES``."""
+"""Distances of the points of two shapes [m], in the order of the rule in ``collision.RULES``."""
 
 
 def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
@@ -339,7 +339,7 @@ def _body_arm(body: Body) -> float:
 
 @traced
 def _max_speed(fastest: Expr, bound: MotionBound, arm: float) -> Expr:
-    """The greatest speed of a point of any body so far [m/s]."""
+    """Return the greatest speed of a point of any body so far [m/s]."""
     return ca.fmax(fastest, bound.speed + bound.swing_speed(arm))
 
 

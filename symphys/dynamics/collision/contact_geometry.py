@@ -12,7 +12,7 @@ from symphys.types import Expr
 
 @dataclass(frozen=True)
 class Frame:
-    """Where two surfaces meet at one instant, world frame.
+    """The contact frame of two surfaces at one instant, world frame.
 
     Attributes:
         normal: (3,) unit vector from the second surface to the first.
@@ -35,7 +35,7 @@ class Displacement:
     angular: Expr
 
     def moved(self, point: Expr, arm: Expr) -> Expr:
-        """(3,): a point of the body after it, to first order in the rotation."""
+        """Return a point of the body after it (3,), to first order in the rotation."""
         return point + self.linear + ca.cross(self.angular, arm)
 
 
@@ -44,14 +44,14 @@ ZERO_DISPLACEMENT = Displacement(ca.SX.zeros(3), ca.SX.zeros(3))
 
 
 class ContactGeometry(Protocol):
-    """How a point of two surfaces lies at any time of the step. Implementations are frozen dataclasses."""
+    """The geometry of a point of two surfaces at any time of the step. Implementations are frozen dataclasses."""
 
     def frame(self, t: Expr) -> Frame:
-        """The frame at time t in the step."""
+        """Return the frame at time t in the step."""
         ...
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
-        """The gap [m] at the end of the step, given both sides' displacements."""
+        """Return the gap [m] at the end of the step, given both sides' displacements."""
         ...
 
 
@@ -93,5 +93,5 @@ class FlippedGeometry:
 
 
 def flipped(contact: Contact) -> Contact:
-    """The contact with its sides exchanged."""
+    """Return the contact with its sides exchanged."""
     return replace(contact, geometry=FlippedGeometry(contact.geometry))

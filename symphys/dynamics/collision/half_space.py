@@ -44,7 +44,7 @@ class OnPlane:
 
 
 def ball_on_plane(body_path: PredictedPath, offset: Sequence[Any], radius: Expr, plane: Plane) -> Contact:
-    """The contact of a ball at body-frame ``offset`` with ``plane``."""
+    """Return the contact of a ball at body-frame ``offset`` with ``plane``."""
     normal, path, dt = ca.vertcat(*plane.normal), body_path.path(offset), body_path.dt
     gap = ca.dot(normal, path.start) - plane.offset - radius
     rate = ca.dot(normal, path.velocity)
@@ -61,15 +61,15 @@ def ball_on_plane(body_path: PredictedPath, offset: Sequence[Any], radius: Expr,
 
 
 def sphere_plane(sphere: Sphere, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """One point."""
+    """Return the one point of contact."""
     return [ball_on_plane(a, sphere.centre, sphere.radius, plane)]
 
 
 def capsule_plane(capsule: Capsule, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """Two points: the round ends."""
+    """Return two points: the round ends."""
     return [ball_on_plane(a, end, capsule.radius, plane) for end in ends(capsule)]
 
 
 def box_plane(box: Box, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """Eight points: the corners, balls where edges are round."""
+    """Return eight points: the corners, balls where edges are round."""
     return [ball_on_plane(a, corner, box.edge, plane) for corner in corners(box)]

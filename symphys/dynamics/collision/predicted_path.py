@@ -22,29 +22,29 @@ class Parabola:
     acceleration: Expr
 
     def at(self, t: Expr) -> Expr:
-        """(3,): the vector at time t."""
+        """Return the vector at time t (3,)."""
         return _parabola(self.start, self.velocity, self.acceleration, t)
 
     def velocity_at(self, t: Expr) -> Expr:
-        """(3,): its rate at time t."""
+        """Return its rate at time t (3,)."""
         return self.velocity + t * self.acceleration
 
     def __add__(self, other: Parabola) -> Parabola:
-        """The path of the sum."""
+        """Return the path of the sum."""
         return Parabola(
             self.start + other.start, self.velocity + other.velocity, self.acceleration + other.acceleration
         )
 
     def __sub__(self, other: Parabola) -> Parabola:
-        """The path of the difference."""
+        """Return the path of the difference."""
         return self + -1 * other
 
     def __rmul__(self, factor: Expr) -> Parabola:
-        """The path of a multiple."""
+        """Return the path of a multiple."""
         return Parabola(factor * self.start, factor * self.velocity, factor * self.acceleration)
 
     def cross(self, other: Parabola) -> Parabola:
-        """The path of the cross product, to second order."""
+        """Return the path of the cross product, to second order."""
         bend = ca.cross(self.acceleration, other.start) + ca.cross(self.start, other.acceleration)
         return Parabola(
             ca.cross(self.start, other.start),
@@ -63,7 +63,7 @@ ZERO_PATH = Parabola(ca.SX.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3))
 
 
 def chosen(condition: Expr, one: Parabola, other: Parabola) -> Parabola:
-    """The first path where the condition is 1, else the other."""
+    """Return the first path where the condition is 1, else the other."""
     return Parabola(
         ca.if_else(condition, one.start, other.start),
         ca.if_else(condition, one.velocity, other.velocity),
@@ -97,7 +97,7 @@ class PredictedPath:
     gravity: Expr | None
 
     def arm(self, offset: Sequence[Any]) -> Parabola:
-        """The path of the body-frame vector ``offset``, in world coordinates."""
+        """Return the path of the body-frame vector ``offset``, in world coordinates."""
         if all(is_zero(c) for c in offset):
             return ZERO_PATH
         arm = ca.mtimes(self.rotation, ca.vertcat(*offset))
@@ -106,15 +106,15 @@ class PredictedPath:
         return Parabola(arm, swing, bend)
 
     def centre(self) -> Parabola:
-        """The path of the centre of mass."""
+        """Return the path of the centre of mass."""
         return Parabola(self.position, self.velocity, self.acceleration)
 
     def true_velocity_of(self, offset: Sequence[Any]) -> Expr:
-        """(3,): the true velocity at t_k of the body's point at body-frame ``offset`` [m/s]."""
+        """Return the true velocity at t_k of the body's point at body-frame ``offset`` [m/s] (3,)."""
         return (self.velocity if self.true_velocity is None else self.true_velocity) + self.arm(offset).velocity
 
     def path(self, offset: Sequence[Any]) -> Parabola:
-        """The path of the body's point at body-frame ``offset`` from the centre of mass."""
+        """Return the path of the body's point at body-frame ``offset`` from the centre of mass."""
         return self.centre() + self.arm(offset)
 
 
@@ -129,6 +129,6 @@ class StillPath(PredictedPath):
 
 
 def at_rest(dt: Expr) -> PredictedPath:
-    """The path of what is static: its frame is the world's."""
+    """Return the path of what is static: its frame is the world's."""
     zero = ca.SX.zeros(3)
     return PredictedPath(zero, ca.SX.eye(3), zero, zero, zero, zero, dt, None, None)

@@ -26,7 +26,7 @@ class Field(Protocol):
         ...
 
     def normal(self, point: Expr) -> Expr:
-        """(3,): the unit vector in which the distance grows."""
+        """Return the unit vector in which the distance grows (3,)."""
         ...
 
 
@@ -51,7 +51,7 @@ class InField:
     axes: tuple[Parabola, Parabola, Parabola]
 
     def gap(self, t: Expr) -> Expr:
-        """[m] at time t in the step."""
+        """Return the gap [m] at time t in the step."""
         return self.field.distance(self._inside(self.path.at(t), t)) - self.radius
 
     def frame(self, t: Expr) -> Frame:
@@ -70,11 +70,11 @@ class InField:
         return self.field.distance(self._inside(apart, 0)) - self.radius
 
     def _inside(self, vector: Expr, t: Expr) -> Expr:
-        """A world vector in the shape's frame."""
+        """Return a world vector in the shape's frame."""
         return ca.vertcat(*(ca.dot(axis.at(t), vector) for axis in self.axes))
 
     def _outside(self, vector: Expr, t: Expr) -> Expr:
-        """A vector of the shape's frame in the world's, at its length."""
+        """Return a vector of the shape's frame in the world's, at its length."""
         turned = sum(vector[i] * axis.at(t) for i, axis in enumerate(self.axes))
         return turned / ca.sqrt(ca.dot(turned, turned))
 
@@ -82,7 +82,7 @@ class InField:
 def ball_in_field(
     path: Parabola, arm: Parabola, radius: Expr, shape: SolidShape, field: Field, b: PredictedPath
 ) -> Contact:
-    """The contact of a ball with a shape on b; ``path`` and ``arm`` of the ball's centre."""
+    """Return the contact of a ball with a shape on b; ``path`` and ``arm`` of the ball's centre."""
     centre = b.path(shape.centre)
     arms = (arm, b.arm(shape.centre))
     geometry = InField(field, radius, path - centre, arms, (path.start, centre.start), axes(b, shape))

@@ -27,7 +27,7 @@ FOOT_STEPS = 3
 MIN_DETERMINANT = 0.1
 """Least determinant of the squared distance's Hessian for Newton's method; else Gauss-Newton."""
 MAX_FOOT_ERROR = 0.1
-"""How far from perpendicular a line to the surface may be, as a share of its length, and count as a distance."""
+"""Largest deviation of a line from the perpendicular, as a share of its length, for it to count as a distance."""
 MAX_STEP_RATIO = 10.0
 """Longest step of that search, as a multiple of the height over the surface."""
 FREE_STEP = 0.1
@@ -35,7 +35,7 @@ FREE_STEP = 0.1
 MIN_AREA = 1e-12
 """[m^2] below which squares of lengths count as zero there."""
 Surface = Callable[[Expr], tuple[Expr, Expr, Expr]]
-"""Of (2,) x, y: the height, its gradient (2,) and its Hessian (2, 2)."""
+"""A function of x, y (2,): the height, its gradient (2,) and its Hessian (2, 2)."""
 
 
 @dataclass(frozen=True)
@@ -66,12 +66,12 @@ class Paraboloid:
 
 
 def upwards(slope: Expr) -> Expr:
-    """(3,): the unit normal of a surface with this gradient."""
+    """Return the unit normal of a surface with this gradient (3,)."""
     return ca.vertcat(-slope, 1) / ca.sqrt(1 + ca.dot(slope, slope))
 
 
 def foot(surface: Surface, point: Expr) -> Expr:
-    """(2,): x, y of the surface's point that is nearest to ``point``, searched from straight below it."""
+    """Return x, y (2,) of the surface's point that is nearest to ``point``, searched from straight below it."""
     xy, longest = point[:2], None
     for _ in range(FOOT_STEPS):
         height, slope, bend = surface(xy)
@@ -87,7 +87,7 @@ def foot(surface: Surface, point: Expr) -> Expr:
 
 
 def nearest(surface: Surface, point: Expr) -> Expr:
-    """(2,): x, y of the foot; of the place straight below where what was found is none, as far from a bent surface."""
+    """Return x, y (2,) of the foot; of the place straight below if none was found, as far from a bent surface."""
     xy = foot(surface, point)
     height, slope, _ = surface(xy)
     line, normal = point - ca.vertcat(xy, height), upwards(slope)
@@ -99,18 +99,18 @@ def nearest(surface: Surface, point: Expr) -> Expr:
 
 
 def determinant(m: Expr) -> Expr:
-    """Return the inverse of a (2, 2) matrix."""
+    """Return the determinant of a (2, 2) matrix."""
     return m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
 
 
 def solved(m: Expr, b: Expr) -> Expr:
-    """(2,): m^-1 b of a matrix with a determinant of at least ``MIN_DETERMINANT``, whatever rounding leaves of it."""
+    """Return m^-1 b (2,), with a determinant of at least ``MIN_DETERMINANT``, whatever rounding leaves of it."""
     found = ca.vertcat(m[1, 1] * b[0] - m[0, 1] * b[1], m[0, 0] * b[1] - m[1, 0] * b[0])
     return found / ca.fmax(determinant(m), MIN_DETERMINANT)
 
 
 def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: PredictedPath) -> Contact:
-    """The contact of a ball at body-frame ``offset`` with terrain."""
+    """Return the contact of a ball at body-frame ``offset`` with terrain."""
     path, world = a.path(offset), at_rest(a.dt)
     axes = world.arm((1.0, 0.0, 0.0)), world.arm((0.0, 1.0, 0.0)), world.arm((0.0, 0.0, 1.0))
     surface = surface_of(terrain)
@@ -127,7 +127,7 @@ def ball_on_terrain(offset: Sequence[Any], radius: Expr, terrain: Terrain, a: Pr
 
 
 def surface_of(terrain: Terrain) -> Surface:
-    """Height, gradient and Hessian of terrain."""
+    """Return height, gradient and Hessian of terrain."""
     xy = ca.SX.sym("xy", 2)
     height = ca.SX(terrain.height(xy[0], xy[1]))
     bend, slope = ca.hessian(height, xy)
@@ -136,15 +136,15 @@ def surface_of(terrain: Terrain) -> Surface:
 
 
 def sphere_terrain(sphere: Sphere, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """One point."""
+    """Return the one point of contact."""
     return [ball_on_terrain(sphere.centre, sphere.radius, terrain, a)]
 
 
 def capsule_terrain(capsule: Capsule, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """Two points: the round ends."""
+    """Return two points: the round ends."""
     return [ball_on_terrain(end, capsule.radius, terrain, a) for end in ends(capsule)]
 
 
 def box_terrain(box: Box, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """Eight points: the corners, balls where edges are round."""
+    """Return eight points: the corners, balls where edges are round."""
     return [ball_on_terrain(corner, box.edge, terrain, a) for corner in corners(box)]

@@ -23,11 +23,11 @@ NEWTON_STEPS = 3
 MAX_ROOT_GAP = 1e-9
 """[m] gap at which an instant counts as one of touch."""
 END_TOLERANCE = 1e-9
-"""Of dt: an instant so little beyond the end of a step keeps its slope, since rounding may have put it there."""
+"""Share of dt by which an instant may exceed the end of a step and keep its slope: rounding may have put it there."""
 
 
 def approaches(gap: Expr, rate: Expr) -> Expr:
-    """1 where surfaces have yet to meet: apart, or touching at speed; 0 where they rest on each other or overlap.
+    """Return 1 where surfaces have yet to meet: apart, or touching at speed; 0 where they rest or overlap.
 
     From rest a gap g closes after sqrt(2 g / a), with an infinite slope at g = 0, which a body placed exactly on the
     ground would inherit: there the instant of touch is 0 with slope 0. An impact that falls on the boundary of two
@@ -37,19 +37,19 @@ def approaches(gap: Expr, rate: Expr) -> Expr:
 
 
 def first_root(gap: Expr, rate: Expr, bend: Expr, dt: Expr) -> Expr:
-    """The first t in [0, dt] with gap + rate t + bend t^2/2 = 0; 0 when overlapping, dt when there is none."""
+    """Return the first t in [0, dt] with gap + rate t + bend t^2/2 = 0; 0 when overlapping, dt when there is none."""
     discriminant = ca.fmax(rate * rate - 2 * bend * gap, 0)
     closing = ca.fmax(ca.sqrt(discriminant + TINY_SQUARE) - rate, MIN_CLOSING_SPEED)
     return clip_to_end(ca.if_else(approaches(gap, rate), 2 * gap, 0) / closing, dt)
 
 
 def clip_to_end(t: Expr, dt: Expr) -> Expr:
-    """min(t, dt) with the slope of t where rounding decides: an impact may fall exactly on the end of a step."""
+    """Return min(t, dt) with the slope of t where rounding decides: an impact may fall exactly on the end of a step."""
     return ca.if_else(t > (1 + END_TOLERANCE) * dt, dt, t)
 
 
 def clip_to_step(t: Expr, dt: Expr) -> Expr:
-    """The instant t held in [0, dt], with the slope of t at both ends; see ``clip_to_end``."""
+    """Return the instant t held in [0, dt], with the slope of t at both ends; see ``clip_to_end``."""
     return clip_to_end(ca.if_else(t < -END_TOLERANCE * dt, 0, t), dt)
 
 
@@ -57,12 +57,12 @@ class Timed(ContactGeometry, Protocol):
     """A contact geometry with a gap at any time."""
 
     def gap(self, t: Expr) -> Expr:
-        """[m] at time t in the step."""
+        """Return the gap [m] at time t in the step."""
         ...
 
 
 def contact_along(geometry: Timed, dt: Expr, newton_steps: int = NEWTON_STEPS) -> Contact:
-    """The contact of surfaces whose gap is a function of time.
+    """Return the contact of surfaces whose gap is a function of time.
 
     The first root by the parabola that osculates at t = 0, then Newton steps. The gap of convex shapes in uniform
     motion is a convex function of time: from before the root, or from beyond it while the gap still falls, these
@@ -84,7 +84,7 @@ def contact_along(geometry: Timed, dt: Expr, newton_steps: int = NEWTON_STEPS) -
 
 
 def gap_rate_bend(geometry: Timed) -> Callable[[Expr], list[Expr]]:
-    """The gap and its two derivatives at a time.
+    """Return the gap and its two derivatives at a time.
 
     They are worked out with symbols in place of the expressions that the geometry is made of: casadi would otherwise
     look through all that these depend on, each time.
@@ -97,7 +97,10 @@ def gap_rate_bend(geometry: Timed) -> Callable[[Expr], list[Expr]]:
 
 
 def on_symbols(tree: Any, symbols: list[Expr], values: list[Expr]) -> Any:
-    """A tree of dataclasses and tuples with a symbol for each of its numbers, but for constants; they are appended."""
+    """Return a tree of dataclasses and tuples with a symbol for each of its numbers, but for constants.
+
+    They are appended.
+    """
     if isinstance(tree, ca.SX):
         numbers: list[Expr] = tree.nonzeros()
         found = [number for number in numbers if not number.is_constant()]

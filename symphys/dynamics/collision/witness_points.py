@@ -36,7 +36,7 @@ class Witness:
     end: Expr
 
     def gap(self, t: Expr) -> Expr:
-        """[m] at time t in the step."""
+        """Return the gap [m] at time t in the step."""
         return ca.dot(self._direction(t), (self.points[0] - self.points[1]).at(t)) - self.radii[0] - self.radii[1]
 
     def frame(self, t: Expr) -> Frame:
@@ -58,7 +58,7 @@ class Witness:
 
 
 def steady(normal: Parabola, t: Expr, dt: Expr) -> Parabola:
-    """The path of a vector; one that changes by more than half of its length at ``t`` stays as it is then.
+    """Return the path of a vector; one that changes by more than half of its length at ``t`` stays as it is then.
 
     The common perpendicular of edges that are nearly parallel may turn right round within a step, or vanish.
     """
@@ -68,7 +68,7 @@ def steady(normal: Parabola, t: Expr, dt: Expr) -> Parabola:
 
 
 def contact_of(witness: Witness) -> Contact:
-    """The contact of a witness; none within the step where it is off."""
+    """Return the contact of a witness; none within the step where it is off."""
     met, off = contact_along(witness, witness.end), witness.off
     return Contact(
         gap=ca.if_else(off, witness.far, met.gap),

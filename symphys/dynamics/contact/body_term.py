@@ -1,4 +1,4 @@
-"""What a body adds to a constraint: its effective mass, its lever arms, its Jacobian on a kinematic tree."""
+"""The term of a body in a constraint: effective mass, lever arms, Jacobian on a kinematic tree."""
 
 from __future__ import annotations
 
@@ -55,19 +55,19 @@ class BodyTerm:
     jacobian: PointJacobian | None = None
 
     def spin(self, m: Any) -> Expr:
-        """(3,) [rad/s], from the velocities."""
+        """Return the angular velocity (3,) [rad/s] from the velocities."""
         if self.jacobian is not None:
             return m.along(self.jacobian.angular)
         return apply(self.inverse_inertia, m.angular)
 
     def speed(self, m: Any) -> Expr:
-        """(3,) [m/s] of the touching point."""
+        """Return the velocity (3,) [m/s] of the touching point."""
         if self.jacobian is not None:
             return m.along(self.jacobian.linear)
         return m.velocity + ca.cross(self.spin(m), self.arm)
 
     def apply(self, m: Any, linear: Expr, angular: Expr) -> Any:
-        """The velocities of the body after impulses on the constraint's first body."""
+        """Return the velocities of the body after impulses on the constraint's first body."""
         linear, angular = self.sign * linear, self.sign * angular
         if self.jacobian is not None:
             return GeneralizedVelocities(
@@ -83,7 +83,7 @@ class BodyTerm:
 def apply_impulse(
     terms: Sequence[BodyTerm], momenta: Sequence[Any], linear: Expr, angular: Expr, same: bool
 ) -> tuple[Any, ...]:
-    """Both bodies after impulses on the first; ``same``: both are of one tree."""
+    """Return both bodies after impulses on the first; ``same``: both are of one tree."""
     if not same:
         return tuple(term.apply(m, linear, angular) for term, m in zip(terms, momenta, strict=True))
     after = momenta[0]
@@ -93,7 +93,7 @@ def apply_impulse(
 
 
 def slip(terms: Sequence[BodyTerm], momenta: Sequence[Any]) -> Expr:
-    """(3,) [m/s]: relative velocity of the touching points."""
+    """Return the relative velocity of the touching points (3,) [m/s]."""
     total = ca.SX.zeros(3)
     for term, m in zip(terms, momenta, strict=True):
         total += term.sign * term.speed(m)
@@ -101,7 +101,7 @@ def slip(terms: Sequence[BodyTerm], momenta: Sequence[Any]) -> Expr:
 
 
 def still(terms: Sequence[BodyTerm]) -> tuple[Any, ...]:
-    """Velocities of bodies at rest."""
+    """Return velocities of bodies at rest."""
     zero = ca.SX.zeros(3)
     return tuple(
         Momentum(zero, zero)
@@ -112,7 +112,7 @@ def still(terms: Sequence[BodyTerm]) -> tuple[Any, ...]:
 
 
 def point_jacobian(motion: PredictedMotion, t: Expr, arm: Expr, impulse_arm: Expr) -> PointJacobian | None:
-    """The Jacobian of a term at a constraint's instant."""
+    """Return the Jacobian of a term at a constraint's instant."""
     jacobian = motion.jacobian
     if jacobian is None:
         return None
@@ -128,7 +128,10 @@ def point_jacobian(motion: PredictedMotion, t: Expr, arm: Expr, impulse_arm: Exp
 
 
 def at_touch(contact: Contact, motions: Motions, t: Expr) -> tuple[Expr, Expr, Expr]:
-    """Relative velocity and acceleration (without the centripetal part) of the touching points at t*; the normal."""
+    """Return relative velocity and acceleration (without the centripetal part) of the touching points at t*.
+
+    The normal.
+    """
     frame = contact.geometry.frame(t)
     velocity, acceleration = ca.SX.zeros(3), ca.SX.zeros(3)
     for k, motion in enumerate(motions):
@@ -140,7 +143,7 @@ def at_touch(contact: Contact, motions: Motions, t: Expr) -> tuple[Expr, Expr, E
 
 
 def body_terms(motions: Motions, instant: Expr, frame: Frame, applied: Frame) -> tuple[BodyTerm, ...]:
-    """The terms of a constraint that is evaluated at ``instant`` in ``frame`` and whose impulse acts in ``applied``."""
+    """Return the terms of a constraint evaluated at ``instant`` in ``frame``, whose impulse acts in ``applied``."""
     return tuple(
         BodyTerm(
             sign=1 - 2 * k,
@@ -155,7 +158,7 @@ def body_terms(motions: Motions, instant: Expr, frame: Frame, applied: Frame) ->
 
 
 def free_slip(terms: Sequence[BodyTerm], motions: Motions) -> Expr:
-    """(3,) [m/s]: relative velocity of the touching points at mid-step, before any impulse."""
+    """Return the relative velocity of the touching points at mid-step (3,) [m/s], before any impulse."""
     total = ca.SX.zeros(3)
     for term, motion in zip(terms, motions, strict=True):
         spin = apply(term.inverse_inertia, motion.mid_momentum)

@@ -33,7 +33,7 @@ NEVER, ALWAYS = ca.SX(0), ca.SX(1)
 INACTIVE_NORMAL_SPEED = -1e6
 """[m/s] a normal velocity that no constraint reaches: it gives no impulse."""
 MIN_SLIDING_SHARE = 0.01
-"""Of W_nn: the least effective inverse mass of a sliding contact."""
+"""Least effective inverse mass of a sliding contact, as a share of W_nn."""
 MIN_HEADING_SLOPE = 1e-12
 """[m/s] below which the slope of the search for a direction says nothing."""
 MAX_ANGLE_STEP = 0.5
@@ -42,7 +42,7 @@ MAX_ANGLE_STEP = 0.5
 
 @dataclass(frozen=True)
 class ContactImpulse:
-    """What a contact has given so far, on the pair's first body, world frame.
+    """The accumulated impulse of a contact on the pair's first body, world frame.
 
     Attributes:
         normal: along the normal [N s], >= 0.
@@ -62,29 +62,29 @@ class ContactImpulse:
         return 4
 
     def like(self, numbers: Expr) -> ContactImpulse:
-        """One with load and friction (4,)."""
+        """Return an impulse with these numbers: load and friction (4,)."""
         return ContactImpulse(numbers[0], numbers[1:4], ca.SX(0), ca.SX.zeros(3))
 
     def linear(self, n: Expr) -> Expr:
-        """(3,) [N s]."""
+        """Return the linear impulse (3,) [N s]."""
         return n * self.normal + self.tangent
 
     def angular(self, n: Expr) -> Expr:
-        """(3,) [N m s]: the torque impulse beside that of the linear one."""
+        """Return the torque impulse beside that of the linear one (3,) [N m s]."""
         return n * self.spin + self.roll
 
     def plus(self, other: ContactImpulse) -> ContactImpulse:
-        """The sum."""
+        """Return the sum."""
         return ContactImpulse(
             self.normal + other.normal, self.tangent + other.tangent, self.spin + other.spin, self.roll + other.roll
         )
 
     def times(self, factor: Expr) -> ContactImpulse:
-        """A share of it."""
+        """Return the impulse times a factor."""
         return ContactImpulse(factor * self.normal, factor * self.tangent, factor * self.spin, factor * self.roll)
 
     def minus(self, other: ContactImpulse) -> ContactImpulse:
-        """The difference."""
+        """Return the difference."""
         return ContactImpulse(
             self.normal - other.normal, self.tangent - other.tangent, self.spin - other.spin, self.roll - other.roll
         )
@@ -95,7 +95,7 @@ ZERO_IMPULSE = ContactImpulse(ca.SX(0), ca.SX.zeros(3), ca.SX(0), ca.SX.zeros(3)
 
 @dataclass(frozen=True)
 class Precomputed:
-    """What projections need each time and is known before the sweeps.
+    """Terms of the projections that are computed once, before the sweeps.
 
     Attributes:
         normal_target: normal impulse for the velocity that is aimed at [N s].
@@ -172,11 +172,11 @@ class ContactConstraint:
     soft: SoftImpulse | None = None
 
     def slip(self, momenta: tuple[Any, ...]) -> Expr:
-        """(3,) [m/s]: relative velocity of the touching points."""
+        """Return the relative velocity of the touching points (3,) [m/s]."""
         return body_term.slip(self.terms, momenta)
 
     def apply(self, momenta: tuple[Any, ...], impulse: ContactImpulse) -> tuple[Any, ...]:
-        """The momenta of the bodies after an impulse."""
+        """Return the momenta of the bodies after an impulse."""
         linear, angular = impulse.linear(self.impulse_normal), impulse.angular(self.impulse_normal)
         return body_term.apply_impulse(self.terms, momenta, linear, angular, self.same)
 
@@ -187,7 +187,7 @@ class ContactConstraint:
         return linearised(self, self.slip(momenta), old, by)
 
     def project(self, momenta: tuple[Any, ...], old: ContactImpulse) -> tuple[tuple[Any, ...], ContactImpulse]:
-        """One projection of each of its impulses, one after the other."""
+        """Project each of its impulses once, one after the other."""
         zero = ca.SX.zeros(3)
         normal, tangent = (self.near * force for force in _forces(self, self.slip(momenta), old))
         momenta = self.apply(momenta, ContactImpulse(normal - old.normal, tangent - old.tangent, ca.SX(0), zero))
@@ -199,7 +199,7 @@ class ContactConstraint:
 
 
 def _forces(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> tuple[Expr, Expr]:
-    """The normal impulse and that of friction."""
+    """Return the normal impulse and that of friction."""
     if contact.coupling is not None:
         exact = _solve_coupled(contact, contact.coupling, slip, old)
         smoothed = _solve_coupled_smoothed(contact, contact.coupling, slip, old)
@@ -222,7 +222,7 @@ def precompute(contact: ContactConstraint) -> Precomputed:
 def _project_sequentially(
     contact: ContactConstraint, precomputed: Precomputed, slip: Expr, old: ContactImpulse
 ) -> tuple[Expr, Expr]:
-    """The normal impulse and that of friction; what is known last, the change of the first, comes in last."""
+    """Return the normal impulse and that of friction; what is known last, the change of the first, comes in last."""
     n, given = contact.normal, contact.normal_mass * contact.softness * old.normal
     kept = old.normal + precomputed.normal_target - given - contact.normal_mass * ca.dot(n, slip)
     normal = positive(kept, contact.normal_mass * contact.width)
@@ -233,20 +233,20 @@ def _project_sequentially(
 
 
 def _normal(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> Expr:
-    """ln <- max(ln - m (n.u - b + gamma ln), 0), m = 1 / (k + gamma)."""
+    """Project the normal impulse: ln <- max(ln - m (n.u - b + gamma ln), 0), m = 1 / (k + gamma)."""
     kept = old.normal + contact.normal_mass * (contact.target - contact.softness * old.normal)
     return positive(kept - contact.normal_mass * ca.dot(contact.normal, slip), contact.normal_mass * contact.width)
 
 
 def _tangent(contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal: Expr) -> Expr:
-    """The friction impulse that is nearest to what would stop the slip."""
+    """Return the friction impulse that is nearest to what would stop the slip."""
     kept = old.tangent + contact.tangent_mass * _across(contact.slip_target, contact.normal)
     wanted = kept - contact.tangent_mass * _across(slip, contact.normal)  # what is known last comes in last
     return contact.friction.nearest(wanted, normal, contact.tangent_mass * contact.smoothing, contact.smoothing)
 
 
 def linearised(contact: ContactConstraint, slip: Expr, old: ContactImpulse, by: Linearisation) -> tuple[Expr, Expr]:
-    """(a (4,), B (4, 3)): load and friction change by a - B du with the slip u.
+    """Return a (4,) and B (4, 3): load and friction change by a - B du with the slip u.
 
     Args:
         contact: the contact.
@@ -268,14 +268,14 @@ def linearised(contact: ContactConstraint, slip: Expr, old: ContactImpulse, by: 
 
 
 def _slope(x: Expr, width: Expr, mass: Expr, by: Linearisation) -> Expr:
-    """The slope of ``positive``."""
+    """Return the slope of ``positive``."""
     return ca.if_else(width > 0, positive_slope(x, width), by.within(x, mass))
 
 
 def _friction(
     contact: ContactConstraint, slip: Expr, old: ContactImpulse, normal: Expr, by: Linearisation
 ) -> tuple[Expr, Expr, Expr]:
-    """(a (3,), its slope (3,) by the load, B (3, 3)) of friction alone, with the cone of a load ``normal``."""
+    """Return a (3,), its slope (3,) by the load and B (3, 3) of friction alone, with the cone of a load ``normal``."""
     n, mass = contact.normal, contact.tangent_mass
     return contact.friction.linearised(
         FrictionStep(
@@ -295,7 +295,7 @@ def _friction(
 def _torques(
     contact: ContactConstraint, momenta: tuple[Any, ...], old: ContactImpulse, normal: Expr
 ) -> tuple[Expr, Expr]:
-    """Torsional friction (an interval) and rolling friction (a disc), both limited by the normal impulse."""
+    """Return torsional friction (an interval) and rolling friction (a disc), both limited by the normal impulse."""
     n = contact.normal
     spin_width, roll_width = contact.smoothing * contact.spin_mass, contact.smoothing * contact.roll_mass
     rate = sum(term.sign * term.spin(m) for term, m in zip(contact.terms, momenta, strict=True))
@@ -309,7 +309,7 @@ def _torques(
 def _solve_coupled(
     contact: ContactConstraint, coupling: Coupling, slip: Expr, old: ContactImpulse
 ) -> tuple[Expr, Expr]:
-    """(normal impulse, friction impulse (3,)) after which the contact obeys its law, all else as it is.
+    """Return the normal impulse and the friction impulse (3,) after which the contact obeys its law, all else as it is.
 
     Args:
         contact: the contact.
@@ -335,14 +335,14 @@ def _solve_coupled(
 
 
 def _sliding_load(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Friction) -> tuple[Expr, Expr]:
-    """The normal impulse of a contact that slides against ``heading``, and the velocity (3,) for a unit of it."""
+    """Return the normal impulse of a contact that slides against ``heading``, and the velocity (3,) per unit of it."""
     response = ca.mtimes(w, n + friction.largest * friction.shaped(heading))
     least = MIN_SLIDING_SHARE * ca.dot(n, ca.mtimes(w, n))
     return ca.fmax(-ca.dot(n, free), 0) / ca.fmax(ca.dot(n, response), least), response
 
 
 def _newton_heading(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Friction) -> Expr:
-    """The heading after a step of Newton's method towards one that is opposite to the slip, as friction sees it."""
+    """Return the heading after a Newton step towards the one that is opposite to the slip, as friction sees it."""
     load, response = _sliding_load(heading, free, w, n, friction)
     aside, slip = ca.cross(n, heading), free + load * response
     seen = friction.shaped(aside)

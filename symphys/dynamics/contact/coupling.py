@@ -23,7 +23,7 @@ The corners of a box at rest converge sooner by those: a block pushed at mu = 1 
 
 @dataclass(frozen=True)
 class Coupling:
-    """What impulses do to the velocity of the touching points against each other.
+    """Response of the relative velocity of the touching points to impulses.
 
     Attributes:
         mobility: W (3, 3) [1/kg], with the softness of the contact along the normal.
@@ -37,7 +37,7 @@ class Coupling:
 
 
 def coupling_of(mobility: Expr, n: Expr, friction: Friction, softness: Expr) -> Coupling:
-    """The coupling of a contact with normal n (3,)."""
+    """Return the coupling of a contact with normal n (3,)."""
     w = mobility + softness * ca.mtimes(n, n.T)
     along = ca.mtimes(w, n)
     across = along - n * ca.dot(n, along)
@@ -45,7 +45,7 @@ def coupling_of(mobility: Expr, n: Expr, friction: Friction, softness: Expr) -> 
 
 
 def pulls_together(mobility: Expr, n: Expr, friction: Friction, slip: Expr) -> Expr:
-    """1 if an impulse on the edge of the cone, against the ``slip`` (3,), brings the surfaces together (Painleve)."""
+    """Return 1 if an impulse on the edge of the cone, against the ``slip`` (3,), closes the surfaces (Painleve)."""
     return ca.dot(n, ca.mtimes(mobility, n - friction.against(_across(slip, n)))) <= 0
 
 
@@ -54,7 +54,7 @@ def _across(a: Expr, n: Expr) -> Expr:
 
 
 def coupled_pairs(world: World) -> list[bool]:
-    """``may_couple`` of all pairs; equal ones are looked at once."""
+    """Return ``may_couple`` of all pairs, evaluated once for equal ones."""
     known: dict[Any, bool] = {}
     found = []
     for pair in world.pairs:
@@ -86,7 +86,7 @@ def may_couple(world: World, pair: Pair) -> bool:
 
 
 def _ratio(body: Body, shape: int, friction: Any) -> float:
-    """The largest mu W_nt / W_nn of a body without joints; infinite where symbols decide it."""
+    """Return the largest mu W_nt / W_nn of a body without joints; infinite where symbols decide it."""
     surface = body.shapes[shape]
     if surface.central:
         return 0.0

@@ -1,4 +1,4 @@
-"""What impulses at a contact do to its velocity: mobilities, their inverses, and the largest across the normal."""
+"""Effective masses of a contact: mobilities, their inverses, and the largest eigenvalue across the normal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from symphys.maths.smoothing import TINY_SQUARE
 from symphys.types import Expr
 
 LOCKED_MOBILITY_SHARE = 1e-9
-"""Of a body's own mobility: what it keeps in directions in which joints do not let it move.
+"""Share of a body's own mobility that it keeps in directions in which joints do not let it move.
 
 Impulses act at another instant than that at which velocities are asked for: a rod on a hinge that passes the upright
 between the two has a mobility below 0 along it.
@@ -26,7 +26,7 @@ MIN_TURN_MOBILITY = 1e-6
 
 
 def mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, Expr]:
-    """(3, 3) each: relative velocity for unit impulses at the point, relative spin for unit torque impulses."""
+    """Return the relative velocity (3, 3) for unit impulses at the point, the spin (3, 3) for unit torque impulses."""
     push, twist = ca.SX.zeros(3, 3), ca.SX.zeros(3, 3)
     for i, term in enumerate(terms):
         inverse = apply(term.inverse_inertia, ca.SX.eye(3))
@@ -46,12 +46,12 @@ def mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, Expr]:
 
 
 def delassus_column(terms: Sequence[BodyTerm], n: Expr, same: bool) -> Expr:
-    """(3,) [1/kg]: the velocity of the touching points against each other for a unit impulse along n."""
+    """Return the velocity of the touching points against each other for a unit impulse along n (3,) [1/kg]."""
     return slip(terms, apply_impulse(terms, still(terms), n, ca.SX.zeros(3), same))
 
 
 def separates(terms: Sequence[BodyTerm], n: Expr, column: Expr) -> Expr:
-    """1 if an impulse parts the surfaces: where joints turn far between its instant and the constraint's it may pull.
+    """Return 1 if an impulse parts the surfaces: on trees it may pull if joints turn far between the two instants.
 
     Sweeps would answer each pull by a stronger one: a shin that was struck, at 90 rad/s at 10 ms a step, sent its robot
     to 1e19 m/s within a step.
@@ -62,7 +62,7 @@ def separates(terms: Sequence[BodyTerm], n: Expr, column: Expr) -> Expr:
 
 
 def no_less_than_response(terms: Sequence[BodyTerm], n: Expr, column: Expr, normal: Expr) -> Expr:
-    """k along the normal, on trees at least half of what an impulse does: sweeps answer by too much with less."""
+    """Return k along the normal, on trees at least half of the response: with less, sweeps overshoot."""
     if all(term.jacobian is None for term in terms):
         return normal
     least = ca.dot(n, column) / 2
@@ -78,7 +78,7 @@ def symmetric_mobilities(terms: Sequence[BodyTerm], same: bool) -> tuple[Expr, E
 
 
 def inverse_masses(terms: Sequence[BodyTerm], n: Expr, push: Expr, twist: Expr) -> tuple[Expr, Expr, Expr, Expr]:
-    """k along the normal, across it, and for torques about it and across it; from ``symmetric_mobilities``.
+    """Return k along the normal, across it, and for torques about it and across it; from ``symmetric_mobilities``.
 
     On free bodies at least shares of what their masses and moments of inertia give: the inverse inertia at an instant
     of the step is extrapolated, which at a spin of about a radian a step need not leave it positive definite.
@@ -98,7 +98,7 @@ def _trace(inverse_inertia: Expr) -> Expr:
 
 
 def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr, separates: Expr = 1) -> dict[str, Expr]:
-    """The fields of a constraint from the inverse effective masses k, which are inverted once, not in each sweep.
+    """Return the fields of a constraint from the inverse effective masses k, inverted once, not in each sweep.
 
     A contact that does not separate its surfaces has none, so that no sweep answers to it.
     """
@@ -111,12 +111,12 @@ def effective_masses(normal: Expr, tangent: Expr, spin: Expr, roll: Expr, separa
 
 
 def along(k: Expr, n: Expr) -> Expr:
-    """n . k n."""
+    """Return n . k n."""
     return ca.dot(n, ca.mtimes(k, n))
 
 
 def across(k: Expr, n: Expr) -> Expr:
-    """The largest eigenvalue of the symmetric (3, 3) ``k`` restricted to the plane across the unit vector n."""
+    """Return the largest eigenvalue of the symmetric (3, 3) ``k`` restricted to the plane across the unit vector n."""
     half_trace = (ca.trace(k) - along(k, n)) / 2
     determinant = ca.dot(n, ca.mtimes(ca.adj(k), n))
     return half_trace + ca.sqrt(ca.fmax(half_trace**2 - determinant, 0) + TINY_SQUARE)

@@ -29,7 +29,7 @@ MIN_DIRECTION_ANGLE = 0.05
 TINY_LEAN = 1e-8
 """Added to the square of a direction's part across the normal, so that its slope is finite where there is none."""
 ELLIPSE_NEWTON_STEPS = 5
-"""Of Newton's method towards the nearest impulse of an ellipse. That is then off by 1e-14 of its size at most for
+"""Newton steps towards the nearest impulse of an ellipse. That is then off by 1e-14 of its size at most for
 coefficients in a ratio of up to 10, by 1e-9 for 100 and by 3e-8 for 10,000."""
 TINY_LOAD = 1e-24
 """[N s] added to loads that divide."""
@@ -74,19 +74,19 @@ class Friction(Protocol):
 
     @property
     def largest(self) -> Expr:
-        """The largest friction impulse per unit of load."""
+        """Return the largest friction impulse per unit of load."""
         ...
 
     def shaped(self, vector: Expr) -> Expr:
-        """(3,): a vector across the normal, shortened where friction is less than the largest."""
+        """Return a vector across the normal (3,), shortened where friction is less than the largest."""
         ...
 
     def heading(self, wanted: Expr, load: Expr) -> Expr:
-        """(3,) unit vector: heading of the impulse on the edge that is nearest to ``wanted`` (3,) [N s]."""
+        """Return the unit vector (3,) along the impulse on the edge that is nearest to ``wanted`` (3,) [N s]."""
         ...
 
     def nearest(self, wanted: Expr, load: Expr, width: Expr, smoothing: Expr) -> Expr:
-        """(3,) [N s]: the admissible impulse nearest to ``wanted`` (3,), across the normal.
+        """Return the admissible impulse (3,) [N s] nearest to ``wanted`` (3,), across the normal.
 
         Args:
             wanted: friction impulse that would stop the slip [N s].
@@ -97,24 +97,24 @@ class Friction(Protocol):
         ...
 
     def against(self, slip: Expr) -> Expr:
-        """(3,): friction impulse per unit of load against a ``slip`` (3,) across the normal [m/s]."""
+        """Return the friction impulse (3,) per unit of load against a ``slip`` (3,) across the normal [m/s]."""
         ...
 
     def admits(self, impulse: Expr, load: Expr) -> Expr:
-        """1 if the law admits a friction impulse (3,) [N s] across the normal at this load [N s], else 0."""
+        """Return 1 if the law admits a friction impulse (3,) [N s] across the normal at this load [N s], else 0."""
         ...
 
     def beyond(self, impulse: Expr, load: Expr, share: float) -> Expr:
-        """1 if a friction impulse (3,) [N s] is more than this share of what its load admits in its direction."""
+        """Return 1 if a friction impulse (3,) [N s] exceeds this share of the largest in its direction."""
         ...
 
     def linearised(self, at: FrictionStep) -> tuple[Expr, Expr, Expr]:
-        """(a (3,), g (3,), B (3, 3)): friction changes by a + g dl - B dv with the load l and the slip v."""
+        """Return a (3,), g (3,), B (3, 3): friction changes by a + g dl - B dv with the load l and the slip v."""
         ...
 
 
 def friction_at(law: Law, normal: Expr, motions: Motions, t: Expr) -> Friction:
-    """The law of friction at a contact.
+    """Return the law of friction at a contact.
 
     Args:
         law: of the contact.
@@ -301,32 +301,35 @@ class Ellipse:
         return (self.along + self.across) / 2
 
     def _split(self, vector: Expr) -> tuple[Expr, Expr]:
-        """(the component along the direction, the rest (3,)) of a vector across the normal."""
+        """Return the component along the direction, and the rest (3,), of a vector across the normal."""
         first = ca.dot(self.direction, vector)
         return first, vector - self.direction * first
 
     def _times(self, vector: Expr, one: Expr, two: Expr) -> Expr:
-        """(3,): the part of a vector along the direction times ``one``, and the rest times ``two``."""
+        """Return the part of a vector along the direction times ``one`` (3,), and the rest times ``two``."""
         first, rest = self._split(vector)
         return self.direction * (one * first) + two * rest
 
     def _scaled(self, wanted: Expr) -> tuple[Expr, Expr]:
-        """mu_i |y_i|."""
+        """Return mu_i |y_i|."""
         first, rest = self._split(wanted)
         return self.along * ca.fabs(first), self.across * length(rest)
 
     def _sums(self, load: Expr, t: Expr) -> tuple[Expr, Expr]:
-        """b_i + T."""
+        """Return b_i + T."""
         return self.along**2 * load + t + TINY_LOAD, self.across**2 * load + t + TINY_LOAD
 
     def _gauge(self, impulse: Expr) -> Expr:
-        """The square of the least load that admits an impulse; a direction without friction does not count."""
+        """Return the square of the least load that admits an impulse; a direction without friction does not count."""
         first, rest = self._split(impulse)
         one, two = (mu / (mu**2 + TINY_LOAD) for mu in (self.along, self.across))
         return (first * one) ** 2 + ca.dot(rest, rest) * two**2
 
     def _inside(self, wanted: Expr, load: Expr) -> Expr:
-        """T < 0 inside the ellipse: how far from the edge, where it is 0 and has the slope of that outside."""
+        """Return T < 0 inside the ellipse, by the distance from the edge.
+
+        There T is 0, with the slope of that outside.
+        """
         (c1, c2), (b1, b2) = self._scaled(wanted), self._sums(load, ca.SX(0))
         square = (c1 / b1) ** 2 + (c2 / b2) ** 2
         middle = self._mean**2 * load + TINY_LOAD
@@ -334,7 +337,7 @@ class Ellipse:
         return (ca.sqrt(square + TINY_SQUARE) - 1) / fall
 
     def _root(self, wanted: Expr, load: Expr) -> tuple[Expr, Expr]:
-        """(1 if an impulse lies outside the ellipse, T of the nearest one on the edge)."""
+        """Return 1 if an impulse lies outside the ellipse, and T of the nearest one on the edge."""
         (c1, c2), (b1, b2) = self._scaled(wanted), self._sums(load, ca.SX(0))
         outside = (c1 * b2) ** 2 + (c2 * b1) ** 2 > (b1 * b2) ** 2
 

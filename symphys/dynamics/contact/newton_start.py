@@ -58,17 +58,17 @@ State = Any
 States = tuple[State, ...]
 
 CENTRE_SCHEDULE = 1, 1, 0, 0, 0
-"""Of the steps: 1 with loads about 0, 0 about those that were found."""
+"""Centres of the steps: 1 for compliance about zero load, 0 about the loads found so far."""
 MAX_GROUP_SIZE = 40
 """Velocities of a group that is solved at once."""
 MAX_ENERGY_RATIO = 100.0
-"""Of the energies from which a step may start: how large that of the step may be."""
+"""Largest energy of a step, as a multiple of the energies at its start."""
 SLOPE_BLUR = 0.03
-"""Of the root of what an iterate misses: over how much of it a constraint's slope goes from one side to the other."""
+"""Width, as a share of the root of the residual energy, over which a constraint's slope changes sides at a bound."""
 ACCEPT_RATIO, REJECT_RATIO = 0.25, 4.0
-"""What an iterate misses, of what the best so far has missed: below, it is taken whole, and above, not at all."""
+"""Ratio of an iterate's residual energy to the least so far up to which it replaces the best, and from which not."""
 ROUNDING_SHARE = 1e-22
-"""Of the energies at hand: what is missed by rounding alone."""
+"""Residual energy that is rounding, as a share of the energies at hand."""
 MIN_ENERGY = 1e-30
 """[J] the least that a step may reach, so that its slope is finite at rest."""
 
@@ -83,7 +83,7 @@ class Group:
 
 @dataclass(frozen=True)
 class ConstraintOperators:
-    """How a constraint sees the N velocities of its bodies, and acts on them.
+    """Jacobian and impulse response of a constraint on the N velocities of its bodies.
 
     Attributes:
         rates: (m, N) J.
@@ -145,7 +145,7 @@ def solve_together(
     softness: Expr,
     centres: Sequence[int] = CENTRE_SCHEDULE,
 ) -> Iterate:
-    """The start of the sweeps, with the constraints of a group solved.
+    """Return the start of the sweeps, with the constraints of a group solved.
 
     Args:
         group: of carriers.
@@ -186,7 +186,7 @@ def _newton_step(
     by: Linearisation,
     reach: Expr,
 ) -> Iterate:
-    """After a step of Newton's method, shortened so that it stays within ``reach`` [J]."""
+    """Make a step of Newton's method, shortened so that it stays within ``reach`` [J]."""
     momenta, impulses = list(now.momenta), list(now.impulses)
     answers = []
     for each in members:
@@ -210,7 +210,7 @@ def _newton_step(
 
 
 def _residual_energy(metric: tuple[Expr, ...], members: Sequence[Member], now: Iterate) -> Expr:
-    """[J] twice the energy of what a projection of each constraint would change, all from the same velocities."""
+    """Return twice the energy [J] that a projection of each constraint would change, all from the same velocities."""
     found = []
     for each in members:
         carriers = tuple(dict.fromkeys(each.placed.carriers))
@@ -221,7 +221,7 @@ def _residual_energy(metric: tuple[Expr, ...], members: Sequence[Member], now: I
 
 
 def _blend(group: Group, share: Expr, now: Iterate, best: Iterate) -> Iterate:
-    """A share of ``now``, the rest of ``best``. Both have their velocities from their impulses, and so has it."""
+    """Blend a share of ``now`` with the rest of ``best``; velocities stay those of the impulses."""
     momenta, impulses = list(best.momenta), list(best.impulses)
     for i in group.carriers:
         momenta[i] = _mean_state(share, now.momenta[i], best.momenta[i])
@@ -231,7 +231,7 @@ def _blend(group: Group, share: Expr, now: Iterate, best: Iterate) -> Iterate:
 
 
 def contact_softness(group: Group, constraints: Sequence[PlacedConstraint], trees: KinematicTrees) -> Expr:
-    """[1/kg]: the same for all contacts of a group, so that loads are shared by least squares."""
+    """Return a softness [1/kg] common to all contacts of a group, so that loads are shared by least squares."""
     rigid = (constraints[k] for k in group.constraints if _rigid(constraints[k].constraint))
     bodies = sorted({body for each in rigid for body in each.bodies})
     return _softness(tuple(trees.motions[body].mass for body in bodies))
@@ -242,7 +242,7 @@ def _size(state: State) -> int:
 
 
 def _metric(trees: KinematicTrees, carriers: Sequence[int], states: Sequence[State]) -> tuple[Expr, ...]:
-    """The mass matrix of each carrier: kinetic energy by its velocities."""
+    """Return the mass matrix of each carrier: kinetic energy by its velocities."""
     coordinates = dict(zip(trees.roots, trees.coordinates, strict=True))
     return tuple(
         mass_matrix(coordinates[k]) if k in coordinates else _of_body(trees.motions[k], states[k]) for k in carriers
@@ -251,7 +251,7 @@ def _metric(trees: KinematicTrees, carriers: Sequence[int], states: Sequence[Sta
 
 @traced
 def _of_body(motion: PredictedMotion, state: State) -> Expr:
-    """(6, 6) by velocity and angular momentum, or by displacements."""
+    """Return the mass matrix (6, 6) of a body by velocity and angular momentum, or by displacements."""
     turning = motion.inertia_mid if isinstance(state, Displacement) else apply(motion.inverse_mid, ca.SX.eye(3))
     return ca.diagcat(motion.mass * ca.SX.eye(3), turning)
 
@@ -282,7 +282,7 @@ def _operators(
 
 
 def _split_states(velocities: Expr, states: States) -> list[State]:
-    """Velocities of carriers, side by side, one by one."""
+    """Return velocities of carriers, side by side, one by one."""
     found, start = list[State](), 0
     for state in states:
         end = start + _size(state)
@@ -307,7 +307,7 @@ def _flatten(state: State) -> Expr:
 def _linear_response(
     constraint: VelocityConstraint, lever: ConstraintOperators, momenta: States, old: AnyImpulse, by: Linearisation
 ) -> tuple[Expr, Expr, Expr, Expr]:
-    """M H B J, M H a, a and B."""
+    """Return M H B J, M H a, a and B."""
     a, b = constraint.linearised(momenta, old, by)
     return ca.mtimes(ca.mtimes(lever.momenta, b), lever.rates), ca.mtimes(lever.momenta, a), a, b
 
@@ -333,13 +333,13 @@ def _velocity_changes(
 
 @traced
 def _impulse_change(lever: ConstraintOperators, a: Expr, b: Expr, changes: tuple[Expr, ...]) -> Expr:
-    """(k,): the change of an impulse."""
+    """Return the change of an impulse (k,)."""
     return a - ca.mtimes(b, ca.mtimes(lever.rates, ca.vertcat(*changes)))
 
 
 @traced
 def _trust_radius(metric: tuple[Expr, ...], states: States, missed: Expr, count: int) -> Expr:
-    """[J] which no step goes beyond: from the energy of the velocities, and of all projections were they to add up."""
+    """Return the energy [J] that bounds a step, from that of the velocities and the sum of those of all projections."""
     return MAX_ENERGY_RATIO * (_energy(metric, ca.vertcat(*map(_flatten, states))) + count * missed) + MIN_ENERGY
 
 
@@ -369,7 +369,7 @@ def _constraint_residual(
 
 
 def _energy(metric: tuple[Expr, ...], velocities: Expr) -> Expr:
-    """[J] twice the kinetic energy, which rounding does not make negative."""
+    """Return twice the kinetic energy [J], which rounding does not make negative."""
     return ca.fmax(ca.dot(velocities, ca.mtimes(ca.diagcat(*metric), velocities)), 0)
 
 
@@ -385,7 +385,7 @@ def _slope_width(missed: Expr) -> Expr:
 
 @traced
 def _acceptance(after: Expr, missed: Expr, reach: Expr) -> Expr:
-    """The share of an iterate that misses ``after`` against what has missed so far: 1 if far better, 0 if far worse."""
+    """Return the share of an iterate by its residual energy: 1 if far better than the best so far, 0 if far worse."""
     ratio = after / (missed + ROUNDING_SHARE * reach + MIN_ENERGY)
     return clip((REJECT_RATIO - ratio) / (REJECT_RATIO - ACCEPT_RATIO), 0, 1, 0)
 

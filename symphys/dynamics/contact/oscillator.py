@@ -55,22 +55,25 @@ class Response:
     sigma: Expr
 
     def mean_velocity(self, velocity: Expr, push: Expr) -> Expr:
-        """The mean of the velocity over the time, from ``velocity`` and push = a - w^2 e at its start."""
+        """Return the mean of the velocity over the time, from ``velocity`` and push = a - w^2 e at its start."""
         return self.sigma * velocity + self.time * self.p / 2 * push
 
     def end_velocity(self, velocity: Expr, push: Expr) -> Expr:
-        """The velocity at the end of the time."""
+        """Return the velocity at the end of the time."""
         return self.time * self.sigma * push + self.kept * velocity
 
     @property
     def kept(self) -> Expr:
-        """D of the module: the share of a velocity that is left at the end of the time."""
+        """Return D of the module: the share of a velocity that is left at the end of the time."""
         angle = self.omega * self.time
         return 1 - angle**2 * self.p / 2 - 2 * self.ratio * angle * self.sigma
 
 
 def response(omega: Expr, ratio: Expr, time: Expr) -> Response:
-    """The exact solution over ``time`` [s]; ``ratio`` < 0 for backwards. By power series and doubling of the time."""
+    """Return the exact solution over ``time`` [s].
+
+    ``ratio`` < 0 for backwards. By power series and doubling of the time.
+    """
     angle = omega * time
     longest = ca.fmin(MAX_ANGLE, MAX_DAMPING / ca.fmax(ca.fabs(ratio), 1))
     held = ca.fmin(ca.fmax(angle, 0), longest)
@@ -110,7 +113,7 @@ class SpringLaw:
 
 
 def spring_law(forward: Response, backward: Response) -> SpringLaw:
-    """The law from the exact solution over the step, and backwards over the step before."""
+    """Return the law from the exact solution over the step, and backwards over the step before."""
     d, before, share = forward.time, backward.time, forward.sigma / backward.sigma
     kick, half = (d + before) / 2, d / 2
     q = (d * forward.p + before * backward.p * share) / 2

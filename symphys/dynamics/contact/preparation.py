@@ -1,4 +1,4 @@
-"""What the sweeps need to know of a contact over a substep of time, worked out once.
+"""Preparation of a contact constraint: all terms over a substep that the sweeps need, computed once.
 
 Formulas: docs/time_step.md, "4. Contact constraint". Letters: t* instant of touch, s = dt - t* what is left of the
 step, n normal, r arms, v* velocity of approach at t*, f* relative acceleration of the touching points there,
@@ -41,14 +41,14 @@ TIE_DISTANCE = 1e-11
 NO_CORRECTION_SLOP = 1e6
 """[m] more than any overlap: what gives no impulse is not pushed out either."""
 MIN_SUBSTEP_SHARE = 1e-6
-"""Of dt: the shortest substep before or after an impact."""
+"""Shortest substep before or after an impact, as a share of dt."""
 MIN_LOAD_SHARE = 1e-3
-"""Of the weight of the effective mass: what counts as load. A smooth contact always carries a little."""
+"""Least load, as a share of the weight of the effective mass. A smoothed contact always carries a little."""
 
 
 @dataclass(frozen=True)
 class SubstepFlags:
-    """What a substep makes of a contact.
+    """State of a contact within a substep.
 
     Attributes:
         suppressed: 1 for a contact that gives no impulse.
@@ -75,7 +75,7 @@ class SubstepFlags:
 def prepare(
     settings: StepSettings, law: Law, contact: Contact, motions: Motions, duration: Expr, conditions: SubstepFlags
 ) -> ContactConstraint:
-    """The constraint of a contact along the free motions of its bodies, over a substep of ``duration`` [s]."""
+    """Return the constraint of a contact along the free motions of its bodies, over a substep of ``duration`` [s]."""
     scheme, smoothing, half = settings.scheme, settings.smoothing, duration / 2
     suppressed, same, coupled = conditions.suppressed, conditions.same, conditions.coupled
     touch = _touch(settings, law, contact, motions, duration, conditions)
@@ -130,7 +130,7 @@ def prepare(
 
 @dataclass(frozen=True)
 class _FreeTouch:
-    """What free motion and restitution make of a contact within a substep.
+    """Touch and rebound of a contact under free motion within a substep.
 
     Attributes:
         time: at which the surfaces meet [s]; 0 without time of impact.
@@ -151,7 +151,7 @@ class _FreeTouch:
     leaving: Expr
 
     def slip(self, half: Expr) -> Expr:
-        """(3,): what of the slip at mid-substep comes after the impact, at whose instant friction acts [m/s]."""
+        """Return the slip (3,) [m/s] at mid-substep that arises after the impact, at whose instant friction acts."""
         return self.hit * self.leaving * (half - self.time) * (self.acceleration - self.normal * self.pull)
 
 
@@ -176,12 +176,12 @@ def _delay(touch: _FreeTouch, landing: Expr, lasts: Expr, half: Expr, terms: tup
 
 
 def _separating_speed(settings: StepSettings, contact: Contact, k_normal: Expr, load: Expr, duration: Expr) -> Expr:
-    """On the central path a load keeps surfaces parting at w^2 / (4 k load) [m/s]: less that, what lasts is at rest."""
+    """Return the speed w^2 / (4 k load) [m/s] at which a load keeps surfaces parting on the central path."""
     return width_of(settings, contact) ** 2 / (4 * k_normal * load * duration)
 
 
 def closes_fast(settings: StepSettings, contact: Contact) -> Expr:
-    """1 if a contact closes at a speed that makes it an impact: now, or as a tip that swings round."""
+    """Return 1 if a contact closes at a speed that makes it an impact: now, or as a tip that swings round."""
     swings = contact.gap > settings.fast * contact.time + MAX_REST_GAP * settings.reference * settings.scheme.dt**2
     return ca.logic_or(contact.rate < -settings.fast, ca.logic_and(contact.hit, swings))
 
@@ -192,13 +192,13 @@ def width_of(settings: StepSettings, contact: Contact) -> Expr:
 
 
 def _leaves(rebound: Expr, pull: Expr, left: Expr, reference: Expr, dt: Expr, smoothing: Expr) -> Expr:
-    """chi: 1 if the rebound is still off the surface when the step ends, 0 if it has fallen back by then."""
+    """Return chi: 1 if the rebound is still off the surface when the step ends, 0 if it has fallen back by then."""
     fall = ca.fmax(-pull, reference) * left
     return clip((2 * rebound - fall) / (fall + REBOUND_MARGIN * dt), 0, 1, smoothing)
 
 
 def _lasts(settings: StepSettings, law: Law, contact: Contact, leaving: Expr, loaded: Expr) -> Expr:
-    """1 if the surfaces carried load, are near each other and do not part. Smoothed contacts hover, up to a height."""
+    """Return 1 if the surfaces carried load, are near and do not part. Smoothed contacts hover, up to a height."""
     if law.soft:
         return ca.SX(0)
     dt = settings.scheme.dt
@@ -207,7 +207,7 @@ def _lasts(settings: StepSettings, law: Law, contact: Contact, leaving: Expr, lo
 
 
 def _landing(contact: Contact, duration: Expr, time: Expr, target: Expr, free: Expr) -> Expr:
-    """The delay of an impulse after which the surfaces just touch at the end of the substep.
+    """Return the delay of an impulse after which the surfaces just touch at the end of the substep.
 
     What holds a body that lands and stays acts from the touch on, not at it: with all of it at t* the body would end
     below the surface by a (t* - dt) t*/2, which for small gaps is large beside the gap. ``free`` is the normal velocity
@@ -218,7 +218,7 @@ def _landing(contact: Contact, duration: Expr, time: Expr, target: Expr, free: E
 
 
 def _slack(settings: StepSettings, contact: Contact, touch: _FreeTouch, duration: Expr) -> Expr:
-    """[m] an overlap at the end of the substep that is rounding: that of an impact which falls on its very end.
+    """Return the overlap [m] at the end of the substep that is rounding: that of an impact on its very end.
 
     Whether such an impact belongs to this substep or to the next is rounding's choice. Either way nothing but the
     impact may act: a constraint that holds the surfaces where they just touch would have half of its slope there.
@@ -233,7 +233,7 @@ def _slack(settings: StepSettings, contact: Contact, touch: _FreeTouch, duration
 
 
 def _normal_target(contact: Contact, duration: Expr, touch: _FreeTouch, away: Expr, smoothing: Expr) -> Expr:
-    """The velocity that the normal constraint of a rigid contact asks for at the middle of the step.
+    """Return the velocity that the normal constraint of a rigid contact asks for at the middle of the step.
 
     Hit: the rebound carried from t* to the middle, b = max(u + n.f* (dt/2 - t*), 0). Not hit: ``away``, that of the
     free motion less what would close the gap that this leaves at the end.

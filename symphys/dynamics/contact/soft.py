@@ -28,7 +28,7 @@ MIN_CONTACT_SHARE = 1e-9
 
 @dataclass(frozen=True)
 class SoftApproach:
-    """What a soft contact finds, along the normal.
+    """State of a soft contact along the normal, before its impulse.
 
     Attributes:
         active: 1 if the surfaces overlap or meet in the substep.
@@ -53,7 +53,7 @@ class SoftApproach:
 
 @dataclass(frozen=True)
 class SoftImpulse:
-    """What a soft contact gives in a substep.
+    """Coefficients of the impulse of a soft contact in a substep.
 
     Attributes:
         softness: gamma [1/kg].
@@ -73,13 +73,13 @@ class SoftImpulse:
     late: Expr
 
     def lasting(self, velocity: Expr, normal: Expr) -> Expr:
-        """The normal force that goes on acting [N], from the velocity and the normal impulse after the sweeps."""
+        """Return the persistent normal force [N] from the velocity and the normal impulse after the sweeps."""
         force = normal / self.kick + self.slope * velocity + self.constant
         return ca.if_else(normal > 0, self.lasts * ca.fmax(force, 0), 0)
 
 
 def soft_impulse(law: Law, at: SoftApproach) -> SoftImpulse:
-    """The law of a soft contact over a substep; where it is not active it does nothing."""
+    """Return the law of a soft contact over a substep; where it is not active it does nothing."""
     omega, ratio, d, mass = 2 * ca.pi * law.frequency, law.damping, at.duration, 1 / at.inverse_mass
     lasted = at.force > 0
     before = ca.if_else(lasted, 2 * ca.fmax(at.lag, 0), 0)

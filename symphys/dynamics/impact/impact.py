@@ -39,15 +39,15 @@ from symphys.model.world import Law, Pair, World
 from symphys.types import Expr
 
 SIMULTANEITY_SHARE = 1e-9
-"""Of dt: impacts that are no further apart are one."""
+"""Largest time between simultaneous impacts, as a share of dt."""
 POSE_FIELDS = "position", "orientation"
 MAX_TOUCH_GAP = 1e-3
-"""Of the distance a_ref dt^2: surfaces that near to each other take part in an impact of their bodies."""
+"""Largest gap of surfaces that take part in an impact of their bodies, as a share of the distance a_ref dt^2."""
 
 
 @dataclass(frozen=True)
 class StepSplit:
-    """Where a step is split in two.
+    """The split of a step at its first impact.
 
     Attributes:
         impact: 1 if the split is an impact, 0 if there is none.
@@ -65,7 +65,7 @@ class StepSplit:
 
 
 def find_split(context: StepContext, x: State, duration: Expr, share: float) -> StepSplit:
-    """The first impact within ``duration`` [s], on paths under the persistent forces of the last step.
+    """Return the first impact within ``duration`` [s], on paths under the persistent forces of the last step.
 
     Without an impact the split is at ``share`` of the duration.
     """
@@ -86,13 +86,13 @@ def find_split(context: StepContext, x: State, duration: Expr, share: float) -> 
 
 @traced
 def strikes(settings: StepSettings, law: Law, contact: Contact, near: Expr) -> Expr:
-    """1 if a contact is an impact."""
+    """Return 1 if a contact is an impact."""
     return ca.SX(0) if law.soft else ca.logic_and(near, closes_fast(settings, contact))
 
 
 @traced
 def _update_earliest(earliest: tuple[Expr, Expr], closes: Expr, hit: Expr, time: Expr, dt: Expr) -> tuple[Expr, Expr]:
-    """(whether there is an impact, when), with one more contact looked at; at a tie with the slope of this one."""
+    """Update whether there is an impact, and when, by one more contact; a tie has the slope of this one."""
     meets = ca.logic_and(closes, hit)
     sooner = ca.logic_and(meets, time < earliest[1] + SIMULTANEITY_SHARE * dt)
     return either(earliest[0], meets), ca.if_else(sooner, time, earliest[1])
@@ -117,7 +117,7 @@ def _time_after_split(earliest: tuple[Expr, Expr], struck: Expr, time: Expr) -> 
 
 @traced
 def _substep_length(earliest: tuple[Expr, Expr], duration: Expr, share: float) -> Expr:
-    """The length of the substep before the split; near an end it is shifted, not clamped, so that its slope stays.
+    """Return the length of the substep before the split; near an end it is shifted, which keeps its slope.
 
     Surfaces that rounding has put beyond each other meet at a time below 0 (``time_of_impact.falls``).
     """
@@ -128,7 +128,10 @@ def _substep_length(earliest: tuple[Expr, Expr], duration: Expr, share: float) -
 
 
 def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
-    """The state after the impacts at ``split``; leapfrog begins anew there, so ``lag`` is 0. Without one the same x."""
+    """Return the state after the impacts at ``split``.
+
+    Leapfrog begins anew there, so ``lag`` is 0. Without one the same x.
+    """
     duration = ca.SX(context.settings.scheme.dt)
     motions = [motion.at_start() for motion in predicted_motions(context, x, duration)]
     contacts = detect_contacts(context, motions, duration)
@@ -168,7 +171,7 @@ def _constraint(
     coupled: bool,
     near: Expr,
 ) -> ContactConstraint:
-    """The constraint of a contact at an impact: where ``struck`` it rebounds, where it touches it holds."""
+    """Return the constraint of a contact at an impact: where ``struck`` it rebounds, where it touches it holds."""
     now, scheme = ca.SX(0), settings.scheme
     touching = ca.logic_and(impact, contact.gap < MAX_TOUCH_GAP * settings.reference * scheme.dt**2)
     velocity, _, normal = at_touch(contact, motions, now)
@@ -261,7 +264,7 @@ def _delayed(
 def _velocities_after(
     motion: PredictedMotion, momentum: Momentum, before: tuple[Expr, ...], impact: Expr
 ) -> tuple[Expr, Expr]:
-    """(velocity, angular velocity): as solved if there is an impact, else as before."""
+    """Return velocity and angular velocity: those of the solution if there is an impact, else those before."""
     spin = angular_velocity(motion.inertia, motion.orientation, momentum.angular)
     return ca.if_else(impact, momentum.velocity, before[0]), ca.if_else(impact, spin, before[1])
 
@@ -273,7 +276,7 @@ def _restarted_lag(impact: Expr, lag: Expr) -> Expr:
 
 @dataclass(frozen=True)
 class DeferredImpacts:
-    """What the last substep of a step leaves to the next.
+    """Impacts that the last substep of a step leaves to the next step.
 
     Attributes:
         suppressed: per pair: 1 if it must give no impulse.
@@ -347,7 +350,7 @@ def _max_overlap(world: World, pair: Pair, eccentric: set[int]) -> Expr | None:
 
 @traced
 def _closing_contact(settings: StepSettings, law: Law, contact: Contact, near: Expr) -> tuple[Expr, Expr]:
-    """(whether it closes at speed, whether it then meets)."""
+    """Return whether a contact closes at speed, and whether it then meets."""
     fast = strikes(settings, law, contact, near)
     return fast, ca.logic_and(fast, contact.hit)
 
@@ -385,7 +388,7 @@ def _driven_pair(
     duration: Expr,
     room: Expr,
 ) -> tuple[tuple[Expr], ...]:
-    """(whether a pair waits, whether there is a chain, one without room), with a pair that hits may drive together.
+    """Update whether a pair waits, a chain exists, one lacks room, by a pair that hits may drive together.
 
     Its surfaces are apart, or part at speed as after an impact, and its bodies are hit before they meet. It waits if
     they do not go far into each other by that. Each flag is a tuple of its own, so that it lies by itself and stands

@@ -37,7 +37,7 @@ from symphys.types import Expr
 
 
 def eccentric_bodies(world: World) -> set[int]:
-    """The bodies on which contacts may act off the centre: on others no single impact with friction adds energy."""
+    """Return the bodies with contacts off the centre: on others no single impact with friction adds energy."""
     held = {index for joint in world.joints for index in joint.bodies}
     return held | {index for index, body in enumerate(world.bodies) if not all(shape.central for shape in body.shapes)}
 
@@ -49,7 +49,7 @@ def rebound(
     motions: Sequence[PredictedMotion],
     trees: KinematicTrees,
 ) -> Iterate:
-    """The impulses of an impact, and the momenta after it."""
+    """Return the impulses of an impact, and the momenta after it."""
     scheme = context.settings.scheme
     if not (scheme.energy_cap and eccentric_bodies(context.world)):
         return iterate(context, constraints, start, trees)
@@ -85,7 +85,7 @@ def _without_rebound(constraint: Any) -> Any:
 def _energies(
     sums: tuple[Expr, Expr, Expr], motion: PredictedMotion, momenta: list[Momentum]
 ) -> tuple[Expr, Expr, Expr]:
-    """Coefficients of the change of kinetic energy, a s^2 + b s + c, at share s of the way to Newton's impulse."""
+    """Return a, b, c of the change of kinetic energy, a s^2 + b s + c, at share s of the way to Newton's impulse."""
     before, plastic, newton = momenta
     turning = inverse_inertia(motion.inertia, motion.rotation)
 
@@ -110,7 +110,7 @@ def _rotor_energies(armature: Expr, rates: list[Expr], sums: tuple[Expr, Expr, E
 
 @traced
 def _largest_share(sums: tuple[Expr, Expr, Expr]) -> Expr:
-    """The largest s in [0, 1] with a s^2 + b s + c <= 0, where c <= 0 up to rounding."""
+    """Return the largest s in [0, 1] with a s^2 + b s + c <= 0, where c <= 0 up to rounding."""
     a, b, c = sums[0], sums[1], ca.fmin(sums[2], 0)
     root = ca.sqrt(ca.fmax(b * b - 4 * a * c, 0) + TINY_SQUARE)
     share = ca.if_else(b >= 0, -2 * c / (ca.fmax(b, 0) + root), (root - b) / (2 * a + TINY_SQUARE))

@@ -59,7 +59,7 @@ class KinematicTrees:
     roots: tuple[int, ...] = ()
 
     def placed(self, bodies: tuple[int, ...], constraint: Any) -> PlacedConstraint:
-        """A constraint on these bodies."""
+        """Return a constraint on these bodies."""
         return PlacedConstraint(bodies, constraint, tuple(self.carriers[i] for i in bodies))
 
     def same(self, bodies: tuple[int, ...]) -> bool:
@@ -70,7 +70,7 @@ class KinematicTrees:
 def prepare_trees(
     context: StepContext, motions: Sequence[PredictedMotion], free: Momenta, middle: Expr
 ) -> KinematicTrees:
-    """The trees; ``free``: momenta of all bodies without any impulse of the substep."""
+    """Return the trees; ``free``: momenta of all bodies without any impulse of the substep."""
     joints, moving = context.world.joints, list(motions)
     states: list[Velocities] = list(free)
     found, touched = list[GeneralizedCoordinates](), _touched(context.world)
@@ -95,7 +95,7 @@ def _acts(joint: Joint | None) -> bool:
 
 
 def _touched(world: World) -> set[int]:
-    """Bodies on which contacts act, or joints that close loops or are soft."""
+    """Return bodies on which contacts act, or joints that close loops or are soft."""
     exact = tree_joints(world.joints)
     sides = {side.body for pair in world.pairs for side in (pair.first, pair.second)}
     loose = {body for k, joint in enumerate(world.joints) if k not in exact for body in joint.bodies}
@@ -135,7 +135,7 @@ class JointPath:
 
 
 def joint_paths(context: StepContext, x: State, paths: Sequence[PredictedMotion]) -> list[JointPath]:
-    """The paths of all joints in a substep from x."""
+    """Return the paths of all joints in a substep from x."""
     found = []
     for joint in context.world.joints:
         frames = joint_frames(joint, tuple(paths[i] for i in joint.bodies))
@@ -148,7 +148,7 @@ def joint_paths(context: StepContext, x: State, paths: Sequence[PredictedMotion]
 def joint_constraints(
     context: StepContext, x: State, trees: KinematicTrees, paths: Sequence[PredictedMotion], duration: Expr, kick: Expr
 ) -> tuple[list[JointPath], list[JointConstraint], list[PlacedConstraint]]:
-    """The paths of all joints over a substep from x, the constraints of the sweeps, and those of the position pass."""
+    """Return the paths of all joints over a substep from x, the constraints of the sweeps and of the position pass."""
     settings, substep = context.settings, SubstepTimes(duration, kick)
     projected, fitted = list[JointConstraint](), list[PlacedConstraint]()
     places, along = _places(context.world, trees), joint_paths(context, x, paths)
@@ -196,7 +196,7 @@ def _coupled(
     coupling: JointCoupling,
     places: Mapping[int, tuple[int, Expr]],
 ) -> PlacedConstraint:
-    """The constraint of a coupling."""
+    """Return the constraint of a coupling."""
     terms = list[CoordinateTerms | None]()
     for index in (coupling.first, coupling.second):
         if index is None:
@@ -222,7 +222,7 @@ def _places(world: World, trees: KinematicTrees) -> dict[int, tuple[int, Expr]]:
 
 
 def locks_at(context: StepContext, trees: KinematicTrees) -> list[tuple[PlacedConstraint, JointImpulse]]:
-    """The constraints, without impulse, of rigid joints that close loops, at the instant of an impact."""
+    """Return the constraints, without impulse, of rigid joints that close loops, at the instant of an impact."""
     found, exact = [], tree_joints(context.world.joints)
     for index, joint in enumerate(context.world.joints):
         if index in exact or joint.soft:

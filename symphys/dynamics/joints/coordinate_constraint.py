@@ -31,7 +31,7 @@ class TreeCoordinate:
 
 @dataclass(frozen=True)
 class CoordinateConstraint:
-    """What acts along one coordinate, prepared for the sweeps; impulses in [N m s], or [N s] where it slides.
+    """A constraint along one coordinate, prepared for the sweeps; impulses in [N m s], or [N s] where it slides.
 
     Attributes:
         terms: arms at the constraint's instant, and to the common point for impulses.
@@ -69,7 +69,7 @@ class CoordinateConstraint:
     pushed: Expr | None = None
 
     def position_impulse(self, moved: Expr) -> Expr:
-        """(1,): the impulse times a time that takes a limit back to where it is kept, a coupling to where it holds.
+        """Return the impulse times a time (1,) that takes a limit, or a coupling, back to where it holds.
 
         See ``LockConstraint``.
         """
@@ -86,11 +86,11 @@ class CoordinateConstraint:
         return momenta[0].along(self.of_tree.jacobian)
 
     def stored_form(self, impulse: JointImpulse) -> Expr:
-        """(1,): what is stored of an impulse; also of a force."""
+        """Return the stored form (1,) of an impulse or of a force."""
         return impulse.numbers
 
     def from_stored(self, stored: Expr) -> JointImpulse:
-        """The impulse that is stored so."""
+        """Return the impulse that has this stored form."""
         return JointImpulse(stored)
 
     def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
@@ -101,7 +101,7 @@ class CoordinateConstraint:
     rates = rate
 
     def linearised(self, momenta: tuple[Any, ...], old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
-        """(a (1,), B (1, 1)); see ``newton_start``."""
+        """Return a (1,) and B (1, 1); see ``newton_start``."""
         wanted = self.keep * old.numbers - self.offset - self.slope * self.rate(momenta)
         new, follows = self.bounded(wanted), self._follows(wanted, by)
         gives = 1 - follows * self.keep + COMPLIANCE
@@ -110,7 +110,7 @@ class CoordinateConstraint:
         ) / gives, follows * self.slope / gives
 
     def _follows(self, impulse: Expr, by: Linearisation) -> Expr:
-        """The slope of ``bounded``."""
+        """Return the slope of ``bounded``."""
         slope = ca.SX(1)
         if self.low is not None:
             slope *= self._inside(impulse - self.low, by)
@@ -124,7 +124,7 @@ class CoordinateConstraint:
         return ca.if_else(self.width > 0, smooth, by.within(distance, self.slope))
 
     def answer(self, rate: Expr, old: Expr, less: Expr | None = None) -> tuple[Expr, Expr]:
-        """The impulse after a projection, and its change; ``less`` is known last, so it is taken off last."""
+        """Return the impulse after a projection, and its change; ``less`` is known last, so it is taken off last."""
         free = self.low is None and self.high is None
         new = self.keep * old - self.offset - (old if free else 0) - self.slope * rate
         new = new if less is None else new - less
@@ -134,7 +134,7 @@ class CoordinateConstraint:
         return new, new - old
 
     def bounded(self, impulse: Expr) -> Expr:
-        """Held within the bounds."""
+        """Clamp an impulse to the bounds."""
         if self.low is not None:
             impulse = at_least(impulse, self.low, self.width)
         if self.high is not None:
@@ -152,7 +152,7 @@ class CoordinateConstraint:
 def project_sequentially(
     constraints: Sequence[CoordinateConstraint], velocities: GeneralizedVelocities, old: Sequence[JointImpulse]
 ) -> tuple[GeneralizedVelocities, list[JointImpulse]]:
-    """Projections of coordinates of one tree, one after the other.
+    """Project coordinates of one tree, one after the other.
 
     Each takes the rate from the velocities before the last change, and what that did to it from ``pushed``. So two
     projections are under way at a time: a processor that waits for results does not wait for one after the other.
@@ -170,17 +170,17 @@ def project_sequentially(
 
 @traced
 def coupling_to_previous(first: CoordinateConstraint, then: CoordinateConstraint) -> Expr:
-    """(1,): see ``CoordinateConstraint.pushed``."""
+    """Return ``CoordinateConstraint.pushed`` (1,) of the second constraint."""
     assert first.of_tree is not None and then.of_tree is not None
     return then.slope * GeneralizedVelocities(first.of_tree.response).along(then.of_tree.jacobian)
 
 
 def velocity_law(target: Expr, mobility: Expr) -> dict[str, Expr]:
-    """The coefficients of a constraint that asks for a velocity."""
+    """Return the coefficients of a constraint that asks for a velocity."""
     return {"keep": ca.SX(1), "slope": 1 / mobility, "offset": -target / mobility}
 
 
 def affine_law(a: Expr, b: Expr, mobility: Expr) -> dict[str, Expr]:
-    """The coefficients of a constraint whose impulse is -(a + b rate)."""
+    """Return the coefficients of a constraint whose impulse is -(a + b rate)."""
     share = 1 / (1 + b * mobility)
     return {"keep": b * mobility * share, "slope": b * share, "offset": a * share}

@@ -30,9 +30,9 @@ from symphys.types import Expr
 
 NO_STRIKE = ca.SX(0)
 REDUNDANT_MOBILITY_SHARE = 1e-6
-"""Of the mobility of both bodies by themselves."""
+"""Added to the mobility of a lock, as a share of that of both bodies without their trees."""
 ADDED_MASS_SHARE = 0.27
-"""Of k dt^2: what a spring adds to an effective mass; with 1/4 leapfrog would be at the edge of stability."""
+"""Effective mass that a spring adds, as a share of k dt^2; with 1/4 leapfrog would be at the edge of stability."""
 MIN_STRIKE_STEP = 1e-4
 """[rad], [m] in a step: what comes to a limit faster than that strikes it."""
 
@@ -52,7 +52,7 @@ class SubstepTimes:
 
 @dataclass(frozen=True)
 class Command:
-    """Of a motor.
+    """The command of a motor.
 
     Attributes:
         given: in the step.
@@ -65,7 +65,7 @@ class Command:
 
 @dataclass(frozen=True)
 class CoordinateTerms:
-    """What every constraint along a coordinate needs.
+    """Terms common to all constraints along a coordinate.
 
     Attributes:
         terms, seen, given: as of any constraint.
@@ -92,7 +92,7 @@ class CoordinateTerms:
 def lock_constraint(
     frames: JointFrames, motions: Motions, substep: SubstepTimes, same: bool, near: Expr | None
 ) -> LockConstraint:
-    """The locked directions of a joint; of a soft one each is a spring and damper on its own effective mass.
+    """Return the locked directions of a joint; of a soft one each is a spring and damper on its own effective mass.
 
     ``near``: (k,) the coordinates of one that holds screws, at the start.
     """
@@ -134,7 +134,7 @@ def lock_at_impact(frames: JointFrames, motions: Motions, momenta: tuple[Any, ..
 
 
 def regular_mobility(terms: tuple[BodyTerm, ...], seen: Directions, same: bool) -> Expr:
-    """(n, n): with a trace of what a tree locks already, as the hinges of a parallelogram do."""
+    """Return the mobility (n, n), made regular where a tree locks directions already, as in a parallelogram."""
     k = mobility(terms, seen, same)
     if all(term.jacobian is None for term in terms):
         return k
@@ -143,7 +143,7 @@ def regular_mobility(terms: tuple[BodyTerm, ...], seen: Directions, same: bool) 
 
 
 def _spring_law(joint: Joint, substep: SubstepTimes) -> SpringLaw:
-    """The law of a soft joint along each of its locked directions."""
+    """Return the law of a soft joint along each of its locked directions."""
     omega, ratio = 2 * ca.pi * joint.frequency, joint.damping
     return spring_law(response(omega, ratio, substep.duration), response(omega, -ratio, 2 * substep.lag))
 
@@ -151,7 +151,7 @@ def _spring_law(joint: Joint, substep: SubstepTimes) -> SpringLaw:
 def _path_rates(
     frames: JointFrames, motions: Motions, terms: tuple[BodyTerm, ...], directions: tuple[Directions, Directions]
 ) -> tuple[Expr, Expr]:
-    """Rates (n,) along directions at the start of the substep, and at its middle under the forces of the last one."""
+    """Return rates (n,) along directions at the start of the substep, and at its middle under the last forces."""
     start, (given, seen) = ca.SX(0), directions
     before = tuple(Momentum(m.velocity, m.momentum_k) for m in motions)
     due = tuple(Momentum(m.mid_velocity, m.mid_momentum) for m in motions)
@@ -161,7 +161,7 @@ def _path_rates(
 
 @traced
 def coordinate_value(frames: JointFrames, k: int, near: Expr) -> Expr:
-    """Coordinate ``k`` of a joint at the start of a substep [rad] or [m]; see ``Joint.value``."""
+    """Return coordinate ``k`` of a joint at the start of a substep [rad] or [m]; see ``Joint.value``."""
     return frames.joint.value(k, frames.placed(ca.SX(0)), near)
 
 
@@ -175,7 +175,7 @@ def coordinate_terms(
     place: tuple[int, Any] | bool,
     value: Expr,
 ) -> CoordinateTerms:
-    """Coordinate ``k`` of a joint over a substep.
+    """Return the terms of coordinate ``k`` of a joint over a substep.
 
     Args:
         frames: of the joint.
@@ -215,7 +215,7 @@ def coordinate_terms(
 def motor_constraint(
     settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
-    """A motor; the bounds of its torque are rounded off over what the smoothing makes of an effective mass."""
+    """Return the constraint of a motor; bounds of its torque are rounded off over smoothing times effective mass."""
     motor, width = joint.motor, settings.smoothing / at.mobility
     if isinstance(motor, AffineMotor):
         return _affine(settings, motor, at, command, substep)
@@ -230,7 +230,10 @@ def motor_constraint(
 
 
 def commanded_torque(motor: TorqueMotor | AffineMotor, given: Expr, smoothing: Expr = 0, width: Expr = 0) -> Expr:
-    """The torque or force of a motor by its command alone [N m], [N]; ``width`` smooths the bounds of its force."""
+    """Return the torque or force of a motor by its command alone [N m], [N].
+
+    ``width`` smooths the bounds of its force.
+    """
     if isinstance(motor, TorqueMotor):
         return clip(given, -motor.torque, motor.torque, smoothing)
     for end, held in zip(motor.command_range or (), (at_least, at_most), strict=False):
@@ -245,7 +248,7 @@ def commanded_torque(motor: TorqueMotor | AffineMotor, given: Expr, smoothing: E
 def _drive_constraint(
     at: CoordinateTerms, drive: Expr, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
-    """A motor that gives what its command says: ``drive`` [N m] in the substep, over the lag what it was before."""
+    """Return the constraint of a motor that gives ``drive`` [N m] in the substep, and the drive before over the lag."""
     law = affine_law(-_impulse(drive, command, substep), ca.SX(0), at.mobility)
     return _constraint(at, law, None, None, ca.SX(0), drive=drive)
 
@@ -258,7 +261,10 @@ def _impulse(drive: Expr, command: Command, substep: SubstepTimes) -> Expr:
 def _affine(
     settings: StepSettings, motor: AffineMotor, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
-    """A torque that is affine in command, coordinate and rate; what depends on these acts as a spring and damper do."""
+    """Return the constraint of a torque affine in command, coordinate and rate.
+
+    The last two act as spring and damper.
+    """
     gear, kick, width, ends = motor.gear, substep.kick, settings.smoothing / at.mobility, _force_ends(motor)
     drive = commanded_torque(motor, command.given, settings.smoothing, width / kick)
     if motor.passive:
@@ -270,7 +276,7 @@ def _affine(
 
 
 def _force_ends(motor: AffineMotor) -> tuple[Expr | None, Expr | None]:
-    """The least and the largest force behind the gear; None where there is none."""
+    """Return the least and the largest force behind the gear; None where there is none."""
     low, high = motor.force_range or (-inf, inf)
     if isfinite(low) and isfinite(high):
         return ca.fmin(motor.gear * low, motor.gear * high), ca.fmax(motor.gear * low, motor.gear * high)
@@ -290,7 +296,7 @@ def servo_velocity(servo: Servo, command: Expr, value: Expr, smoothing: Expr) ->
 def lower_limit(
     settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
-    """A limit from below: it may be reached within the substep, not passed, and pushes only.
+    """Return the constraint of a lower limit: it may be reached within the substep, not passed, and pushes only.
 
     What is beyond it is taken back by the position pass, without velocity.
     """
@@ -305,7 +311,7 @@ def lower_limit(
 def upper_limit(
     settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
-    """A limit from above."""
+    """Return the constraint of an upper limit."""
     left, strikes = joint.limits.upper - at.value, _strikes(settings, at, at.rate_now)
     law = velocity_law(_limit_slack(left, strikes) / substep.duration, at.mobility)
     return _constraint(
@@ -319,7 +325,7 @@ def _limit_slack(left: Expr, strikes: Expr) -> Expr:
 
 
 def _strikes(settings: StepSettings, at: CoordinateTerms, closing: Expr) -> Expr:
-    """1 if a limit is reached at speed: faster than what acts in two steps brings about."""
+    """Return 1 if a limit is reached at speed: faster than what acts in two steps brings about."""
     return closing > 4 * ca.fabs(at.rate - at.rate_now) + MIN_STRIKE_STEP / settings.scheme.dt
 
 
@@ -327,7 +333,7 @@ def _strikes(settings: StepSettings, at: CoordinateTerms, closing: Expr) -> Expr
 def spring_constraint(
     settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
-    """A spring and damper."""
+    """Return the constraint of a spring and damper."""
     assert joint.spring is not None
     pull, half = _spring(settings, at, substep, joint.spring)
     return _constraint(at, affine_law(pull, half, at.mobility), None, None, ca.SX(0))
@@ -337,7 +343,7 @@ def spring_constraint(
 def friction_constraint(
     settings: StepSettings, joint: Joint, at: CoordinateTerms, command: Command, substep: SubstepTimes
 ) -> CoordinateConstraint:
-    """Dry friction: it stops the coordinate with at most so much."""
+    """Return the constraint of dry friction, which stops the coordinate with a bounded impulse."""
     most = joint.friction * substep.kick
     return _constraint(at, velocity_law(ca.SX(0), at.mobility), -most, most, settings.smoothing / at.mobility)
 
@@ -346,7 +352,7 @@ def friction_constraint(
 def coupling_constraint(
     coupling: JointCoupling, follows: CoordinateTerms, leads: CoordinateTerms | None, duration: Expr
 ) -> CoordinateConstraint:
-    """A coordinate that follows another of its tree: no velocity apart, and the position pass takes back what is left.
+    """Return the constraint of a coordinate that follows another of its tree; the position pass removes what is left.
 
     Its rate is seen with the slope at the middle of the substep, and its impulse acts with that at the start.
     """
@@ -367,7 +373,7 @@ def coupling_constraint(
 
 
 def _spring(settings: StepSettings, at: CoordinateTerms, substep: SubstepTimes, spring: Spring) -> tuple[Expr, Expr]:
-    """(a, b) of the impulse -(a + b rate) of a spring and damper.
+    """Return a and b of the impulse -(a + b rate) of a spring and damper.
 
     The spring acts as if the coordinate were heavier by ``ADDED_MASS_SHARE`` k dt^2, whatever accelerates it: of second
     order, keeps energy, is stable at any k, and at rest its force is k (q - rest). The damper acts on the mean of the
@@ -388,7 +394,7 @@ CONSTRAINTS = {
     "spring": spring_constraint,
     "friction": friction_constraint,
 }
-"""By what acts along a coordinate."""
+"""The constraint of each thing that acts along a coordinate."""
 
 
 def _constraint(

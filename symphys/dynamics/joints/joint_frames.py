@@ -1,4 +1,4 @@
-"""Where the frames of a joint are during a substep, and the directions that follow."""
+"""Frames of a joint during a substep, and the directions that it locks and leaves free."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ class JointFrames:
     axes: tuple[tuple[Parabola, ...], tuple[Parabola, ...]]
 
     def placed(self, t: Expr) -> PlacedFrames:
-        """Both frames at time t."""
+        """Return both frames at time t."""
         a, b = (ca.horzcat(*(axis.at(t) for axis in axes)) for axes in self.axes)
         first, second = (centre + arm for centre, arm in zip(self.centres, self.arms, strict=True))
         return PlacedFrames(a, b, (first - second).at(t))
 
     def lever_arms(self, t: Expr) -> tuple[Expr, Expr]:
-        """(3,) each: from the centres of mass to the frames; to the first one's for what slides."""
+        """Return the arms (3,) from the centres of mass to the frames; to the first frame for a joint that slides."""
         first, second = self.arms[0].at(t), self.arms[1].at(t)
         if self.joint.kind.travels:
             second += self.placed(t).apart
         return first, second
 
     def common_arms(self, t: Expr) -> tuple[Expr, Expr]:
-        """(3,) each: to one point for both, midway between the frames, so that impulses make no spin."""
+        """Return the arms (3,) to one point midway between the frames, so that impulses make no spin."""
         first, second = self.lever_arms(t)
         if self.joint.kind.travels:
             return first, second
@@ -47,7 +47,7 @@ class JointFrames:
         return first - half, second + half
 
     def terms(self, motions: Motions, seen: Expr, given: Expr) -> tuple[BodyTerm, ...]:
-        """The bodies of constraints that see the frames at one time and give impulses at another."""
+        """Return the bodies of constraints that see the frames at one time and give impulses at another."""
         arms, impulse_arms = self.lever_arms(seen), self.common_arms(given)
         return tuple(
             BodyTerm(
@@ -64,12 +64,12 @@ class JointFrames:
 
 @traced
 def joint_frames(joint: Joint, motions: Motions) -> JointFrames:
-    """The frames of a joint whose bodies have these motions."""
+    """Return the frames of a joint whose bodies have these motions."""
     return joint_frames_on(joint, [motion.predicted_path() for motion in motions])
 
 
 def joint_frames_on(joint: Joint, body_paths: Sequence[PredictedPath]) -> JointFrames:
-    """The frames of a joint whose bodies have these paths."""
+    """Return the frames of a joint whose bodies have these paths."""
     body_paths = [*body_paths, *([at_rest(body_paths[0].dt)] if joint.second is None else [])]
     axes = []
     for body_path, frame in zip(body_paths, joint.frames, strict=True):
@@ -81,7 +81,7 @@ def joint_frames_on(joint: Joint, body_paths: Sequence[PredictedPath]) -> JointF
 
 
 def joint_frames_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> JointFrames:
-    """The frames of a joint whose bodies are at these positions and orientations."""
+    """Return the frames of a joint whose bodies are at these positions and orientations."""
     zero = ca.SX.zeros(3)
     return joint_frames_on(
         joint, [StillPath(p, rotation.matrix(q), zero, zero, zero, zero, ca.SX(0), None, None) for p, q in poses]
@@ -89,10 +89,10 @@ def joint_frames_at(joint: Joint, poses: tuple[tuple[Expr, Expr], ...]) -> Joint
 
 
 def locked(joint: Joint, placed: PlacedFrames) -> Directions:
-    """The directions that a joint locks."""
+    """Return the directions that a joint locks."""
     return Directions(*joint.kind.locks(placed))
 
 
 def free(coordinate: Coordinate, placed: PlacedFrames) -> Directions:
-    """The direction of a coordinate."""
+    """Return the direction of a coordinate."""
     return Directions(*coordinate.along(placed))

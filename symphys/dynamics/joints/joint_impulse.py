@@ -1,4 +1,4 @@
-"""What a joint gives: one impulse along each of its directions."""
+"""The impulse of a joint: a component along each of its directions."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ class JointImpulse:
         return int(self.numbers.shape[0])
 
     def like(self, numbers: Expr) -> JointImpulse:
-        """A joint impulse of other numbers (n,)."""
+        """Return a joint impulse of other numbers (n,)."""
         return JointImpulse(numbers)
 
     def plus(self, other: JointImpulse) -> JointImpulse:
-        """The sum."""
+        """Return the sum."""
         return JointImpulse(self.numbers + other.numbers)
 
     def minus(self, other: JointImpulse) -> JointImpulse:
-        """The difference."""
+        """Return the difference."""
         return JointImpulse(self.numbers - other.numbers)
 
     def times(self, factor: Expr) -> JointImpulse:
-        """A share of it."""
+        """Return the impulse times a factor."""
         return JointImpulse(factor * self.numbers)
 
 
 @dataclass(frozen=True)
 class Directions:
-    """Where impulses act and what they change, world frame.
+    """Directions of impulses and of the velocities that they change, world frame.
 
     Attributes:
         slides: (m, 3) unit vectors of impulses through the common point; None: the world's three.
@@ -55,16 +55,16 @@ class Directions:
     leads: Expr | None = None
 
     def forwards(self, linear: Expr, angular: Expr) -> Expr:
-        """(n,): the parts of a velocity along the directions."""
+        """Return the parts of a velocity along the directions (n,)."""
         along = linear if self.slides is None else ca.mtimes(self.slides, linear)
         return ca.vertcat(along if self.leads is None else along + ca.mtimes(self.leads, angular), self.of(angular))
 
     def of(self, angular: Expr) -> Expr:
-        """(k,): the parts of an angular velocity."""
+        """Return the parts of an angular velocity (k,)."""
         return ca.mtimes(self.turns, angular)
 
     def split(self, numbers: Expr) -> tuple[Expr, Expr]:
-        """(3,), (3,): the linear and the angular impulse that numbers (n,) stand for."""
+        """Return the linear (3,) and the angular impulse (3,) of numbers (n,)."""
         m = 3 if self.slides is None else self.slides.size1()
         linear = numbers[:m, 0] if self.slides is None else ca.mtimes(self.slides.T, numbers[:m, 0])
         angular = ca.mtimes(self.turns.T, numbers[m:, 0])
@@ -72,7 +72,7 @@ class Directions:
 
 
 def speeds(terms: tuple[BodyTerm, ...], directions: Directions, momenta: tuple[Any, ...]) -> Expr:
-    """(n,): how fast the first body moves against the second along the directions."""
+    """Return how fast the first body moves against the second along the directions (n,)."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
     for term, m in zip(terms, momenta, strict=True):
         linear += term.sign * term.speed(m)
@@ -83,12 +83,12 @@ def speeds(terms: tuple[BodyTerm, ...], directions: Directions, momenta: tuple[A
 def apply_impulse(
     terms: tuple[BodyTerm, ...], directions: Directions, momenta: tuple[Any, ...], numbers: Expr, same: bool
 ) -> tuple[Any, ...]:
-    """The momenta after impulses (n,); ``same``: both bodies are of one tree of joints."""
+    """Return the momenta after impulses (n,); ``same``: both bodies are of one tree of joints."""
     return body_term.apply_impulse(terms, momenta, *directions.split(numbers), same)
 
 
 def mobility(terms: tuple[BodyTerm, ...], directions: Directions, same: bool) -> Expr:
-    """(n, n): the velocities along the directions that unit impulses along them bring about."""
+    """Return the velocities along the directions that unit impulses along them bring about (n, n)."""
     n = (3 if directions.slides is None else directions.slides.size1()) + directions.turns.size1()
     columns = []
     for k in range(n):

@@ -55,23 +55,23 @@ class LockConstraint:
     lasting: LastingForce | None = None
 
     def position_impulse(self, moved: Expr) -> Expr:
-        """(n,): displacements by the directions moved to impulses times a time that close what is then left open."""
+        """Return impulses times a time (n,) that close what is left open after displacements along the directions."""
         return -ca.mtimes(self.mass, self.error + moved)
 
     def at_end(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> JointImpulse:
-        """The force of a soft joint at the end of the substep, from momenta and impulse after the sweeps."""
+        """Return the force of a soft joint at the end of the substep, from momenta and impulse after the sweeps."""
         assert self.lasting is not None
         moving = self.lasting.slope * speeds(self.terms, self.seen, momenta)
         return JointImpulse(impulse.numbers / self.lasting.kick + moving + self.lasting.constant)
 
     def stored_form(self, impulse: JointImpulse) -> Expr:
-        """(n,): what is stored of an impulse; also of a force."""
+        """Return the stored form (n,) of an impulse or of a force."""
         if self.impulse_directions.slides is not None:
             return impulse.numbers
         return ca.vertcat(ca.mtimes(self.axes.T, impulse.numbers[:3, 0]), impulse.numbers[3:, 0])
 
     def from_stored(self, stored: Expr) -> JointImpulse:
-        """The impulse that is stored so."""
+        """Return the impulse that has this stored form."""
         return JointImpulse(stored if self.impulse_directions.slides is not None else in_world(self.axes, stored))
 
     def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
@@ -81,11 +81,11 @@ class LockConstraint:
         return self.apply(momenta, change), old.plus(change)
 
     def rates(self, momenta: tuple[Any, ...]) -> Expr:
-        """(n,): velocities along the directions."""
+        """Return the velocities along the directions (n,)."""
         return speeds(self.terms, self.seen, momenta)
 
     def linearised(self, momenta: tuple[Any, ...], old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
-        """The impulse change a (n,) and its slope B (n, n) by the velocities; see ``newton_start``."""
+        """Return the impulse change a (n,) and its slope B (n, n) by the velocities; see ``newton_start``."""
         soft = COMPLIANCE / ca.diag(self.mass)
         miss = self.rates(momenta) - self.target + (self.softness + by.centre * soft) * old.numbers
         stiff = ca.diag(1 / (self.softness + soft))
@@ -97,12 +97,12 @@ class LockConstraint:
 
 
 def in_world(axes: Expr, stored: Expr) -> Expr:
-    """(n,): numbers whose first three are along axes (3, 3), along the world's instead."""
+    """Return numbers (n,) whose first three, given along axes (3, 3), are along the world's axes."""
     return ca.vertcat(ca.mtimes(axes, stored[:3, 0]), stored[3:, 0])
 
 
 def inverse(k: Expr) -> Expr:
-    """(n, n): of a mobility, which is not symmetric where arms of impulses and velocities differ."""
+    """Return the inverse (n, n) of a mobility, which is not symmetric where arms of impulses and velocities differ."""
     n = k.size1()
     matrix = factorise([{j: k[i, j] for j in range(n)} for i in range(n)])
     columns = (matrix.solve({j: ca.SX(1)}) for j in range(n))

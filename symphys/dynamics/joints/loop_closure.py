@@ -18,14 +18,14 @@ from symphys.types import Expr
 
 Displacements = tuple[Displacement, ...]
 TreeDisplacement = Displacement | GeneralizedVelocities | None
-"""Of a body; of a tree along its coordinates, at its root; None for other bodies of a tree."""
+"""Displacement of a body, or of a tree along its coordinates, at its root; None for other bodies of a tree."""
 ClosedLoops = tuple[tuple[TreeDisplacement, ...], tuple[GeneralizedVelocities | None, ...]]
 """Displacements, and of each tree with loops what their locks did to them."""
 
 
 @dataclass(frozen=True)
 class LoopPass:
-    """What stays the same over the sweeps of the pass."""
+    """Motions and constraints, constant over the sweeps of the pass."""
 
     motions: tuple[PredictedMotion, ...]
     constraints: tuple[PlacedConstraint, ...]
@@ -37,7 +37,7 @@ def close_loops(
     constraints: tuple[PlacedConstraint, ...],
     along: Sequence[TreeDisplacement],
 ) -> ClosedLoops:
-    """Gauss-Seidel on displacements, over constraints of locks and limits."""
+    """Apply Gauss-Seidel to displacements, over constraints of locks and limits."""
     looped = {each.carriers[0] for each in constraints if isinstance(each.constraint, LockConstraint)}
     still = tuple(_still(each) if i in looped else None for i, each in enumerate(along))
     return repeat(sweeps, _fit_all, LoopPass(motions, constraints), (tuple(along), still))
@@ -51,7 +51,7 @@ def _still(along: TreeDisplacement) -> GeneralizedVelocities:
 
 @traced
 def displaced(jacobian: BodyJacobian | None, along: TreeDisplacement) -> Displacement:
-    """A body's displacement."""
+    """Return a body's displacement."""
     if jacobian is not None and isinstance(along, GeneralizedVelocities):
         more = apply(jacobian.matrix, along.numbers)
         return Displacement(more[:3], more[3:])
@@ -60,7 +60,7 @@ def displaced(jacobian: BodyJacobian | None, along: TreeDisplacement) -> Displac
 
 
 def _fit_all(fixed: LoopPass, state: ClosedLoops) -> ClosedLoops:
-    """One pass over all constraints."""
+    """Make one pass over all constraints."""
     along, made = list(state[0]), list(state[1])
     for each in fixed.constraints:
         before = tuple(along[i] for i in each.carriers)
@@ -79,7 +79,7 @@ def _fit_all(fixed: LoopPass, state: ClosedLoops) -> ClosedLoops:
 def _fit(
     constraint: LockConstraint | CoordinateConstraint, moved: Displacements, along: tuple[TreeDisplacement, ...]
 ) -> tuple[TreeDisplacement, ...]:
-    """Displacements after which the joint fits."""
+    """Return displacements after which the joint fits."""
     push, twist = constraint.impulse_directions.split(constraint.position_impulse(_relative(constraint, moved)))
     if constraint.same:
         after = along[0]

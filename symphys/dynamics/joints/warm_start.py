@@ -1,4 +1,4 @@
-"""What joints gave in a substep: what is kept of it, and what it does to bodies where the next one begins."""
+"""Persistent forces of joints: those of a substep that are stored, and their effect on bodies in the next one."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from symphys.model.world import World
 from symphys.types import Expr
 
 Struck = Mapping[frozenset[int], Expr]
-"""Of bodies that hang together: 1 if one of their contacts is an impact."""
+"""For each set of bodies connected by joints 1 if one of their contacts is an impact."""
 Total = list[Wrench]
 """Force and torque on each body."""
 Rotors = dict[int, Rates]
-"""Of each tree, by its root, the rates of its rotors."""
+"""Rates of the rotors of each tree, by its root."""
 Poses = Sequence[tuple[Expr, Expr]]
 """Positions and orientations."""
 
 
 def components(world: World) -> list[frozenset[int]]:
-    """The bodies that hang together by joints."""
+    """Return the bodies that hang together by joints."""
     found = [frozenset((i,)) for i in range(len(world.bodies))]
     for joint in world.joints:
         touched = [group for group in found if group & set(joint.bodies)]
@@ -98,7 +98,7 @@ def _lasting_forces(
     x: State,
     kick: Expr,
 ) -> State:
-    """Persistent forces of constraints that sweeps project.
+    """Return persistent forces of constraints that sweeps project.
 
     In a substep with an impact those of the last one stay: what held the impact is not to be told from them.
     """
@@ -132,7 +132,10 @@ def _lasting(
     struck: Expr,
     times: tuple[Expr, Expr, Expr],
 ) -> Expr:
-    """The force; of what a command gives the last one, although its impulse began with that of the step before."""
+    """Return the force.
+
+    Of what a command gives the last one, although its impulse began with that of the step before.
+    """
     kick, lag, shortest = times
     given = constraint.stored_form(impulse)
     if isinstance(constraint, CoordinateConstraint) and constraint.drive is not None:
@@ -211,7 +214,7 @@ def _against(
 def on_bodies(
     joint: Joint, poses: tuple[tuple[Expr, Expr], ...], parts: tuple[tuple[str, Expr], ...]
 ) -> tuple[tuple[Expr, Expr], ...]:
-    """Force and torque on each moving side."""
+    """Return force and torque on each moving side."""
     frames, now = joint_frames_at(joint, poses), ca.SX(0)
     placed, arms = frames.placed(now), frames.common_arms(now)
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
@@ -236,7 +239,7 @@ def _added(total: tuple[Expr, Expr], wrench: tuple[Expr, Expr]) -> tuple[Expr, E
 def keep_momentum(
     context: StepContext, momenta: Momenta, made: Mapping[int, JointCorrection], struck: Struck, duration: Expr
 ) -> Momenta:
-    """The momenta, with those that the displacements by joints stand for (as SHAKE has it), so that spin is kept.
+    """Return the momenta, with those of the displacements by joints (as in SHAKE), so that spin is kept.
 
     Not those by loops in a substep with an impact, where they make up for impulses that act late. They are no part of
     the forces that the next sweeps start from.
@@ -265,7 +268,7 @@ def keep_rotors(
     struck: Struck,
     duration: Expr,
 ) -> Rotors:
-    """The rates of rotors, with those that the displacements by joints stand for; see ``keep_momentum``."""
+    """Return the rates of rotors, with those that the displacements by joints stand for; see ``keep_momentum``."""
     dt, found = context.settings.scheme.dt, Rotors()
     for tree, each in zip(kinematic_trees(context.world.joints), coordinates, strict=True):
         root, more = tree.root, turned[tree.root]
@@ -292,7 +295,7 @@ def project_velocities(
     velocities: Sequence[tuple[Expr, Expr]],
     rotors: Rotors,
 ) -> list[tuple[Expr, Expr]]:
-    """Velocities and angular velocities; those of trees as they fit their joints at these poses.
+    """Return velocities and angular velocities; those of trees as they fit their joints at these poses.
 
     Args:
         context: what is simulated.

@@ -1,4 +1,4 @@
-"""What can be computed from a state without taking a step: sensors, coordinates of joints, queries."""
+"""Functions of a state that take no step: sensors, coordinates of joints, queries."""
 
 from symphys.dynamics.observation.joint_coordinates import joint_readings, joint_turn, reading_function, readings
 from symphys.dynamics.observation.queries import gap_function, half_step_function, slip_function

@@ -26,7 +26,7 @@ from symphys.model.world import World
 from symphys.types import Expr
 
 WORLD_ORIENTATION = (1.0, 0.0, 0.0, 0.0)
-"""Of the world."""
+"""Orientation of the world's frame."""
 Motion = tuple[Expr, Expr]
 """(3,) velocity [m/s], (3,) angular velocity [rad/s], world frame."""
 
@@ -50,13 +50,16 @@ class Reading:
 
 
 def readings(world: World, x: Expr) -> dict[str, Reading]:
-    """Every joint of a state x (see ``Layout``), by name."""
+    """Return every joint of a state x (see ``Layout``), by name."""
     layout = Layout(world)
     return {joint.name: _reading(world, layout, joint, x) for joint in world.joints}
 
 
 def reading_function(world: World, parameters: Sequence[Any] = ()) -> ca.Function:
-    """(x, p) -> value, rate, torque (coordinates of all joints,), separation (joints,); p stacks the SX parameters."""
+    """Return (x, p) -> value, rate, torque (coordinates of all joints,), separation (joints,).
+
+    P stacks the parameters.
+    """
     x = ca.SX.sym("x", Layout(world).size)
     found = readings(world, x).values()
     parts = zip(*((r.value, r.rate, r.torque, r.separation) for r in found), strict=True) if found else ((),) * 4
@@ -169,7 +172,10 @@ def _point(frame: JointFrame, pose: tuple[Expr, Expr]) -> Expr:
 
 @traced
 def _missing_wrench(motion: PredictedMotion, gravity: Expr, given: Wrench, lasting: Wrench) -> Wrench:
-    """The rates of a body's momenta less all forces on it but those that its tree locks; a frame has no momenta."""
+    """Return the rates of a body's momenta less all forces on it but those that its tree locks.
+
+    A frame has no momenta.
+    """
     counted = 0 if motion.massless else 1
     force = counted * motion.mass * (motion.acceleration - gravity) - given[0] - lasting[0]
     return force, counted * motion.torque - given[1] - lasting[1]
@@ -182,7 +188,7 @@ def _signed(wrench: Wrench, sign: int) -> Wrench:
 
 @traced
 def _with_wrench(total: Wrench, about: Expr, more: Wrench, place: Expr) -> Wrench:
-    """A force, and a torque about a point, with others that are given about another place."""
+    """Return a force, and a torque about a point, with others that are given about another place."""
     return total[0] + more[0], total[1] + more[1] + ca.cross(place - about, more[0])
 
 
@@ -274,7 +280,7 @@ JOINT_SENSORS = (
 
 
 def joint_turn(joint: Joint, orientations: tuple[Expr, ...], spins: tuple[Expr, ...]) -> tuple[Expr, Expr]:
-    """The orientation (4,) of the joint's first frame in its second, and the angular velocity (3,) [rad/s] there.
+    """Return the orientation (4,) of the joint's first frame in its second, and the angular velocity (3,) [rad/s].
 
     Args:
         joint: of the world.

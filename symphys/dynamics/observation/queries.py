@@ -28,7 +28,7 @@ STATE_FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 
 
 def gap_function(world: World, parameters: Sequence[Any] | None = None) -> ca.Function:
-    """The gaps [m] of a state: x -> (pairs,); candidates that cannot touch as things lie have a large one.
+    """Return the gaps [m] of a state: x -> (pairs,); candidates that cannot touch as things lie have a large one.
 
     With SX ``parameters`` of the world, also none, it is a function of (x, p).
     """
@@ -79,7 +79,7 @@ def _motions(world: World, context: StepContext, x: Expr) -> tuple[list[Predicte
 def half_step_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
-    """The state at t_k + dt/2, to first order in dt: (x, u, p) -> (nx,).
+    """Return the state at t_k + dt/2, to first order in dt: (x, u, p) -> (nx,).
 
     Places drift with the velocities at t_k: a force of these places alone makes the step position Verlet (drift, kick,
     drift), which is symplectic. Velocities change with the accelerations under gravity, the inputs and the persistent
@@ -106,7 +106,7 @@ def half_step_function(
 
 
 def _with_commanded_torques(context: StepContext, x: State) -> State:
-    """The state with the torques that are commanded in this step in place of those of the last one."""
+    """Return the state with the torques that are commanded in this step in place of those of the last one."""
     values, bodies = dict(x), context.world.bodies
     for joint in context.world.joints:
         given = context.input(f"{joint.name}.command")

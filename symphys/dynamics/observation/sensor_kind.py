@@ -1,4 +1,4 @@
-"""What a kind of sensor is: one declaration of a quantity that formulas read by name, such as ``torso.gyro``."""
+"""Kinds of sensors: each declares a quantity that formulas read by name, such as ``torso.gyro``."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class SensedState:
         return Layout(self.world)
 
     def part(self, name: str) -> Expr:
-        """The part of the state that has this name."""
+        """Return the part of the state that has this name."""
         return self.x[self.layout[name]]
 
     def shared(self, make: Callable[[SensedState], T]) -> T:
@@ -100,6 +100,6 @@ class SensorKind:
     mjcf: MjcfSensor | None = None
 
     def unit_of(self, owner: Any) -> str:
-        """The unit of its components, of this body, joint or site."""
+        """Return the unit of its components, of this body, joint or site."""
         slides = isinstance(owner, Joint) and any(not coordinate.turns for coordinate in owner.kind.coordinates)
         return self.sliding_unit if slides and self.sliding_unit is not None else self.unit

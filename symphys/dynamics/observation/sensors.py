@@ -19,13 +19,13 @@ from symphys.types import Expr
 
 
 def _of_body(at: SensedState, site: Site, field: str) -> Expr:
-    """A field of the body that carries the site."""
+    """Return a field of the body that carries the site."""
     assert site.body is not None
     return at.part(f"{at.world.bodies[site.body].name}.{field}")
 
 
 def _place(at: SensedState, site: Site) -> Expr:
-    """The site's position in the frame of what carries it (3,) [m]."""
+    """Return the site's position in the frame of what carries it (3,) [m]."""
     return type(at.x)(ca.vertcat(*site.position))
 
 
@@ -90,23 +90,26 @@ def _part(field: str) -> Callable[[SensedState, Body], Expr]:
 
 
 def _gyro(at: SensedState, body: Body) -> Expr:
-    """The angular velocity in the body's frame (3,) [rad/s]."""
+    """Return the angular velocity in the body's frame (3,) [rad/s]."""
     return ca.mtimes(_to_body(at, body), at.part(f"{body.name}.angular_velocity"))
 
 
 def _to_body(at: SensedState, body: Body) -> Expr:
-    """(3, 3): from the world's frame to the body's."""
+    """Return the from the world's frame to the body's (3, 3)."""
     return matrix(at.part(f"{body.name}.orientation")).T
 
 
 def _accelerometer(at: SensedState, body: Body) -> Expr:
-    """The mean acceleration over the last step less gravity, in the body's frame (3,) [m/s^2]."""
+    """Return the mean acceleration over the last step less gravity, in the body's frame (3,) [m/s^2]."""
     rate = (at.part(f"{body.name}.velocity") - at.before[f"{body.name}.velocity"]) / at.dt
     return ca.mtimes(_to_body(at, body), rate - ca.vertcat(*at.world.gravity))
 
 
 def _contact_force(at: SensedState, body: Body) -> Expr:
-    """The sum of the contact forces that last, world frame (3,) [N]; impacts, which take no time, are left out."""
+    """Return the sum of the contact forces that last, world frame (3,) [N].
+
+    Impacts, which take no time, are left out.
+    """
     total = type(at.x).zeros(3)
     for pair in at.world.pairs:
         for side, sign in ((pair.first, 1), (pair.second, -1)):
@@ -205,7 +208,7 @@ class NamedSensor:
 
     @property
     def unit(self) -> str:
-        """The unit of its components."""
+        """Return the unit of its components."""
         return self.kind.unit_of(self.owner)
 
 

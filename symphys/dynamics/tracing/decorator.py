@@ -20,14 +20,14 @@ C = TypeVar("C")
 
 
 class Tracing(Protocol):
-    """What traces the calls of a step."""
+    """A tracer of the calls of a step."""
 
     def guard(self, word: Any) -> None:
         """Allow calls that depend on ``word`` to be left out where it is 0."""
         ...
 
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
-        """``function(*arguments, **named)``."""
+        """Call ``function(*arguments, **named)``."""
         ...
 
     def section(self, word: Any) -> None:
@@ -39,7 +39,7 @@ class Tracing(Protocol):
         ...
 
     def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
-        """The state after ``count`` times ``state = once(context, state)``."""
+        """Repeat ``state = once(context, state)`` ``count`` times."""
         ...
 
 
@@ -48,7 +48,7 @@ _TRACER: ContextVar[Tracing | None] = ContextVar("tracer", default=None)
 
 @contextmanager
 def tracing(tracer: Tracing | None) -> Iterator[None]:
-    """Traced functions are called through ``tracer``; None: they are called plainly."""
+    """Call traced functions through ``tracer`` in the block; None: plainly."""
     token = _TRACER.set(tracer)
     try:
         yield
@@ -57,7 +57,7 @@ def tracing(tracer: Tracing | None) -> Iterator[None]:
 
 
 def traced(function: Callable[P, T]) -> Callable[P, T]:
-    """The function (or method of a dataclass), called through the current tracer."""
+    """Return the function (or method of a dataclass), called through the current tracer."""
 
     @wraps(function)
     def call(*arguments: P.args, **named: P.kwargs) -> T:
@@ -93,7 +93,7 @@ def contiguous(tree: T) -> T:
 
 
 def repeat(count: int, once: Callable[[C, T], T], context: C, state: T) -> T:
-    """The state after ``count`` times ``state = once(context, state)``; a tracer copies what repeats itself."""
+    """Repeat ``state = once(context, state)`` ``count`` times; a tracer copies calls that repeat."""
     tracer = _TRACER.get()
     if tracer is not None:
         return tracer.repeat(count, once, context, state)

@@ -1,4 +1,4 @@
-"""Which calls of a traced step are without effect where a guard is 0, and what stands for their results then.
+"""Guards: the calls of a traced step without effect where a guard is 0, and substitutes of their results.
 
 A guard is a word of the step that is 0 or 1, such as whether a pair of surfaces is near. What it multiplies is 0 with
 it, and what is added to that stays as it is. So each call is evaluated with symbols, and with 0 where its arguments are
@@ -23,9 +23,9 @@ from symphys.types import Expr
 MAX_EXAMINED_ARGUMENTS = 80
 """Arguments of a call that is not looked into: it puts together what many bodies or pairs have."""
 Known = int
-"""Which entries of a vector are known to be 0, as bits."""
+"""Entries of a vector that are known to be 0, as bits."""
 Pattern = tuple[Known, ...]
-"""What is known of each argument of a call."""
+"""Known zeros of each argument of a call."""
 
 
 class Part(NamedTuple):
@@ -36,7 +36,7 @@ class Part(NamedTuple):
 
 
 class Guard(NamedTuple):
-    """When a call may be left out.
+    """The condition under which a call may be skipped.
 
     Attributes:
         word: the call is without effect where this is 0: one entry.
@@ -60,7 +60,7 @@ class _Substitute:
 
 
 Simplified = tuple[_Substitute | None, Known]
-"""What a result equals, and where it is 0."""
+"""The substitute of a result, and its known zeros."""
 
 
 def with_guards(
@@ -68,7 +68,7 @@ def with_guards(
     guards: Sequence[TracedVector],
     sections: Sequence[tuple[TracedVector, int]],
 ) -> tuple[TracedCall, ...]:
-    """The calls, with what leaves them without effect; each section in one piece.
+    """Return the calls, with what leaves them without effect; each section in one piece.
 
     Args:
         calls: of a step.
@@ -129,7 +129,7 @@ class _GuardSearch:
         return found
 
     def writers(self, numbers: Sequence[int]) -> set[int]:
-        """The calls that write vectors."""
+        """Return the calls that write vectors."""
         return {self._writer[number] for number in numbers}
 
     def skippable(
@@ -139,7 +139,7 @@ class _GuardSearch:
         implied_calls: Collection[int] = (),
         substitutes: Iterable[Guard] = (),
     ) -> dict[int, Guard]:
-        """The calls that are without effect where ``word`` is 0, but for those ``without``.
+        """Return the calls that are without effect where ``word`` is 0, but for those ``without``.
 
         ``implied_calls`` are among these: calls that guards of their own skip then; ``substitutes`` are these guards,
         which name what replaces their results.
@@ -173,7 +173,7 @@ class _GuardSearch:
         return left
 
     def consecutive(self, order: Sequence[int], left: Mapping[int, Guard]) -> list[int] | None:
-        """The calls in an order in which those of a section follow one another; None if there is none."""
+        """Return the calls in an order in which those of a section follow one another; None if there is none."""
         places = [i for i, k in enumerate(order) if k in left]
         if not places:
             return None
@@ -195,7 +195,7 @@ class _GuardSearch:
         return [*order[: places[0]], *before, *inside, *after, *order[places[-1] + 1 :]]
 
     def dependencies(self, words: Sequence[TracedVector]) -> set[int]:
-        """The calls that words depend on."""
+        """Return the calls that words depend on."""
         found: set[int] = set()
         waiting = [self._writer[word.number] for word in words if word.number in self._writer]
         while waiting:
@@ -308,7 +308,7 @@ class _IgnoredArguments:
     """For each argument of a function whether results do not depend on it, and are the same with zeros in its place."""
 
     def __init__(self, function: ca.Function, zeros: Pattern) -> None:
-        """``zeros``: what is known of the arguments."""
+        """Analyse a function; ``zeros``: known zeros of the arguments."""
         self._function, self._zeros = function, zeros
         homes, results = _with_zeros(function, zeros)
         read: list[Expr] = ca.symvar(ca.vertcat(ca.SX(0, 1), *map(ca.vec, results)))
@@ -330,7 +330,7 @@ class _IgnoredArguments:
 
 
 def _entry(expression: Expr, homes: dict[int, tuple[int, int]]) -> Any:
-    """0, (argument, entry) that an expression equals, or None."""
+    """Return 0, the (argument, entry) that an expression equals, or None."""
     if expression.is_constant():
         return 0 if float(expression) == 0 else None
     return homes.get(expression.element_hash())

@@ -16,7 +16,7 @@ from symphys.types import Expr
 
 @dataclass(frozen=True)
 class Leaf:
-    """Where a tree has a matrix: its sparsity; ``pattern`` None: dense."""
+    """A matrix of a tree: its sparsity; ``pattern`` None: dense."""
 
     rows: int
     columns: int
@@ -41,7 +41,7 @@ class TracedMatrix:
     __slots__ = ("_codes", "_slots", "kept", "leaf")
 
     def __init__(self, leaf: Leaf, codes: tuple[Code, ...], slots: Sequence[int] | None = None) -> None:
-        """``slots``: those that the slots of ``codes`` number; None: codes have the slots themselves."""
+        """Keep the codes; ``slots``: those that their slots number; None: codes have the slots themselves."""
         self.leaf, self._codes, self._slots = leaf, codes, slots
         self.kept: Any = None
 
@@ -64,7 +64,7 @@ class TracedMatrix:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
+        """Return rows and columns."""
         return self.leaf.rows, self.leaf.columns
 
     __add__, __radd__ = traced(lambda a, b: a + b), traced(lambda a, b: b + a)
@@ -78,7 +78,7 @@ class TracedMatrix:
 
 @dataclass(frozen=True)
 class TreeDef:
-    """Where a tree forks: its kind, its keys, and what hangs below. Also what is no fork: ``keys`` hold that."""
+    """The structure of a node: its kind, its keys and its children. Of a value without children ``keys`` holds it."""
 
     kind: type
     keys: tuple[Hashable, ...]
@@ -86,12 +86,12 @@ class TreeDef:
 
 
 def outline(matrix: Expr) -> Leaf:
-    """The sparsity of an SX matrix."""
+    """Return the sparsity of an SX matrix."""
     return Leaf(matrix.size1(), matrix.size2(), None if matrix.is_dense() else tuple(matrix.sparsity().find()))
 
 
 def flatten(tree: Any, leaves: list[Expr]) -> Hashable:
-    """The shape of a tree, which compares equal for equal trees; its matrices are appended to ``leaves``.
+    """Return the shape of a tree, which compares equal for equal trees; its matrices are appended to ``leaves``.
 
     Whatever is neither a matrix nor a fork (numbers, texts, functions) belongs to the shape.
     """
@@ -119,7 +119,7 @@ def field_names(kind: type) -> tuple[str, ...] | None:
 
 
 def unflatten(shape: Any, leaves: Iterator[Expr]) -> Any:
-    """The tree of this shape with other matrices."""
+    """Return the tree of this shape with other matrices."""
     kind = type(shape)
     if kind is Leaf:
         return next(leaves)
@@ -132,7 +132,7 @@ def unflatten(shape: Any, leaves: Iterator[Expr]) -> Any:
 
 
 def leaves_of(shape: Any, found: list[Leaf]) -> None:
-    """The outlines of a tree's matrices, from its shape, in order."""
+    """Append the outlines of a tree's matrices, from its shape, in order."""
     if type(shape) is Leaf:
         found.append(shape)
     else:
@@ -161,7 +161,7 @@ def slots_of(shape: Any) -> list[int]:
 
 
 def matrix(leaf: Leaf, entries: list[Expr]) -> Expr:
-    """A matrix of this sparsity from its entries."""
+    """Return a matrix of this sparsity from its entries."""
     if leaf == SCALAR:
         return entries[0]
     column = ca.vertcat(*entries) if entries else ca.SX(0, 1)

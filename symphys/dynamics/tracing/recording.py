@@ -60,7 +60,7 @@ class Recorder(Tracer):
         self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
 
     def argument(self, name: str, symbols: Expr) -> None:
-        """A slot for an argument of the step."""
+        """Add a slot for an argument of the step."""
         self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
 
     def guard(self, word: Any) -> None:
@@ -101,7 +101,7 @@ class Recorder(Tracer):
         return together
 
     def give(self, name: str, values: Sequence[Expr]) -> TracedVector:
-        """A call that puts values side by side."""
+        """Record a call that puts values side by side."""
         stacked = self.call(_side_by_side, (tuple(values),), {})
         slots: dict[int, int] = {}
         codes = [(slots.setdefault(c[0], len(slots)), c[1]) if isinstance(c, tuple) else c for c in stacked.codes]
@@ -146,7 +146,7 @@ class Recorder(Tracer):
         return dict(zip(old_slots, new_slots, strict=True)) if old == new else None
 
     def _copy(self, template: list[TracedCall], slots: dict[int, int], after: T) -> T:
-        """The state one time later: as ``template`` led to ``after``, its copy leads on from there."""
+        """Return the state one time later: as ``template`` led to ``after``, its copy leads on from there."""
         for call in template:
             inputs = [slots.get(slot.number, slot.number) for slot in call.inputs]
             given = self._add("", call.function, inputs)
@@ -169,7 +169,7 @@ class Recorder(Tracer):
         return range(first, len(own))
 
     def _results(self, function: ca.Function) -> tuple[int, ...]:
-        """The sizes of what a function gives."""
+        """Return the sizes of what a function gives."""
         known = self._outputs.get(id(function))
         if known is None or known[0] is not function:
             known = self._outputs[id(function)] = function, tuple(map(function.numel_out, range(function.n_out())))
@@ -185,7 +185,7 @@ Words = int
 
 
 def without_dead_code(calls: Sequence[TracedCall]) -> tuple[TracedCall, ...]:
-    """The calls with the same named results; other vectors hold only the entries that are used."""
+    """Return the calls with the same named results; other vectors hold only the entries that are used."""
     return _Trimming(calls).calls()
 
 
@@ -220,7 +220,7 @@ class _Trimming:
         return tuple(found)
 
     def _needed(self, call: TracedCall, kept: tuple[Words, ...]) -> tuple[Words, ...]:
-        """The words of its inputs that a call needs for what is read of it."""
+        """Return the words of its inputs that a call needs for what is read of it."""
         key = id(call.function), kept
         if key not in self._needs:
             symbols: list[Expr] = [ca.SX.sym("a", slot.size) for slot in call.inputs]
@@ -248,7 +248,7 @@ class _Trimming:
         return found
 
     def _function(self, call: TracedCall, needs: Sequence[Words], given: tuple[Words, ...]) -> ca.Function:
-        """The function from what is kept of the inputs to what is kept of the outputs."""
+        """Return the function from what is kept of the inputs to what is kept of the outputs."""
         used = self._used
         kept = tuple([used[slot.number] for slot in call.inputs])
         key = id(call.function), kept, given
@@ -275,6 +275,6 @@ def _symbols_of(columns: list[Expr]) -> set[int]:
 
 
 def _results(function: ca.Function, arguments: Sequence[Expr], kept: Sequence[Words]) -> list[Expr]:
-    """The words that are kept of what a function gives."""
+    """Return the words that are kept of what a function gives."""
     results = function.call(list(arguments), True, False)
     return [ca.densify(result)[_places(words)] for result, words in zip(results, kept, strict=True)]

@@ -64,7 +64,7 @@ class Numbers:
         self.passing: set[int] = set()
 
     def of(self, key: Hashable) -> int:
-        """The number of what equals ``key``."""
+        """Return the number of what equals ``key``."""
         return self._numbers.setdefault(key, len(self._numbers))
 
 
@@ -72,7 +72,7 @@ class Structures:
     """The structures of trees, and the branches that have been looked at."""
 
     def __init__(self, numbers: Numbers, codes: Callable[[Expr], tuple[Code, ...]], sizes: Sequence[int]) -> None:
-        """``codes`` of an expression's entries; ``sizes`` of the slots."""
+        """Start without structures; ``codes`` of an expression's entries; ``sizes`` of the slots."""
         self._number, self._passing = numbers.of, numbers.passing
         self._codes, self._sizes = codes, sizes
         self._branches: dict[int, tuple[Any, Structure]] = {}
@@ -128,15 +128,15 @@ class Structures:
 
 
 class Blueprint:
-    """How trees of one shape are put together from their matrices; parts without any are made once."""
+    """Rebuilds trees of one shape from their matrices; parts without any are made once."""
 
     def __init__(self, shape: Any) -> None:
-        """``shape``: see ``flatten``."""
+        """Prepare a shape, see ``flatten``."""
         self._shape = _with_constant_parts(shape)
         self._structures: tuple[tuple[int, tuple[int, ...]], ...] | None = None
 
     def tree(self, leaves: Iterator[Expr], slots: Sequence[int], structures: Structures) -> Any:
-        """A tree, and its dataclasses known to ``structures``; ``slots`` are those that the leaves lie in."""
+        """Return a tree, and its dataclasses known to ``structures``; ``slots`` are those that the leaves lie in."""
         nodes: list[Any] = []
         tree = _assembled(self._shape, leaves, nodes)
         if nodes and len(set(slots)) == len(slots):
@@ -170,7 +170,7 @@ def _with_constant_parts(shape: Any) -> Any:
 
 
 def _assembled(shape: Any, leaves: Iterator[Expr], nodes: list[Any]) -> Any:
-    """The tree of this shape; its dataclasses are appended to ``nodes``, inner ones first."""
+    """Return the tree of this shape; its dataclasses are appended to ``nodes``, inner ones first."""
     kind = type(shape)
     if kind is Leaf:
         return next(leaves)
@@ -208,7 +208,7 @@ class Template:
 
 
 class TraceCache:
-    """What tracers have built, for all tracers of this process: one problem's step is traced for several uses.
+    """A cache of templates for all tracers of this process: one problem's step is traced for several uses.
 
     Attributes:
         numbers: of the structures of arguments.
@@ -222,7 +222,7 @@ class TraceCache:
         self._functions: dict[str, ca.Function] = {}
 
     def shared(self, function: ca.Function) -> ca.Function:
-        """A function, or an equal one that was there before."""
+        """Return a function, or an equal one that was there before."""
         return self._functions.setdefault(function.serialize(), function)
 
 
@@ -243,7 +243,7 @@ class Tracer(ABC):
     """Calls traced functions; see ``decorator``."""
 
     def __init__(self, reduces: bool = True) -> None:
-        """``reduces``: what a function computes twice is looked for, which takes up to half of the building.
+        """Start without slots; ``reduces``: eliminate common subexpressions, up to half of the building time.
 
         Where that was done for another tracer, this one has it too.
         """
@@ -256,7 +256,7 @@ class Tracer(ABC):
         self._structures = Structures(self._cache.numbers, self._codes, self._sizes)
 
     def repeat(self, count: int, once: Callable[[Any, T], T], context: Any, state: T) -> T:
-        """The state after ``count`` times ``state = once(context, state)``."""
+        """Repeat ``state = once(context, state)`` ``count`` times."""
         for _ in range(count):
             state = once(context, state)
         return state
@@ -275,20 +275,20 @@ class Tracer(ABC):
 
     @abstractmethod
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
-        """The slots that take what the function gives."""
+        """Return the slots that take what the function gives."""
 
     @abstractmethod
     def _adopt(self, column: Expr) -> None:
         """Find a home for expressions that come from no part, such as a mass that follows from a radius."""
 
     def take(self, column: Expr) -> int:
-        """A slot for a column of symbols or expressions."""
+        """Return a slot for a column of symbols or expressions."""
         number = self._slot(column.numel())
         self._hold(number, column)
         return number
 
     def _slot(self, size: int) -> int:
-        """A slot of that size, as yet without expressions."""
+        """Return a slot of that size, as yet without expressions."""
         self._columns.append(None)
         self._entries.append([])
         self._sizes.append(size)
@@ -310,14 +310,14 @@ class Tracer(ABC):
         return self._entries[code[0]][code[1]]
 
     def value(self, leaf: Expr) -> Expr:
-        """A leaf of a tree as an expression."""
+        """Return a leaf of a tree as an expression."""
         if not isinstance(leaf, TracedMatrix):
             return leaf
         entries = [ca.SX(c) if isinstance(c, float) else self._entry(c) for c in leaf.codes]
         return matrix(leaf.leaf, entries)
 
     def call(self, function: Callable[..., T], arguments: tuple[Any, ...], named: dict[str, Any]) -> T:
-        """``function(*arguments, **named)``."""
+        """Call ``function(*arguments, **named)``."""
         number, slots = self._structures.of_call(arguments, named)
         known = self._cache.templates
         template = known.get((function, number, True)) or known.get((function, number, self._reduces))
@@ -337,7 +337,7 @@ class Tracer(ABC):
     def _build(
         self, function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any], slots: Sequence[int]
     ) -> Template:
-        """The template of a function for arguments of this structure."""
+        """Return the template of a function for arguments of this structure."""
         leaves: list[Expr] = []
         shape = flatten((arguments, named), leaves)
         places = {slot: k for k, slot in enumerate(slots)}
@@ -366,7 +366,7 @@ class Tracer(ABC):
         return Template(built, tuple(used), blueprint, matrices)
 
     def _fill(self, template: Template, slots: Sequence[int]) -> Any:
-        """The tree that a template stands for, given the slots that its arguments lie in."""
+        """Return the tree that a template stands for, given the slots that its arguments lie in."""
         if template.function is not None:
             given = self._apply(template.function, [slots[k] for k in template.used])
             slots = (*slots, *reversed(given))
@@ -375,7 +375,7 @@ class Tracer(ABC):
 
 
 def _argument(symbols: Sequence[Expr], entries: Sequence[Sequence[Expr]], leaf: Leaf, codes: Sequence[Code]) -> Expr:
-    """A matrix of symbols: numbers side by side in one slot in one piece, which is faster than one by one."""
+    """Return a matrix of symbols: numbers side by side in one slot in one piece, which is faster than one by one."""
     first, count = codes[0] if codes else 0.0, len(codes)
     if leaf.pattern is None and leaf != SCALAR and not isinstance(first, float):
         slot, start = first
@@ -402,15 +402,15 @@ class InlineTracer(Tracer):
 
 
 class _Results:
-    """What a part gives, column by column, and where each of its numbers lies."""
+    """Results of a traced function, column by column, and the slot of each number."""
 
     def __init__(self, entries: Sequence[Sequence[Expr]]) -> None:
-        """``entries`` of the slots that the arguments lie in: what is one of them need not be given."""
+        """Start without columns; ``entries`` of the arguments' slots need not be returned."""
         self.columns: dict[int, list[Expr]] = {}
         self._homes = {e.element_hash(): (k, j) for k, column in enumerate(entries) for j, e in enumerate(column)}
 
     def placed(self, matrices: Sequence[Expr], slots: Sequence[int]) -> tuple[tuple[Leaf, tuple[Code, ...]], ...]:
-        """Outlines and codes of matrices, whose numbers go to their slots if they lie nowhere yet.
+        """Return outlines and codes of matrices, whose numbers go to their slots if they lie nowhere yet.
 
         The few numbers of a body, such as its velocities, stay together, also those that are left as they were.
         """

@@ -14,7 +14,7 @@ from worlds.guarded import guarded_sections, halving, program_of, whole
 
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Place, Program, compile_program
 from symphys.codegen.cuda import compile_on
-from symphys.codegen.cuda.schedule import schedules
+from symphys.codegen.cuda.kernel import schedules
 from symphys.codegen.emit.alternatives import LEFT_OUT
 from symphys.codegen.emit.plan import FAST_MEMORY, plan
 

@@ -17,8 +17,7 @@ from worlds.monopod import MONOPOD
 from symphys.codegen import Cache, Kernel, KernelUnavailable, Program, compile_program
 from symphys.codegen.cuda import DeviceKernel, compile_on, find_gpu
 from symphys.codegen.cuda.gpu import compiled, image, linked
-from symphys.codegen.cuda.kernel import device_sources
-from symphys.codegen.cuda.schedule import schedules
+from symphys.codegen.cuda.kernel import device_sources, schedules
 from symphys.codegen.emit.plan import FAST_MEMORY, plan
 from symphys.transcription import rollout_program
 

@@ -17,7 +17,7 @@ from symphys.model.shapes import Capsule, SolidShape
 from symphys.types import Expr
 
 HALVINGS = 8
-"""Of the capsule's length, before the last steps."""
+"""Bisections of the capsule's length before the secant steps."""
 SECANTS = 2
 """Last steps, which also carry the derivative of the place."""
 TINY_SLOPE = 1e-12
@@ -27,7 +27,7 @@ TINY_SLOPE = 1e-12
 def capsule_in_field(
     capsule: Capsule, shape: SolidShape, field: Field, a: PredictedPath, b: PredictedPath
 ) -> list[Contact]:
-    """Three points: the round ends, and where the side between them is nearest, if that is between them."""
+    """Return three points: the round ends, and where the side between them is nearest, if that is between them."""
     tips = ends(capsule)
     found = [ball_in_field(a.path(end), a.arm(end), capsule.radius, shape, field, b) for end in tips]
     time, middle = ca.SX(0), None

@@ -51,7 +51,7 @@ class TriangleField:
         return area / ca.sqrt(ca.dot(area, area))
 
     def _foot(self, point: Expr) -> tuple[Expr, Expr, Expr]:
-        """The height over the plane, whether the foot is within the edges, and from the nearest point of these."""
+        """Return the height over the plane, whether the foot is within the edges, and the vector from these."""
         face = self._face()
         height, within, found = ca.dot(face, point - self.corners[0]), ca.SX(1), list[Expr]()
         for i, j in EDGES:
@@ -86,7 +86,7 @@ def squared_distances(triangles: NDArray[np.float64], point: Expr) -> list[Expr]
 
 
 def nearest_triangle(shape: Convex, point: Expr) -> TriangleField:
-    """The triangle of a hull that is nearest to a point (3,), along the shape's own axes."""
+    """Return the triangle of a hull that is nearest to a point (3,), along the shape's own axes."""
     triangles = shape.hull.corners[shape.hull.triangles]
     squares = squared_distances(triangles, point)
     least, chosen = squares[0], ca.SX(ca.DM(triangles[0].ravel()))
@@ -97,7 +97,7 @@ def nearest_triangle(shape: Convex, point: Expr) -> TriangleField:
 
 
 def sphere_convex(sphere: Sphere, shape: Convex, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """One point."""
+    """Return the one point of contact."""
     path, frame = a.path(sphere.centre), axes(b, shape)
     apart = path - b.path(shape.centre)
     contact, time = None, ca.SX(0)

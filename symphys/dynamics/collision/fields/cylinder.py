@@ -48,7 +48,7 @@ class CylinderField:
         return across * outward + along * ca.if_else(point[2] >= 0, 1, -1) * ca.SX([0, 0, 1])
 
     def _from_axis(self, point: Expr) -> Expr:
-        """(3,): from the axis; along x where the point is on it."""
+        """Return the vector (3,) from the axis to a point; along x where the point is on it."""
         on_axis = point[0] * point[0] + point[1] * point[1] < TINY_SQUARE
         return ca.vertcat(point[0] + ca.if_else(on_axis, MIN_AXIS_DISTANCE, 0), point[1], 0)
 
@@ -58,12 +58,12 @@ class CylinderField:
 
 
 def sphere_cylinder(sphere: Sphere, cylinder: Cylinder, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """One point."""
+    """Return the one point of contact."""
     field = CylinderField(cylinder.radius, cylinder.half_length)
     return [ball_in_field(a.path(sphere.centre), a.arm(sphere.centre), sphere.radius, cylinder, field, b)]
 
 
 def capsule_cylinder(capsule: Capsule, cylinder: Cylinder, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """Three points: the round ends, and where the side is nearest."""
+    """Return three points: the round ends, and where the side is nearest."""
     field = CylinderField(cylinder.radius, cylinder.half_length)
     return capsule_in_field(capsule, cylinder, field, a, b)

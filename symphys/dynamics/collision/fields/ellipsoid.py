@@ -17,7 +17,7 @@ from symphys.types import Expr
 FOOT_STEPS = 5
 """Newton steps towards the foot of a perpendicular."""
 POLE_MARGIN = 0.02
-"""Of the smallest squared radius: how near the multiplier may come to its pole, for points deep inside."""
+"""Least distance of the multiplier from its pole, as a share of the smallest squared radius, for points deep inside."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class EllipsoidField:
         return (parts + upright) / length(parts + upright)
 
     def _foot(self, point: Expr) -> tuple[Expr, Expr]:
-        """The multiplier m, and p_i / (r_i^2 + m): a vector along the normal."""
+        """Return the multiplier m, and p_i / (r_i^2 + m): a vector along the normal."""
         radii = ca.vertcat(*map(ca.SX, self.radii))
         squares, scaled = radii * radii, radii * point
         low = (POLE_MARGIN - 1) * ca.mmin(squares)
@@ -58,11 +58,11 @@ class EllipsoidField:
 
 
 def sphere_ellipsoid(sphere: Sphere, ellipsoid: Ellipsoid, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """One point."""
+    """Return the one point of contact."""
     field = EllipsoidField(ellipsoid.radii)
     return [ball_in_field(a.path(sphere.centre), a.arm(sphere.centre), sphere.radius, ellipsoid, field, b)]
 
 
 def capsule_ellipsoid(capsule: Capsule, ellipsoid: Ellipsoid, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """Three points: the round ends, and where the side is nearest."""
+    """Return three points: the round ends, and where the side is nearest."""
     return capsule_in_field(capsule, ellipsoid, EllipsoidField(ellipsoid.radii), a, b)

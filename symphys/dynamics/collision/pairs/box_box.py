@@ -32,15 +32,16 @@ from symphys.model.shapes import Box
 from symphys.types import Expr
 
 RIM_SHARE = 0.001
-"""Of a face's size: how far beyond its rim a corner still counts, as a point of the rim. So no candidate comes and
-goes as boxes that lie flush creep by rounding; it is given up only where others have long been at the same place."""
+"""Share of a face's size by which a corner may lie beyond its rim and count as a point of the rim. So no candidate
+appears or disappears as boxes that lie flush creep by rounding; it is given up only where others have long been at the
+same place."""
 MIN_EDGE_CHANGE = 1e-9
 """[m] an edge that changes less than this across a strip counts as parallel to it."""
 
 
 @dataclass(frozen=True)
 class BoxApproach:
-    """How two boxes come near each other.
+    """The approach of two boxes: its normal, its time and the overlap.
 
     Attributes:
         bodies: paths of the bodies that carry them.
@@ -63,7 +64,7 @@ class BoxApproach:
         return replace(met, hit=ca.logic_and(met.hit, ca.logic_not(self.apart)))
 
     def flipped(self) -> BoxApproach:
-        """Seen from the other box."""
+        """Return the approach as seen from the other box."""
         return replace(self, bodies=(self.bodies[1], self.bodies[0]), normal=-1 * self.normal)
 
 
@@ -73,7 +74,7 @@ def approach_of(near: BoxOverlap, bodies: tuple[PredictedPath, PredictedPath], s
 
 
 def box_box(first: Box, second: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """Sixteen points: the corners of each face over the other, and where their edges cross."""
+    """Return sixteen points: the corners of each face over the other, and where their edges cross."""
     one, other = moving_box(first, a), moving_box(second, b)
     near = first_overlap(one, other, *faces_and_edges(one, other), a.dt)
     approach = approach_of(near, (a, b), sum(first.half_sizes) + sum(second.half_sizes))
@@ -87,7 +88,7 @@ def box_box(first: Box, second: Box, a: PredictedPath, b: PredictedPath) -> list
 
 
 def corners_over(face: Face, ground: Face, approach: BoxApproach) -> list[Contact]:
-    """The corners of a face over the other."""
+    """Return the corners of a face over the other."""
     found, t = [], approach.time
     for corner in face.corners():
         away = (corner - ground.centre).at(t)
@@ -102,7 +103,7 @@ def corners_over(face: Face, ground: Face, approach: BoxApproach) -> list[Contac
 
 
 def clamp(x: Expr, half: Expr) -> Expr:
-    """X in [-half, half]."""
+    """Clamp ``x`` to [-half, half]."""
     return ca.fmin(ca.fmax(x, -half), half)
 
 
@@ -133,7 +134,7 @@ def seen_along(point: Expr, ground: Face, approach: BoxApproach) -> tuple[Expr, 
 
 
 def inside_strip(start: Expr, change: Expr, half: Expr) -> tuple[Expr, Expr]:
-    """The shares of an edge at which it enters and leaves |x| <= half; an edge along the rim is inside."""
+    """Return the shares of an edge at which it enters and leaves |x| <= half; an edge along the rim is inside."""
     along = ca.fabs(change) < MIN_EDGE_CHANGE
     pace, wide = ca.if_else(along, MIN_EDGE_CHANGE, change), half + ca.if_else(along, RIM_SHARE * half, 0)
     one, other = (-wide - start) / pace, (wide - start) / pace

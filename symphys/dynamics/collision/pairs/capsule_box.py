@@ -17,7 +17,7 @@ from symphys.model.shapes import Box, Capsule
 
 
 def capsule_box(capsule: Capsule, box: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """Eight points: the round ends, the side across the box's face, the corners of that face."""
+    """Return eight points: the round ends, the side across the box's face, the corners of that face."""
     tips = ends(capsule)
     found = [ball_at_box(end, capsule.radius, box, a, b) for end in tips]
     rod, other = moving_box(capsule, a), moving_box(box, b)

@@ -23,7 +23,7 @@ PARALLEL = 1e-6
 
 
 def capsule_capsule(first: Capsule, second: Capsule, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """Five points: the ends of the first, the ends of the second, and between."""
+    """Return five points: the ends of the first, the ends of the second, and between."""
     return [
         *on_capsule(first, second, a, b),
         *map(flipped, on_capsule(second, first, b, a)),
@@ -32,12 +32,12 @@ def capsule_capsule(first: Capsule, second: Capsule, a: PredictedPath, b: Predic
 
 
 def on_capsule(first: Capsule, second: Capsule, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """The round ends of the first against the second."""
+    """Return the round ends of the first against the second."""
     return [ball_at_capsule(a.path(end), a.arm(end), first.radius, second, b) for end in ends(first)]
 
 
 def crossing(first: Capsule, second: Capsule, a: PredictedPath, b: PredictedPath) -> Contact:
-    """The contact between the ends of both; off where the nearest points are ends or the axes parallel."""
+    """Return the contact between the ends of both; off where the nearest points are ends or the axes parallel."""
     centres, lines = (a.path(first.centre), b.path(second.centre)), (axes(a, first)[2], axes(b, second)[2])
     apart, across = centres[0] - centres[1], lines[0].cross(lines[1])
     parallel = ca.dot(across.start, across.start) < PARALLEL

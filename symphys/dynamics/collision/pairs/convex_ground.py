@@ -46,7 +46,7 @@ class OverGround:
 
 
 Seen = Callable[[Expr], Callable[[Point], OverGround]]
-"""Of a time, of a point (3,) along the shape's own axes."""
+"""A function of time, whose value is a function of a point (3,) along the shape's own axes."""
 
 
 def slot_points(shape: Convex, seen: Seen, dt: Expr) -> list[tuple[tuple[Expr, ...], Expr]]:
@@ -79,7 +79,7 @@ def slot_points(shape: Convex, seen: Seen, dt: Expr) -> list[tuple[tuple[Expr, .
 
 
 def lowest(corners: Sequence[Point], heights: Sequence[Expr]) -> tuple[Expr, tuple[Expr, ...]]:
-    """The least height, and the corner that has it; the first of equals."""
+    """Return the least height, and the corner that has it; the first of equals."""
     least, point = heights[0], tuple(map(ca.SX, corners[0]))
     for corner, height in zip(corners[1:], heights[1:], strict=True):
         deeper = height < least
@@ -89,7 +89,7 @@ def lowest(corners: Sequence[Point], heights: Sequence[Expr]) -> tuple[Expr, tup
 
 
 def is_among(point: tuple[Expr, ...], before: Sequence[tuple[Expr, ...]]) -> Expr:
-    """1 if a corner is among others."""
+    """Return 1 if a corner is among others."""
     found = ca.SX(0)
     for other in before:
         same = ca.logic_and(ca.logic_and(point[0] == other[0], point[1] == other[1]), point[2] == other[2])
@@ -98,7 +98,7 @@ def is_among(point: tuple[Expr, ...], before: Sequence[tuple[Expr, ...]]) -> Exp
 
 
 def convex_plane(shape: Convex, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """Eight points."""
+    """Return eight points."""
     normal, centre, frame = ca.vertcat(*plane.normal), a.path(shape.centre), axes(a, shape)
     across = tangents(ca.SX(normal))
 
@@ -111,7 +111,7 @@ def convex_plane(shape: Convex, plane: Plane, a: PredictedPath, _: PredictedPath
 
 
 def convex_terrain(shape: Convex, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """Eight points."""
+    """Return eight points."""
     centre, frame, surface = a.path(shape.centre), axes(a, shape), surface_of(terrain)
     x, y, z = shape.hull.centroid.tolist()
     middle = a.path(placed(shape, (x, y, z))).start[:2]
@@ -130,12 +130,12 @@ def convex_terrain(shape: Convex, terrain: Terrain, a: PredictedPath, _: Predict
 
 
 def along(parts: list[Expr], point: Point) -> Expr:
-    """The sum of three parts, each times a coordinate."""
+    """Return the sum of three parts, each times a coordinate."""
     return parts[0] * point[0] + parts[1] * point[1] + parts[2] * point[2]
 
 
 def tangents(n: Expr) -> tuple[Expr, Expr]:
-    """Two unit vectors (3,) at right angles to a unit vector and to each other.
+    """Return two unit vectors (3,) at right angles to a unit vector and to each other.
 
     Duff and others, "Building an orthonormal basis, revisited", 2017.
     """

@@ -52,7 +52,7 @@ class RimOnPlane:
     side: Parabola
 
     def gap(self, t: Expr) -> Expr:
-        """[m] at time t in the step."""
+        """Return the gap [m] at time t in the step."""
         down = downhill(self.normal, self.axis.at(t), self.side.at(t))
         return ca.dot(self.normal, self.centre.at(t) + self.radius * down) - self.offset
 
@@ -69,7 +69,7 @@ class RimOnPlane:
 
 
 def downhill(normal: Expr, axis: Expr, side: Expr) -> Expr:
-    """(3,): the unit vector across ``axis`` that points most against ``normal``; ``side`` where that has none."""
+    """Return the unit vector across ``axis`` that points most against ``normal`` (3,); ``side`` where that has none."""
     down = axis * ca.dot(axis, normal) - normal
     level = ca.dot(down, down) < MIN_TILT_SINE * MIN_TILT_SINE
     chosen = ca.if_else(level, side, down)
@@ -77,21 +77,21 @@ def downhill(normal: Expr, axis: Expr, side: Expr) -> Expr:
 
 
 def rim_point(cylinder: Cylinder, sign: float, down: tuple[Expr, Expr], turn: float) -> Offset:
-    """A point of a rim, body frame: from the direction ``down`` (x, y of the cylinder's own axes) by a turn [rad]."""
+    """Return a point of a rim, body frame: a turn [rad] from ``down`` (x, y of the cylinder's own axes)."""
     (x, y), c, s = down, cos(turn), sin(turn)
     r = cylinder.radius
     return placed(cylinder, (r * (c * x - s * y), r * (s * x + c * y), sign * cylinder.half_length))
 
 
 def own_direction(normal: Expr, frame: tuple[Parabola, Parabola, Parabola], t: Expr) -> tuple[Expr, Expr]:
-    """The x and y, along a cylinder's own axes, of ``downhill``."""
+    """Return the x and y, along a cylinder's own axes, of ``downhill``."""
     x, y, z = (axis.at(t) for axis in frame)
     down = downhill(normal, z, x)
     return ca.dot(down, x), ca.dot(down, y)
 
 
 def without_spin(path: PredictedPath, axis: Expr, normal: Expr) -> PredictedPath:
-    """The path of a cylinder without its spin about its axis, unless it stands on a face.
+    """Return the path of a cylinder without its spin about its axis, unless it stands on a face.
 
     The points of contact of a rolling wheel do not turn with it. If they did, those at the top of a wheel that turns by
     more than 1.2 rad a step would seem to go through the ground. On a face the points turn with the body.
@@ -106,7 +106,7 @@ def without_spin(path: PredictedPath, axis: Expr, normal: Expr) -> PredictedPath
 
 
 def cylinder_plane(cylinder: Cylinder, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """Six points."""
+    """Return six points."""
     normal, frame = ca.vertcat(*plane.normal), axes(a, cylinder)
     rolling, found = without_spin(a, frame[2].start, normal), []
     for sign in SIGNS:
@@ -120,7 +120,7 @@ def cylinder_plane(cylinder: Cylinder, plane: Plane, a: PredictedPath, _: Predic
 
 
 def cylinder_terrain(cylinder: Cylinder, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """Six points, which the body carries through the step: chosen by the slope of the ground below each rim."""
+    """Return six points, which the body carries through the step: chosen by the slope of the ground below each rim."""
     frame, surface, found = axes(a, cylinder), surface_of(terrain), list[Contact]()
     centre = a.centre().start
     rolling = without_spin(a, frame[2].start, upwards(surface(centre[:2])[1]))

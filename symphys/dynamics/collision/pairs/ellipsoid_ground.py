@@ -37,7 +37,7 @@ class MovingEllipsoid:
     radii: tuple[Expr, ...]
 
     def support(self, normal: Expr, t: Expr) -> Expr:
-        """(3,) [m]: from its centre to its farthest point along a vector."""
+        """Return the vector (3,) [m] from the centre to the farthest point along a vector."""
         along = [r * r * ca.dot(axis.at(t), normal) * axis.at(t) for r, axis in zip(self.radii, self.axes, strict=True)]
         return sum(along) / self.reach(normal, t)
 
@@ -49,12 +49,12 @@ class MovingEllipsoid:
 
 
 def moving(ellipsoid: Ellipsoid, a: PredictedPath) -> MovingEllipsoid:
-    """An ellipsoid that is carried along a path."""
+    """Return an ellipsoid that is carried along a path."""
     return MovingEllipsoid(a.path(ellipsoid.centre), a.arm(ellipsoid.centre), axes(a, ellipsoid), ellipsoid.radii)
 
 
 def turned_back(normal: Expr, displacement: Displacement) -> Expr:
-    """(3,): a unit vector of the world as a body sees it after a displacement, right to third order in the turn."""
+    """Return a unit vector (3,) of the world as a displaced body sees it, to third order in the turn."""
     turned = normal - ca.cross(displacement.angular, normal)
     return turned / length(turned)
 
@@ -68,7 +68,7 @@ class EllipsoidOnPlane:
     solid: MovingEllipsoid
 
     def gap(self, t: Expr) -> Expr:
-        """[m] at time t in the step."""
+        """Return the gap [m] at time t in the step."""
         return ca.dot(self.normal, self.solid.centre.at(t)) - self.offset - self.solid.reach(self.normal, t)
 
     def frame(self, t: Expr) -> Frame:
@@ -84,7 +84,7 @@ class EllipsoidOnPlane:
 
 
 def ellipsoid_plane(ellipsoid: Ellipsoid, plane: Plane, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """One point."""
+    """Return the one point of contact."""
     return [contact_along(EllipsoidOnPlane(ca.vertcat(*plane.normal), plane.offset, moving(ellipsoid, a)), a.dt)]
 
 
@@ -96,7 +96,7 @@ class EllipsoidOnTerrain:
     solid: MovingEllipsoid
 
     def gap(self, t: Expr) -> Expr:
-        """[m] at time t in the step."""
+        """Return the gap [m] at time t in the step."""
         return self._apart(self.solid, t, self._place(self.solid, t))
 
     def frame(self, t: Expr) -> Frame:
@@ -118,7 +118,7 @@ class EllipsoidOnTerrain:
         return ca.dot(normal, solid.centre.at(t) - ca.vertcat(place, height)) - solid.reach(normal, t)
 
     def _place(self, solid: MovingEllipsoid, t: Expr) -> Expr:
-        """(2,): x, y where the ground is parallel to the ellipsoid's nearest point, by Newton's method.
+        """Return x, y (2,) where the ground is parallel to the ellipsoid's nearest point, by Newton's method.
 
         Where the ground is bent more than the ellipsoid, so that there is no one such place, by that of Gauss.
         """
@@ -139,14 +139,14 @@ class EllipsoidOnTerrain:
         return place
 
     def _bend_of_support(self, solid: MovingEllipsoid, normal: Expr, t: Expr) -> Expr:
-        """(3, 3): the derivative of the support with respect to the normal [m]."""
+        """Return the derivative of the support with respect to the normal [m] (3, 3)."""
         form = sum(r * r * ca.mtimes(axis.at(t), axis.at(t).T) for r, axis in zip(solid.radii, solid.axes, strict=True))
         support = solid.support(normal, t)
         return (form - ca.mtimes(support, support.T)) / solid.reach(normal, t)
 
 
 def ellipsoid_terrain(ellipsoid: Ellipsoid, terrain: Terrain, a: PredictedPath, _: PredictedPath) -> list[Contact]:
-    """One point."""
+    """Return the one point of contact."""
     solid, surface = moving(ellipsoid, a), surface_of(terrain)
     contact, place = None, nearest(surface, solid.centre.start)
     for _round in range(2):

@@ -51,25 +51,25 @@ class BoxField:
         return ca.if_else(square > TINY_SQUARE, away, sign * self._nearest_face(over))
 
     def _over(self, point: Expr) -> Expr:
-        """(3,): how far the point is beyond the faces."""
+        """Return how far the point is beyond the faces (3,)."""
         reach: Expr = ca.fabs(point)
         over = reach - ca.vertcat(*self.half_sizes)
         return ca.if_else(ca.vertcat(*self.endless), ca.fmin(over, 0), over) if self.endless else over
 
     def _nearest_face(self, over: Expr) -> Expr:
-        """(3,): 1 for the axis of the nearest face; the first of equals."""
+        """Return a vector (3,) that is 1 for the axis of the nearest face; the first of equals."""
         x = ca.logic_and(over[0] >= over[1], over[0] >= over[2])
         y = ca.logic_and(ca.logic_not(x), over[1] >= over[2])
         return ca.vertcat(x, y, ca.logic_not(ca.logic_or(x, y)))
 
 
 def sphere_box(sphere: Sphere, box: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """One point."""
+    """Return the one point of contact."""
     return [ball_at_box(sphere.centre, sphere.radius, box, a, b)]
 
 
 def ball_at_box(offset: Offset, radius: Expr, box: Box, a: PredictedPath, b: PredictedPath) -> Contact:
-    """The contact of a ball at body-frame ``offset`` of a with a box on b."""
+    """Return the contact of a ball at body-frame ``offset`` of a with a box on b."""
     field = BoxField(box.half_sizes, rolls_onto(offset, radius, box, a, b))
     return ball_in_field(a.path(offset), a.arm(offset), radius, box, field, b)
 

@@ -37,7 +37,7 @@ class BallAtCapsule:
     axis: Parabola
 
     def gap(self, t: Expr) -> Expr:
-        """[m] at time t in the step."""
+        """Return the gap [m] at time t in the step."""
         return distance(self._from_segment(self.path.at(t), self.axis.at(t))) - self.radii[0] - self.radii[1]
 
     def frame(self, t: Expr) -> Frame:
@@ -56,13 +56,13 @@ class BallAtCapsule:
         return distance(self._from_segment(apart, self.axis.start)) - self.radii[0] - self.radii[1]
 
     def _from_segment(self, apart: Expr, axis: Expr) -> Expr:
-        """(3,): from the nearest point of the capsule's segment."""
+        """Return the vector (3,) from the nearest point of the capsule's segment."""
         along = ca.fmin(ca.fmax(ca.dot(axis, apart), -self.half_length), self.half_length)
         return apart - along * axis
 
 
 def ball_at_capsule(path: Parabola, arm: Parabola, radius: Expr, capsule: Capsule, b: PredictedPath) -> Contact:
-    """The contact of a ball with a capsule on b; ``path`` and ``arm`` of the ball's centre."""
+    """Return the contact of a ball with a capsule on b; ``path`` and ``arm`` of the ball's centre."""
     centre = b.path(capsule.centre)
     arms, axis = (arm, b.arm(capsule.centre)), axes(b, capsule)[2]
     radii, starts = (radius, capsule.radius), (path.start, centre.start)
@@ -71,5 +71,5 @@ def ball_at_capsule(path: Parabola, arm: Parabola, radius: Expr, capsule: Capsul
 
 
 def sphere_capsule(sphere: Sphere, capsule: Capsule, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """One point."""
+    """Return the one point of contact."""
     return [ball_at_capsule(a.path(sphere.centre), a.arm(sphere.centre), sphere.radius, capsule, b)]

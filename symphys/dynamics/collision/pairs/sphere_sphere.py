@@ -39,7 +39,7 @@ class OnSphere:
 
 
 def sphere_sphere(ball_a: Sphere, ball_b: Sphere, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """One point."""
+    """Return the one point of contact."""
     paths = a.path(ball_a.centre), b.path(ball_b.centre)
     path, reach = paths[0] - paths[1], ball_a.radius + ball_b.radius
     return [
@@ -55,7 +55,7 @@ def sphere_sphere(ball_a: Sphere, ball_b: Sphere, a: PredictedPath, b: Predicted
 
 
 def first_touch(path: Parabola, reach: Expr, dt: Expr) -> Expr:
-    """The first t in [0, dt] with |path(t)| = reach; 0 when overlapping, dt when there is none.
+    """Return the first t in [0, dt] with |path(t)| = reach; 0 when overlapping, dt when there is none.
 
     Exact for uniform relative motion; relative acceleration enters by Newton steps on |path|^2 - reach^2.
     """
@@ -73,7 +73,7 @@ def first_touch(path: Parabola, reach: Expr, dt: Expr) -> Expr:
 
 
 def _meets(path: Parabola, reach: Expr, dt: Expr) -> Expr:
-    """1 if the spheres overlap at the end of the step, or at their closest approach on the way."""
+    """Return 1 if the spheres overlap at the end of the step, or at their closest approach on the way."""
     closing, speed2 = -ca.dot(path.start, path.velocity), ca.dot(path.velocity, path.velocity)
     nearest = path.at(ca.fmin(ca.fmax(closing, 0) / (speed2 + TINY_SQUARE), dt))
     end = path.at(dt)
@@ -81,13 +81,13 @@ def _meets(path: Parabola, reach: Expr, dt: Expr) -> Expr:
 
 
 def distance(d: Expr) -> Expr:
-    """|d|, never zero."""
+    """Return |d|, never zero."""
     lifted = _lifted(d)
     return ca.sqrt(ca.dot(lifted, lifted))
 
 
 def direction(d: Expr) -> Expr:
-    """(3,): d / |d|; z where d is zero."""
+    """Return the unit vector d / |d| (3,); z where d is zero."""
     return _lifted(d) / distance(d)
 
 
