@@ -188,11 +188,14 @@ def motion_from(
 ) -> PredictedMotion:
     """Predict the motion with a rotation (3, 3) and an angular velocity, ``turning``, in place of ``state``'s."""
     turned, w = turning
+    # parabola of the centre of mass (4), and the free momentum at mid-step
     acceleration = gravity + state.force / mass
     mid_momentum = state.angular_momentum + dt / 2 * state.torque
+    # orientation and inertia at mid-step, where impulses act
     middle = _middle(inertia, state.orientation, w if jointed else None, mid_momentum, dt / 2)
     inverse_mid, inertia_mid = _inertias(inertia, middle)
     w_mid = apply(inverse_mid, mid_momentum)
+    # paths of points turn by at most MAX_TURN, so that parabolas stay near the circles
     (slow, fast), (slow_mid, fast_mid) = bounded_turn(w, dt), bounded_turn(w_mid, dt)
     bend = (w_mid - w) * (2 / dt)
     slow_bend = ca.if_else(ca.logic_or(fast, fast_mid), (slow_mid - slow) * (2 / dt), bend)

@@ -103,6 +103,7 @@ def extrapolate(
     now: Iterate,
 ) -> Iterate:
     """Repeat the change of the last sweep, from ``before`` to ``now``, by the factor of the line search."""
+    # slope and curvature of the energy along the last change (17), and its largest multiple
     sums: tuple[Expr, Expr] = (ca.SX(0), ca.SX(0))
     longest: Expr = ca.SX(MAX_EXTRAPOLATION)
     for k in cluster.bodies:
@@ -110,6 +111,7 @@ def extrapolate(
     for k in cluster.constraints:
         sums, longest = _add_constraint_terms(sums, longest, constraints[k].constraint, now.impulses[k], now.last[k])
     share = _extrapolation_factor(sums, longest)
+    # velocities and impulses after the repetition
     momenta, impulses = list(now.momenta), list(now.impulses)
     for k in cluster.bodies:
         momenta[k] = _extrapolate_momentum(share, now.momenta[k], before.momenta[k])
@@ -178,8 +180,10 @@ def iterate(
     Groups whose loads statics may leave undetermined start from the solution of Newton's method.
     """
     world, sweeps, motions = context.world, context.settings.scheme.sweeps, trees.motions
+    # loads that statics leaves open: Newton's method
     for group in open_groups(context, constraints, start.momenta):
         start = solve_together(group, constraints, start, trees, contact_softness(group, constraints, trees))
+    # sweeps, with extrapolations in clusters of unequal masses
     constraints = _with_known_terms(constraints, start.momenta)
     found = tuple(clusters(world, constraints))
     if not found:

@@ -141,6 +141,7 @@ def close_gaps(
     What is on a tree is pushed along the tree's coordinates. Joints that close loops push along them too.
     """
     scheme = context.settings.scheme
+    # contacts: all gaps of a group together, then sweeps of pushes (19)
     rigid = tuple(
         (each, contact, _lasts(each.constraint, impulse))
         for each, contact, impulse in constraints
@@ -151,6 +152,7 @@ def close_gaps(
     along = contiguous(tuple(moved)) if context.near else tuple(moved)
     before = _start(context, trees, fixed, along)
     pushed, _ = repeat(scheme.position_sweeps, _push_all, fixed, before)
+    # joints that close loops, and limits outside trees
     others = tuple(each for each in joints if not _on_tree_coordinate(each))
     along, by_loops = close_loops(scheme.position_sweeps, trees.motions, others, pushed)
     return _corrected_configuration(context, trees, along, by_loops)

@@ -67,6 +67,7 @@ def pack_calls(program: Program) -> PackedProgram:
 
 def _dependencies(program: Program, body: PhaseCalls) -> list[list[int]] | None:
     """Return the calls that each call depends on; None if places move through time at different strides."""
+    # words of one stride each: places of different strides could meet at some step only
     places = [np.stack([spans.offset, spans.size, spans.stride]) for spans in (body.inputs, body.outputs)]
     taken = np.full(program.size, NONE, np.int64)
     for offset, size, stride in np.unique(np.concatenate(places, axis=1), axis=1).T.tolist():
@@ -75,12 +76,14 @@ def _dependencies(program: Program, body: PhaseCalls) -> list[list[int]] | None:
         if ((taken[own] != NONE) & (taken[own] != stride)).any():
             return None
         taken[own] = stride
+    # writer of each word; a word written again depends on the writer before
     words, calls, _ = body.outputs.words()
     turn = np.lexsort((calls, words))
     words, calls = words[turn], calls[turn]
     writer = np.full(program.size, NONE, np.int64)
     writer[words] = calls
     again = words[1:] == words[:-1]
+    # edges from writers to readers
     read, reader, _ = body.inputs.words()
     edges = np.stack([np.append(writer[read], calls[:-1][again]), np.append(reader, calls[1:][again])])
     edges = np.unique(edges[:, edges[0] != NONE], axis=1)
@@ -148,6 +151,7 @@ def _cluster_chains(
         first, *others = counts.most_common(2)
         return NONE if others and others[0][1] == first[1] else first[0]
 
+    # sets with a call for each chain: each call stays on the chain of its arguments
     for calls in sets:
         if len(calls) == chain_count:
             chains = [majority_chain(c, before) for c in calls]
@@ -155,6 +159,7 @@ def _cluster_chains(
                 chains = list(range(chain_count))
             for c, k in zip(calls, chains, strict=True):
                 chain[c] = k
+    # other calls: forward by their arguments, backward by their readers, forward again
     others = [calls for calls in sets if len(calls) != chain_count]
     for near, turn in ((before, others), (after, others[::-1]), (before, others)):
         for calls in turn:
@@ -168,6 +173,7 @@ def _order_with_packs(
     before: Sequence[Sequence[int]], found: Sequence[Sequence[int]]
 ) -> tuple[list[int], tuple[tuple[int, int], ...]]:
     """Return the calls in their order as far as packs allow, and where the packs begin."""
+    # each pack is one vertex, at its first call
     whose = list(range(len(before)))
     members = {c: [c] for c in whose}
     for pack in found:
@@ -175,6 +181,7 @@ def _order_with_packs(
             whose[c] = pack[0]
             del members[c]
         members[pack[0]] = list(pack)
+    # topological order, earliest calls first
     waits = {head: {whose[other] for c in pack for other in before[c]} for head, pack in members.items()}
     frees: dict[int, list[int]] = {head: [] for head in members}
     for head, others in waits.items():

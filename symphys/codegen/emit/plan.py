@@ -40,13 +40,16 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
         noted: whether the driver notes which guards are 0 in a step, otherwise they are computed again backwards, and
             takes ``again`` for the body where it has all calls of the only step.
     """
+    # packs, then activity and adjoints of all phases
     side_by_side = pack_calls(program)
     program, functions = side_by_side.program, DistinctFunctions()
     parts, reach = with_adjoints(program, seeded, functions)
     body = parts[1]
+    # calls that are run again before the adjoints of a step, and what a tape spares them
     at_once = noted and _taped_at_once(program)
     again = np.ones(len(body.calls), bool) if at_once else _again(program, body, reach, functions, noted)
     tape = _put_on_tape(program, body, again, functions, FAST_MEMORY // word)
+    # tables of calls forward, again and backward, and of calls that may be skipped
     tables = {name: part.pushes(functions) for name, part in zip(("prologue", "body", "epilogue"), parts, strict=True)}
     tables["again"] = body.pushes(functions, np.flatnonzero(again))
     for name, part in zip(("prologue", "body", "epilogue"), parts, strict=True):

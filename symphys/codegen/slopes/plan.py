@@ -433,16 +433,19 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
     """Plan the Jacobian of an output by z; ProgramError for a program that goes more than one step."""
     if program.steps != 1 or any(call.accumulate for call in program.calls):
         raise ProgramError("slopes are of programs of one step, whose calls add to nothing")
+    # calls and their adjoints
     functions, target = DistinctFunctions(), program.outputs[output]
     calls = merged(program)
     first = _after_guards(calls)
     reaches = [CallActivity.of(call, 1, functions.dependence(call.function)) for call in calls]
     pulls = Pulls(Activity(program, [reaches, [], []], [target]), functions, program.size)
     found = [pulls.of(reach, k >= first) for k, reach in enumerate(reaches)]
+    # forward pass with a tape; calls after the guards may be skipped
     forward = [
         (_push(reach.call, pull, functions), of_call(reach.call) if k >= first else ALWAYS)
         for k, (reach, pull) in enumerate(zip(reaches, found, strict=True))
     ]
+    # adjoints, and the blocks of rows that share them
     backward = [pull for pull in reversed(found) if pull]
     places, values = AdjointPlaces(program, target, backward), PointPlaces()
     blocks = []

@@ -97,11 +97,13 @@ def update_configuration(
 
     ``along``: displacements along the tree's numbers; ``by_loops``: what of them joints that close loops did.
     """
+    # displacements along the coordinates at mid-step, and the poses that they aim at
     places, tree, matrix = [motion.position for motion in motions], coordinates.tree, coordinates.matrix
     starts = joint_starts(kinematic_tree, joints, [motion.predicted_path() for motion in motions])
     numbers = split_rates(numbering(tree), along.numbers)
     moved = tree_motion(tree, matrix, numbers)
     aims = [_target_pose(*each) for each in zip(moved.screws, coordinates.bodies, places, strict=True)]
+    # poses from joint to joint, with coordinates corrected until the deviation does nothing along free motions
     bodies = [(motion.counted_mass, motion.position - places[0]) for motion in motions]
     frames = [motion.massless for motion in motions]
     wanted = turned = select_rotors(tree, moved.rates)
@@ -115,6 +117,7 @@ def update_configuration(
         if k < CORRECTION_STEPS:
             numbers = _subtract_rates(numbers, solve(tree, matrix, [each.screw for each in beside], turned))
             moved = tree_motion(tree, matrix, numbers)
+    # conservation to rounding, then what joints and loops did to displacements
     arrived, beside = _conserve_momentum(coordinates, joints[0] is None, bodies, arrived, beside, turned[0])
     if by_loops is None:
         return arrived, tuple(JointCorrection(each.made) for each in beside), RotorCorrection(turned), moved.rates

@@ -78,16 +78,19 @@ def generalized_coordinates(
         middle: the time of the velocities [s].
         acting: whether anything acts along the coordinates of the link.
     """
+    # motion subspaces at the times of velocities and of impulses
     origin = motions[0].position
     body_paths = [motion.predicted_path() for motion in motions]
     seen, given = (axes_at(kinematic_tree, joints, body_paths, t, origin) for t in (middle, ca.SX(0)))
     tree = Tree(kinematic_tree, seen, given, armatures(kinematic_tree, joints))
+    # mass matrix, and generalized velocities of the free momenta (24)
     parts = [
         _body_at_mid_step(motion, momentum, origin, middle) for motion, momentum in zip(motions, free, strict=True)
     ]
     bodies, inertias, momenta = zip(*parts, strict=True)
     matrix = tree_matrix(tree, inertias)
     rates = _join_rates(numbering(tree), solve(tree, matrix, momenta, joint_rates(tree, joints, motions)))
+    # Jacobians of bodies and responses of coordinates, where something acts
     places = [
         (motion.position - origin, body) if on else None
         for motion, body, on in zip(motions, bodies, reached, strict=True)

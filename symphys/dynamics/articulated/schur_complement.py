@@ -92,6 +92,7 @@ def branch_matrix(
     above: Parents, inertias: Sequence[SpatialInertia], axes: MotionSubspaces, armature: tuple[Expr | None, ...]
 ) -> BranchMatrix:
     """Build from the inertias of a branch's bodies, and what is added to the diagonal of its coordinates."""
+    # composite inertias, from leaves to root (Featherstone's composite-rigid-body algorithm)
     symmetric, (given, root_given) = axes.given is None, axes.impulses
     total, base = summed_up(above, [inertia.matrix for inertia in inertias])
     seen_of: Expr = ca.horzcat(*axes.seen)
@@ -99,6 +100,7 @@ def branch_matrix(
     n, m = seen_of.size2(), axes.root_seen.size2()
     rows: list[Sparse] = [{} for _ in range(n)]
     pushes, pulls = ca.SX(m, n), ca.SX(n, m)
+    # entries of the mass matrix along each path, and the coupling with the root
     for path, columns, inertia, added in zip(paths(above, axes.seen), axes.seen, total, armature, strict=True):
         for k in path[len(path) - columns.size2() :]:
             momentum, reaction = ca.mtimes(inertia, seen_of[:, k]), ca.mtimes(inertia.T, given_of[:, k])
@@ -108,6 +110,7 @@ def branch_matrix(
                 rows[i][k] = ca.dot(momentum, given_of[:, i])
                 rows[k][i] = rows[i][k] if symmetric or i == k else ca.dot(reaction, seen_of[:, i])
             rows[k][k] = rows[k][k] if added is None else rows[k][k] + added
+    # T = -M_ll^-1 M_lr, and the branch's share of the root's matrix
     block = factorise(rows, symmetric)
     follows = ca.SX(n, m)
     for j in range(m):

@@ -249,10 +249,12 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
     points = Counter((pair.first, pair.second) for pair in world.pairs)
     if len(points) < MIN_PAIRS:
         return ()
+    # bounds of all bodies, and the speed of the fastest
     held = {index for joint in world.joints for index in joint.bodies}
     bodies, fastest = _motion_bounds(context, x)
     dt = settings.scheme.dt
     reach, found = SweptBound(dt, fastest), dict[tuple[Side, Side], list[Expr]]()
+    # spheres around the surfaces of a pair (6b), then its points by themselves
     for (first, second), count in points.items():
         radii = _radius(world, first, held), _radius(world, second, held)
         if first.body is None or radii[0] is None or radii[1] is None:

@@ -254,6 +254,7 @@ def linearised(contact: ContactConstraint, slip: Expr, old: ContactImpulse, by: 
         old: what it has given so far.
         by: what is common to all constraints.
     """
+    # load: the slope of its projection by the slip, with compliance (see ``newton_start``)
     mass, width = contact.normal_mass, contact.normal_mass * contact.width
     kept = old.normal + mass * (contact.target - contact.softness * old.normal - ca.dot(contact.normal, slip))
     normal, rise = contact.near * positive(kept, width), contact.near * _slope(kept, width, mass, by)
@@ -318,6 +319,7 @@ def _solve_coupled(
         old: what it has given so far, with which ``slip`` came about.
     """
     n, friction, w = contact.normal, contact.friction, coupling.mobility
+    # sticking: the impulse that stops the slip, if it lies in the cone
     given = n * old.normal + old.tangent
     error = slip - n * (contact.target - contact.softness * old.normal) - contact.slip_target
     stopping = given - ca.mtimes(coupling.inverse, error)
@@ -327,6 +329,7 @@ def _solve_coupled(
     closes = ca.dot(n, free) < 0
     sticks = ca.logic_and(ca.logic_and(closes, press > 0), friction.admits(hold, press))
 
+    # sliding: a projection, then a Newton step, give the heading of friction on the edge of the cone
     wanted = old.tangent - contact.tangent_mass * _across(error, n)
     heading = _newton_heading(friction.heading(wanted, old.normal), free, w, n, friction)
     load, _ = _sliding_load(heading, free, w, n, friction)
@@ -344,12 +347,14 @@ def _sliding_load(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Frictio
 def _newton_heading(heading: Expr, free: Expr, w: Expr, n: Expr, friction: Friction) -> Expr:
     """Return the heading after a Newton step towards the one that is opposite to the slip, as friction sees it."""
     load, response = _sliding_load(heading, free, w, n, friction)
+    # residual: the slip across the heading; slope: its derivative by the angle of the heading
     aside, slip = ca.cross(n, heading), free + load * response
     seen = friction.shaped(aside)
     turning = ca.mtimes(w, seen)
     lost = ca.dot(n, turning) / ca.fmax(ca.dot(n, response), MIN_SLIDING_SHARE * ca.dot(n, ca.mtimes(w, n)))
     slope = friction.largest * load * (ca.dot(seen, turning) - lost * ca.dot(seen, response))
     slope = slope - ca.dot(friction.shaped(heading), slip)
+    # a bounded step of the angle
     step = ca.if_else(slope > MIN_HEADING_SLOPE, -ca.dot(seen, slip) / ca.fmax(slope, MIN_HEADING_SLOPE), 0)
     step = ca.fmin(ca.fmax(step, -MAX_ANGLE_STEP), MAX_ANGLE_STEP)
     found = heading + step * aside

@@ -155,11 +155,13 @@ def solve_together(
         softness: of contacts; see ``contact_softness``.
         centres: of each step 1 if loads of that softness are counted from 0, 0 if from those that were found.
     """
+    # operators of each constraint, residual energy of the start and its trust radius
     metric = _metric(trees, group.carriers, start.momenta)
     members = [_member(group, number, constraints[number], metric, start) for number in group.constraints]
     own = tuple(start.momenta[i] for i in group.carriers)
     after = missed = _residual_energy(metric, members, start)
     reach = _trust_radius(metric, own, missed, len(members))
+    # Newton steps; of two iterates the one of less residual energy is kept, between them a mean
     best = now = start
     for centre in centres:
         now = _newton_step(group, metric, members, now, Linearisation(softness, centre, _slope_width(after)), reach)
@@ -187,11 +189,13 @@ def _newton_step(
     reach: Expr,
 ) -> Iterate:
     """Make a step of Newton's method, shortened so that it stays within ``reach`` [J]."""
+    # linear response of each constraint: d impulse = a - B J d velocities
     momenta, impulses = list(now.momenta), list(now.impulses)
     answers = []
     for each in members:
         states = tuple(momenta[i] for i in each.placed.carriers)
         answers.append(_linear_response(each.placed.constraint, each.lever, states, impulses[each.number], by))
+    # (M + M H B J) d velocities = M H a
     changes = _velocity_changes(
         metric, tuple((each.own, *part[:2]) for each, part in zip(members, answers, strict=True))
     )
@@ -199,6 +203,7 @@ def _newton_step(
         _impulse_change(each.lever, a, b, tuple(changes[k] for k in each.own))
         for each, (_, _, a, b) in zip(members, answers, strict=True)
     ]
+    # length of the step
     share = _share(tuple((each.lever, part) for each, part in zip(members, given, strict=True)), reach)
     for each, part in zip(members, given, strict=True):
         carriers = tuple(group.carriers[k] for k in each.own)
@@ -317,6 +322,7 @@ def _velocity_changes(
     metric: tuple[Expr, ...], parts: tuple[tuple[tuple[int, ...], Expr, Expr], ...]
 ) -> tuple[Expr, ...]:
     """Return the changes of the velocities of each carrier."""
+    # matrix and right hand side of the group
     sizes = [each.shape[0] for each in metric]
     starts = [0, *accumulate(sizes)]
     matrix: Expr = ca.diagcat(*metric)
@@ -325,6 +331,7 @@ def _velocity_changes(
         places = [j for k in own for j in range(starts[k], starts[k + 1])]
         matrix[places, places] += block
         right[places] += load
+    # sparse elimination
     n = starts[-1]
     rows = [{j: matrix[i, j] for j in range(n) if matrix.has_nz(i, j)} for i in range(n)]
     solved = factorise(rows).solve({i: right[i] for i in range(n)})

@@ -78,13 +78,16 @@ def prepare(
     """Return the constraint of a contact along the free motions of its bodies, over a substep of ``duration`` [s]."""
     scheme, smoothing, half = settings.scheme, settings.smoothing, duration / 2
     suppressed, same, coupled = conditions.suppressed, conditions.same, conditions.coupled
+    # instant and frames of touch (7, 8), and of the impulse
     touch = _touch(settings, law, contact, motions, duration, conditions)
     instant = half + touch.leaving * (touch.time - half)
     acting = touch.hit * contact.time if law.soft else touch.leaving * touch.time
     frame, applied = contact.geometry.frame(instant), contact.geometry.frame(acting)
     terms, friction = body_terms(motions, instant, frame, applied), friction_at(law, frame.normal, motions, instant)
+    # effective inverse masses (12)
     push, twist = symmetric_mobilities(terms, same)
     k_normal, k_tangent, k_spin, k_roll = inverse_masses(terms, frame.normal, push, twist)
+    # normal target: the rebound carried to mid-step (9), or the velocity that just closes the gap; soft contacts (10)
     slack = ca.if_else(suppressed, NO_CORRECTION_SLOP, _slack(settings, contact, touch, duration))
     slip = free_slip(terms, motions)
     free = ca.dot(frame.normal, slip)
@@ -92,10 +95,12 @@ def prepare(
     soft = _soft_impulse(law, contact, motions, duration, conditions, (free, applied, acting)) if law.soft else None
     softness = ca.SX(0) if soft is None else soft.softness
     target = _normal_target(contact, duration, touch, away, smoothing) if soft is None else soft.target
+    # delay of the impulse (13), and its response
     landing = _landing(contact, duration, touch.time, target, free)
     column = delassus_column(terms, applied.normal, same)
     parts = separates(terms, frame.normal, column)
     k_normal = no_less_than_response(terms, frame.normal, column, k_normal)
+    # contacts that last: they carried load, are near and do not part
     weight, load = MIN_LOAD_SHARE * settings.reference / k_normal, ca.dot(applied.normal, conditions.force)
     loaded = ca.logic_and(load > weight, ca.logic_not(suppressed))
     lasts = _lasts(settings, law, contact, touch.leaving, loaded)
@@ -257,6 +262,7 @@ def _soft_impulse(
     free, applied, acting = seen
     terms = body_terms(motions, acting, applied, applied)
     inverse_mass, *_ = inverse_masses(terms, applied.normal, *symmetric_mobilities(terms, conditions.same))
+    # velocity and acceleration along the normal at the start, with the lasting forces of the last step
     velocity, _, normal = at_touch(contact, motions, ca.SX(0))
     rate = ca.dot(normal, velocity)
     acceleration, arms = (free - rate) * 2 / duration, contact.geometry.frame(ca.SX(0)).arms

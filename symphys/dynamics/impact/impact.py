@@ -133,10 +133,12 @@ def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
     Leapfrog begins anew there, so ``lag`` is 0. Without one the same x.
     """
     duration = ca.SX(context.settings.scheme.dt)
+    # motions and velocities at the instant of the impact
     motions = [motion.at_start() for motion in predicted_motions(context, x, duration)]
     contacts = detect_contacts(context, motions, duration)
     momenta = tuple(Momentum(motion.velocity, motion.momentum_k) for motion in motions)
     trees = prepare_trees(context, motions, momenta, ca.SX(0))
+    # contacts that are struck rebound, those that touch hold
     constraints = []
     couple = coupled_pairs(context.world)
     for (pair, near), contact, struck, coupled in zip(
@@ -146,11 +148,13 @@ def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
         moving = tuple(trees.motions[i] for i in bodies)
         arguments = pair.law, contact, moving, struck, split.impact, trees.same(bodies), coupled, near
         constraints.append(trees.placed(bodies, _constraint(context.settings, *arguments)))
+    # sweeps over contacts and the locks of loops, with restitution that adds no energy (23)
     locks = locks_at(context, trees)
     n, still = len(locks), (*(nothing for _, nothing in locks), *(ZERO_IMPULSE for _ in constraints))
     every = (*(constraint for constraint, _ in locks), *constraints)
     states = contiguous(trees.states) if context.near else trees.states
     solved = rebound(context, every, Iterate(states, still, still), motions, trees)
+    # velocities change, positions only by impulses that act after their split
     after = _with_velocities(context, x, motions, momenta_of(context, trees, solved.momenta), split.impact)
     _delay(context, after, constraints, solved.impulses[n:], split.late)
     forces = (x[f"{pair.name}.force"] for pair in context.world.pairs)
@@ -298,23 +302,27 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
     energy. So a blow that goes through a row of balls takes an impact a substep, as in the row: the next ball is not
     held back before it is hit.
     """
+    # contacts that close at speed within the rest of the step, and whether they meet
     pairs, world = context.world.pairs, context.world
     motions = predicted_motions(context, x, duration)
     contacts = detect_contacts(context, motions, duration)
     near = [each for _, each in context.pairs_and_near()]
     looked_at = list(zip(pairs, near, contacts, strict=True))
     hits = [_closing_contact(context.settings, pair.law, contact, each) for pair, each, contact in looked_at]
+    # instant of the first hit of each body that may be hit twice
     eccentric, sides = eccentric_bodies(world), {k for pair in pairs for k in bodies_of(pair)}
     rebounds = {k for pair in pairs if not is_zero(pair.law.restitution) for k in bodies_of(pair)}
     first: dict[int, Expr] = dict.fromkeys(sorted(sides & (eccentric | rebounds)), duration)
     for pair, contact, (_, meets) in zip(pairs, contacts, hits, strict=True):
         for body in first.keys() & set(bodies_of(pair)):
             first[body] = _update_first_hit(first[body], meets, contact.time)
+    # bodies that an earlier impact of this step has struck already
     struck = {body: ca.SX(0) for body in sorted(first.keys() & eccentric)}
     for j, pair in enumerate(pairs):
         for body in struck.keys() & set(bodies_of(pair)):
             for split in splits:
                 struck[body] = _either(struck[body], split.struck[j])
+    # velocity changes of balls at their first hits
     rooms = [_max_overlap(world, pair, eccentric) for pair in pairs]
     central = {k for pair, room in zip(pairs, rooms, strict=True) if room is not None for k in bodies_of(pair)}
     blows = {body: ca.SX.zeros(3) for body in sorted(central)}
@@ -325,6 +333,7 @@ def defer_impacts(context: StepContext, x: State, duration: Expr, splits: Sequen
             if body in blows:
                 so_far = blows[body], first[body]
                 blows[body] = _add_blow(context.settings, pair.law, side, masses, so_far, meets, contact)
+    # contacts that give no impulse: they close without touch, or their body is hit before
     found, chained, plastic = list[Expr](), ca.SX(0), ca.SX(0)
     for (pair, each, contact), (fast, meets), room in zip(looked_at, hits, rooms, strict=True):
         waits, bodies = _closes_without_touch(fast, meets), bodies_of(pair)

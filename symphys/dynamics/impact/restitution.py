@@ -53,10 +53,12 @@ def rebound(
     scheme = context.settings.scheme
     if not (scheme.energy_cap and eccentric_bodies(context.world)):
         return iterate(context, constraints, start, trees)
+    # two solutions: without restitution, and with Newton's law
     dead = tuple(replace(each, constraint=_without_rebound(each.constraint)) for each in constraints)
     plastic = iterate(context, dead, start, trees)
     between = replace(plastic, momenta=contiguous(plastic.momenta)) if context.near else plastic
     newton = iterate(context, constraints, between, trees)
+    # kinetic energy along the way from the first to the second, rotors included
     sums: tuple[Expr, Expr, Expr] = (ca.SX(0), ca.SX(0), ca.SX(0))
     solutions = replace(start, momenta=trees.states), plastic, newton
     bodies = (momenta_of(context, trees, solution.momenta) for solution in solutions)
@@ -66,6 +68,7 @@ def rebound(
         rates = (rotor_rates(tree, solution.momenta[root]) for solution in solutions)
         for armature, *turning in zip(tree.tree.armature, *rates, strict=True):
             sums = sums if armature is None else _rotor_energies(armature, turning, sums)
+    # the largest share of the way that adds no energy (23)
     share = _largest_share(sums)
     return Iterate(
         tuple(_between_states(share, a, b) for a, b in zip(plastic.momenta, newton.momenta, strict=True)),

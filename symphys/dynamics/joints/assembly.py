@@ -75,6 +75,7 @@ def prepare_trees(
     states: list[Velocities] = list(free)
     found, touched = list[GeneralizedCoordinates](), _touched(context.world)
     coupled = {k for each in context.world.couplings for k in (each.first, each.second) if k is not None}
+    # each tree: its coordinates replace the velocities of its bodies
     for tree in kinematic_trees(joints):
         own = tuple(None if link.joint is None else joints[link.joint] for link in tree.links)
         reached = tuple(body in touched for body in tree.bodies)
@@ -152,6 +153,7 @@ def joint_constraints(
     settings, substep = context.settings, SubstepTimes(duration, kick)
     projected, fitted = list[JointConstraint](), list[PlacedConstraint]()
     places, along = _places(context.world, trees), joint_paths(context, x, paths)
+    # locks (25) of joints that are no tree's, then motors, limits, springs and friction (26)
     for index, joint in enumerate(context.world.joints):
         moving = tuple(trees.motions[i] for i in joint.bodies)
         frames, same = along[index].frames, trees.same(joint.bodies)
@@ -169,6 +171,7 @@ def joint_constraints(
                 constraint = trees.placed(joint.bodies, CONSTRAINTS[part](settings, joint, at, command, substep))
                 projected.append(JointConstraint(constraint, f"{joint.name}.{part}", k))
                 fitted += [constraint] if part in LIMITS else []
+    # couplings of coordinates
     for coupling in context.world.couplings:
         constraint = _coupled(context, trees, along, duration, coupling, places)
         projected.append(JointConstraint(constraint, f"{coupling.name}.{COUPLED}", 0))

@@ -96,11 +96,13 @@ def lock_constraint(
 
     ``near``: (k,) the coordinates of one that holds screws, at the start.
     """
+    # directions at mid-step and of impulses, mobility and error
     joint, start, middle = frames.joint, ca.SX(0), substep.duration / 2
     now = frames.placed(start)
     terms, seen, given = frames.terms(motions, middle, start), locked(joint, frames.placed(middle)), locked(joint, now)
     k, error = regular_mobility(terms, seen, same), joint.kind.errors(now, near)
     softness, target, lasting = ca.SX(k.size1(), 1), ca.SX(k.size1(), 1), None
+    # soft joint: a spring and damper along each direction (10)
     if joint.soft:
         law = _spring_law(joint, substep)
         at_start = ca.diag(regular_mobility(frames.terms(motions, start, start), given, same))
@@ -187,6 +189,7 @@ def coordinate_terms(
             else whether both bodies are of one tree.
         value: of the coordinate at the start, see ``coordinate_value``.
     """
+    # directions and rates of the coordinate at the start and at mid-step
     start, middle, coordinate = ca.SX(0), duration / 2, frames.joint.kind.coordinates[k]
     now, terms = frames.placed(start), frames.terms(motions, middle, start)
     seen, given = free(coordinate, frames.placed(middle)), free(coordinate, now)
@@ -194,6 +197,7 @@ def coordinate_terms(
     if isinstance(place, bool):
         rate, k_of = speeds(terms, seen, momenta), mobility(terms, seen, place)
         return CoordinateTerms(terms, seen, given, value, rate, rate_now, rate_due, k_of, place, None)
+    # coordinate of a tree: its Jacobian and response are those of the tree
     index, responses = place[0] + k, place[1]
     jacobian, response = responses[index]
     rate = ca.mtimes(jacobian, momenta[0].numbers)

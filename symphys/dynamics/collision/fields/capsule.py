@@ -46,6 +46,7 @@ def nearest_share(
     capsule: Capsule, shape: SolidShape, field: Field, a: PredictedPath, b: PredictedPath, t: Expr
 ) -> tuple[Expr, Expr]:
     """Return the nearest place on the axis at time t, from -1 to 1, and 1 if it lies between the ends."""
+    # axis of the capsule in the shape's own frame
     own = [axis.at(t) for axis in axes(b, shape)]
 
     def inside(vector: Expr) -> Expr:
@@ -57,9 +58,11 @@ def nearest_share(
     def slope(share: Expr) -> Expr:
         return ca.dot(field.normal(centre + share * along), along)
 
+    # bracket of the root of the slope of the distance along the axis
     low, high = ca.SX(-1), ca.SX(1)
     falls, rises = slope(low), slope(high)
     between = ca.logic_and(falls < 0, rises > 0)
+    # bisection, then secant steps, whose derivative is that of the root
     for k in range(HALVINGS + SECANTS):
         steep = ca.logic_and(k >= HALVINGS, rises - falls > TINY_SLOPE)
         secant = low - falls * (high - low) / ca.if_else(steep, rises - falls, 1)
