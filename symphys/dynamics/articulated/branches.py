@@ -74,8 +74,8 @@ class Tree:
     """
 
     kinematic_tree: KinematicTree
-    seen: Columns
-    given: Columns | None = None
+    velocity_axes: Columns
+    impulse_axes: Columns | None = None
     armature: tuple[Expr | None, ...] = ()
 
     @property
@@ -85,14 +85,16 @@ class Tree:
 
     def axes(self, branch: Branch) -> MotionSubspaces:
         """Return the motion subspaces of a branch and of the root."""
-        if self.given is None:
-            return MotionSubspaces(branch.of(self.seen), self.seen[0])
-        return MotionSubspaces(branch.of(self.seen), self.seen[0], branch.of(self.given), self.given[0])
+        if self.impulse_axes is None:
+            return MotionSubspaces(branch.of(self.velocity_axes), self.velocity_axes[0])
+        return MotionSubspaces(
+            branch.of(self.velocity_axes), self.velocity_axes[0], branch.of(self.impulse_axes), self.impulse_axes[0]
+        )
 
     @property
     def impulses(self) -> Columns:
         """Return the motion subspaces at the time of the impulses."""
-        return self.seen if self.given is None else self.given
+        return self.velocity_axes if self.impulse_axes is None else self.impulse_axes
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ def tree_matrix(tree: Tree, inertias: Sequence[SpatialInertia]) -> TreeMatrix:
         schur_complement.branch_matrix(branch.above, branch.of(inertias), tree.axes(branch), branch.of(tree.armature))
         for branch in tree.branches
     )
-    root = tree.seen[0], None if tree.given is None else tree.given[0]
+    root = tree.velocity_axes[0], None if tree.impulse_axes is None else tree.impulse_axes[0]
     reached = tuple(part.at_root for part in parts)
     return TreeMatrix(parts, schur_complement.root_matrix(inertias[0], root, reached, tree.armature[0]))
 
@@ -166,11 +168,11 @@ class TreeMotion:
 
 def tree_motion(tree: Tree, matrix: TreeMatrix, rates: TreeRates) -> TreeMotion:
     """Return the motions of all bodies."""
-    n = len(tree.seen)
-    root = _root_moving(tree.seen[0], rates.r)
+    n = len(tree.velocity_axes)
+    root = _root_moving(tree.velocity_axes[0], rates.r)
     turns, found = [rates.r] * n, [root] * n
     for branch, part, z in zip(tree.branches, matrix.branches, rates.z, strict=True):
-        own, moved = _branch_moving(branch.above, part, branch.of(tree.seen), z, rates.r, root)
+        own, moved = _branch_moving(branch.above, part, branch.of(tree.velocity_axes), z, rates.r, root)
         for k, rate, screw in zip(branch.links, own, moved, strict=True):
             turns[k], found[k] = rate, screw
     return TreeMotion(tuple(turns), tuple(found))

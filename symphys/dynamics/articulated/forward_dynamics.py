@@ -137,7 +137,7 @@ def _biases(tree: Tree, joints: spatial.Joints, now: TreeMotion) -> list[Spatial
         parent = None if link.parent is None else place[link.parent]
         above, moved = (None, None) if parent is None else (found[parent], now.screws[parent])
         carriers = tuple(_axis_moves_with_child(link, joint, j) for j in range(link.count))
-        found.append(_bias(carriers, tree.seen[k], now.rates[k], now.screws[k], moved, above))
+        found.append(_bias(carriers, tree.velocity_axes[k], now.rates[k], now.screws[k], moved, above))
     return found
 
 

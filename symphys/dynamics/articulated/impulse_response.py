@@ -98,13 +98,15 @@ def body_jacobians(
     (root, *_), n, given = numbering(tree), tree.kinematic_tree.size, tree.impulses
     if bodies[0] is not None:
         counted, body = bodies[0]
-        parts = _root_jacobian(tree.seen[0], body.place), _root_response(matrix.root, given[0], counted)
+        parts = _root_jacobian(tree.velocity_axes[0], body.place), _root_response(matrix.root, given[0], counted)
         found[0] = _body_jacobian(n, (root,), *parts, body.inertia)
     for branch, part in zip(tree.branches, matrix.branches, strict=True):
         for a, k in enumerate(branch.links):
             if (each := bodies[k]) is not None:
                 counted, body = each
-                see = _branch_jacobian(branch.above, a, part.follows, branch.of(tree.seen), tree.seen[0], body.place)
+                see = _branch_jacobian(
+                    branch.above, a, part.follows, branch.of(tree.velocity_axes), tree.velocity_axes[0], body.place
+                )
                 response = _branch_response(branch.above, a, part, matrix.root, branch.of(given), given[0], counted)
                 found[k] = _body_jacobian(n, (root, branch.coordinates), see, response, body.inertia)
     return tuple(found)

@@ -28,21 +28,21 @@ class MotionSubspaces:
     """The motion subspaces (6, count) of a branch's links and of the root (Featherstone's S).
 
     Attributes:
-        seen, root_seen: at the time of the velocities.
-        given, root_given: at the time of the impulses; None if that is the same.
+        velocity_axes, root_velocity_axes: at the time of the velocities.
+        impulse_axes, root_impulse_axes: at the time of the impulses; None if that is the same.
     """
 
-    seen: Columns
-    root_seen: Expr
-    given: Columns | None = None
-    root_given: Expr | None = None
+    velocity_axes: Columns
+    root_velocity_axes: Expr
+    impulse_axes: Columns | None = None
+    root_impulse_axes: Expr | None = None
 
     @property
     def impulses(self) -> tuple[Columns, Expr]:
         """Return the motion subspaces at the time of the impulses, of the links and of the root."""
-        if self.given is None or self.root_given is None:
-            return self.seen, self.root_seen
-        return self.given, self.root_given
+        if self.impulse_axes is None or self.root_impulse_axes is None:
+            return self.velocity_axes, self.root_velocity_axes
+        return self.impulse_axes, self.root_impulse_axes
 
 
 @dataclass(frozen=True)
@@ -93,22 +93,24 @@ def branch_matrix(
 ) -> BranchMatrix:
     """Build from the inertias of a branch's bodies, and what is added to the diagonal of its coordinates."""
     # composite inertias, from leaves to root (Featherstone's composite-rigid-body algorithm)
-    symmetric, (given, root_given) = axes.given is None, axes.impulses
+    symmetric, (given, root_given) = axes.impulse_axes is None, axes.impulses
     total, base = summed_up(above, [inertia.matrix for inertia in inertias])
-    seen_of: Expr = ca.horzcat(*axes.seen)
-    given_of: Expr = ca.horzcat(*given)
-    n, m = seen_of.size2(), axes.root_seen.size2()
+    velocity_matrix: Expr = ca.horzcat(*axes.velocity_axes)
+    impulse_matrix: Expr = ca.horzcat(*given)
+    n, m = velocity_matrix.size2(), axes.root_velocity_axes.size2()
     rows: list[Sparse] = [{} for _ in range(n)]
     pushes, pulls = ca.SX(m, n), ca.SX(n, m)
     # entries of the mass matrix along each path, and the coupling with the root
-    for path, columns, inertia, added in zip(paths(above, axes.seen), axes.seen, total, armature, strict=True):
+    for path, columns, inertia, added in zip(
+        paths(above, axes.velocity_axes), axes.velocity_axes, total, armature, strict=True
+    ):
         for k in path[len(path) - columns.size2() :]:
-            momentum, reaction = ca.mtimes(inertia, seen_of[:, k]), ca.mtimes(inertia.T, given_of[:, k])
+            momentum, reaction = ca.mtimes(inertia, velocity_matrix[:, k]), ca.mtimes(inertia.T, impulse_matrix[:, k])
             pushes[:, k] = ca.mtimes(root_given.T, momentum)
-            pulls[k, :] = pushes[:, k].T if symmetric else ca.mtimes(axes.root_seen.T, reaction).T
+            pulls[k, :] = pushes[:, k].T if symmetric else ca.mtimes(axes.root_velocity_axes.T, reaction).T
             for i in [i for i in path if i <= k]:
-                rows[i][k] = ca.dot(momentum, given_of[:, i])
-                rows[k][i] = rows[i][k] if symmetric or i == k else ca.dot(reaction, seen_of[:, i])
+                rows[i][k] = ca.dot(momentum, impulse_matrix[:, i])
+                rows[k][i] = rows[i][k] if symmetric or i == k else ca.dot(reaction, velocity_matrix[:, i])
             rows[k][k] = rows[k][k] if added is None else rows[k][k] + added
     # T = -M_ll^-1 M_lr, and the branch's share of the root's matrix
     block = factorise(rows, symmetric)
@@ -116,7 +118,7 @@ def branch_matrix(
     for j in range(m):
         for k, value in block.solve({k: -pulls[k, j] for k in range(n)}).items():
             follows[k, j] = value
-    at_root = ca.mtimes(root_given.T, ca.mtimes(base, axes.root_seen)) + ca.mtimes(pushes, follows)
+    at_root = ca.mtimes(root_given.T, ca.mtimes(base, axes.root_velocity_axes)) + ca.mtimes(pushes, follows)
     return BranchMatrix(block, follows, pushes, symmetric_copy(at_root) if symmetric else at_root)
 
 
@@ -141,7 +143,7 @@ def root_matrix(
 def branch_load(
     above: Parents,
     matrix: BranchMatrix,
-    given: Columns,
+    impulse_axes: Columns,
     root: Expr,
     momenta: Sequence[SpatialVector],
     rotors: tuple[Expr | None, ...],
@@ -149,7 +151,7 @@ def branch_load(
     """Return z (n,) and the load on the root (m,) of momenta, or forces, of a branch's bodies and rotors."""
     total, base = summed_up(above, [momentum.parts for momentum in momenta])
     right, start = dict[int, Expr](), 0
-    for columns, screw, rotor in zip(given, total, rotors, strict=True):
+    for columns, screw, rotor in zip(impulse_axes, total, rotors, strict=True):
         along = ca.mtimes(columns.T, screw) + (0 if rotor is None else rotor)
         right |= {start + k: along[k] for k in range(columns.size2())}
         start += columns.size2()

@@ -35,7 +35,7 @@ class CoordinateConstraint:
 
     Attributes:
         terms: arms at the constraint's instant, and to the common point for impulses.
-        seen, impulse_directions: the one direction at the constraint's instant, and of the impulse.
+        velocity_directions, impulse_directions: the one direction at the constraint's instant, and of the impulse.
         keep, slope, offset: see the module.
         low, high: bounds of the impulse; None where there is none.
         width: of the smoothed bounds [N m s].
@@ -51,7 +51,7 @@ class CoordinateConstraint:
     """
 
     terms: tuple[BodyTerm, ...]
-    seen: Directions
+    velocity_directions: Directions
     impulse_directions: Directions
     keep: Expr
     slope: Expr
@@ -82,7 +82,7 @@ class CoordinateConstraint:
     def rate(self, momenta: tuple[Any, ...]) -> Expr:
         """Return the rate of the coordinate [rad/s] or [m/s]."""
         if self.of_tree is None:
-            return speeds(self.terms, self.seen, momenta)
+            return speeds(self.terms, self.velocity_directions, momenta)
         return momenta[0].along(self.of_tree.jacobian)
 
     def stored_form(self, impulse: JointImpulse) -> Expr:

@@ -55,11 +55,11 @@ class Command:
     """The command of a motor.
 
     Attributes:
-        given: in the step.
+        value: of the command in the step.
         before: what the command of the step before gave by itself [N m], [N]; it acts until this step begins.
     """
 
-    given: Expr
+    value: Expr
     before: Expr
 
 
@@ -68,7 +68,7 @@ class CoordinateTerms:
     """Terms common to all constraints along a coordinate.
 
     Attributes:
-        terms, seen, given: as of any constraint.
+        terms, velocity_directions, impulse_directions: as of any constraint.
         value: [rad] or [m].
         rate: at the middle of the substep, before any impulse of it.
         rate_now, rate_due: at its start, and at its middle if forces stay what they were.
@@ -77,8 +77,8 @@ class CoordinateTerms:
     """
 
     terms: tuple[BodyTerm, ...]
-    seen: Directions
-    given: Directions
+    velocity_directions: Directions
+    impulse_directions: Directions
     value: Expr
     rate: Expr
     rate_now: Expr
@@ -112,7 +112,7 @@ def lock_constraint(
         lasting = LastingForce(substep.kick, -law.end / at_start, -law.end_before * before / at_start)
     return LockConstraint(
         terms=terms,
-        seen=seen,
+        velocity_directions=seen,
         impulse_directions=given,
         mass=inverse(k + ca.diag(softness)),
         softness=softness,
@@ -224,9 +224,9 @@ def motor_constraint(
     if isinstance(motor, AffineMotor):
         return _affine(settings, motor, at, command, substep)
     if isinstance(motor, TorqueMotor):
-        return _drive_constraint(at, commanded_torque(motor, command.given, settings.smoothing), command, substep)
+        return _drive_constraint(at, commanded_torque(motor, command.value, settings.smoothing), command, substep)
     assert isinstance(motor, Servo | VelocityMotor)
-    aim = command.given
+    aim = command.value
     wanted = servo_velocity(motor, aim, at.value, settings.smoothing) if isinstance(motor, Servo) else aim
     target = clip(wanted, -motor.velocity, motor.velocity, settings.smoothing)
     most = motor.torque * substep.kick
@@ -270,7 +270,7 @@ def _affine(
     The last two act as spring and damper.
     """
     gear, kick, width, ends = motor.gear, substep.kick, settings.smoothing / at.mobility, _force_ends(motor)
-    drive = commanded_torque(motor, command.given, settings.smoothing, width / kick)
+    drive = commanded_torque(motor, command.value, settings.smoothing, width / kick)
     if motor.passive:
         return _drive_constraint(at, drive, command, substep)
     pull, slope = _spring(settings, at, substep, Spring(gear**2 * motor.kp, gear**2 * motor.kv))
@@ -414,5 +414,12 @@ def _constraint(
 ) -> CoordinateConstraint:
     bounds = {"low": low, "high": high, "width": width, "left": left, "landing": landing, "drive": drive, "jump": jump}
     return CoordinateConstraint(
-        at.terms, at.seen, at.given, **law, **bounds, same=at.same, of_tree=at.of_tree, inverse_mobility=1 / at.mobility
+        at.terms,
+        at.velocity_directions,
+        at.impulse_directions,
+        **law,
+        **bounds,
+        same=at.same,
+        of_tree=at.of_tree,
+        inverse_mobility=1 / at.mobility,
     )

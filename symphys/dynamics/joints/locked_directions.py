@@ -32,7 +32,7 @@ class LockConstraint:
 
     Attributes:
         terms: arms at the constraint's instant, and to the common point for impulses.
-        seen, impulse_directions: directions at the constraint's instant, and of impulses.
+        velocity_directions, impulse_directions: directions at the constraint's instant, and of impulses.
         mass: (n, n) inverse of mobility and softness.
         softness: (n,) gamma of a joint that is soft, 0 if rigid.
         target: (n,) velocities that the constraint asks for [m/s], [rad/s].
@@ -44,7 +44,7 @@ class LockConstraint:
     """
 
     terms: tuple[BodyTerm, ...]
-    seen: Directions
+    velocity_directions: Directions
     impulse_directions: Directions
     mass: Expr
     softness: Expr
@@ -61,7 +61,7 @@ class LockConstraint:
     def at_end(self, momenta: tuple[Any, ...], impulse: JointImpulse) -> JointImpulse:
         """Return the force of a soft joint at the end of the substep, from momenta and impulse after the sweeps."""
         assert self.lasting is not None
-        moving = self.lasting.slope * speeds(self.terms, self.seen, momenta)
+        moving = self.lasting.slope * speeds(self.terms, self.velocity_directions, momenta)
         return JointImpulse(impulse.numbers / self.lasting.kick + moving + self.lasting.constant)
 
     def stored_form(self, impulse: JointImpulse) -> Expr:
@@ -76,13 +76,13 @@ class LockConstraint:
 
     def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
         """Implement ``VelocityConstraint.project``."""
-        miss = speeds(self.terms, self.seen, momenta) - self.target + self.softness * old.numbers
+        miss = speeds(self.terms, self.velocity_directions, momenta) - self.target + self.softness * old.numbers
         change = JointImpulse(-ca.mtimes(self.mass, miss))
         return self.apply(momenta, change), old.plus(change)
 
     def rates(self, momenta: tuple[Any, ...]) -> Expr:
         """Return the velocities along the directions (n,)."""
-        return speeds(self.terms, self.seen, momenta)
+        return speeds(self.terms, self.velocity_directions, momenta)
 
     def linearised(self, momenta: tuple[Any, ...], old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
         """Return the impulse change a (n,) and its slope B (n, n) by the velocities; see ``newton_start``."""

@@ -118,4 +118,4 @@ def _relative(constraint: LockConstraint | CoordinateConstraint, moved: Displace
     for term, shift in zip(constraint.terms, moved, strict=True):
         linear += term.sign * (shift.linear + ca.cross(shift.angular, term.arm))
         angular += term.sign * shift.angular
-    return constraint.seen.forwards(linear, angular)
+    return constraint.velocity_directions.forwards(linear, angular)

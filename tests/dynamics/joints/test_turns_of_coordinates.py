@@ -33,7 +33,7 @@ def constraints(bounded: bool) -> list[CoordinateConstraint]:
         found.append(
             CoordinateConstraint(
                 terms=(BODY,),
-                seen=NOWHERE,
+                velocity_directions=NOWHERE,
                 impulse_directions=NOWHERE,
                 **law,
                 low=ca.SX(-0.1) if bounded else None,
