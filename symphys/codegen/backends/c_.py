@@ -22,21 +22,21 @@ def c(source: BackendSource, threads: int) -> Backend:
     began = time.perf_counter()
     made = {name: getattr(source.functions, name) for name in EVALUATED}
     made |= parts(source.functions.nlp)
-    asked = {name: function for name, function in made.items() if function is not None}
-    texts = [kernel.SourceFile(written(name, function)) for name, function in asked.items()]
+    present = {name: function for name, function in made.items() if function is not None}
+    texts = [kernel.SourceFile(written(name, function)) for name, function in present.items()]
     with kernel.shared_library(texts, kernel.default_cache()) as built:
         try:
-            compiled = {name: ca.external(name, str(built.path)) for name in asked}
+            compiled = {name: ca.external(name, str(built.path)) for name in present}
         except RuntimeError as error:
             why = " ".join(str(error).split())
             raise kernel.KernelUnavailable(f"the compiled functions cannot be loaded: {why}") from error
     functions = SimpleNamespace(**{name: compiled.get(name) for name in EVALUATED})
     nlp = Nlp(source.functions.nlp, *(compiled.get(name) for name in ("nlp", "nlp_gradient", "nlp_jacobian")))
     spent = time.perf_counter() - began
-    told = Description(
+    description = Description(
         "c", 1, threads, "double", built.compiler.version, built.cached, spent, built.note, flags=built.flags
     )
-    return Backend(told, FunctionEvaluator(cast(ProblemFunctions, functions), threads), nlp)
+    return Backend(description, FunctionEvaluator(cast(ProblemFunctions, functions), threads), nlp)
 
 
 def parts(nlp: Function) -> dict[str, Function]:

@@ -230,26 +230,26 @@ def by_kernel(source: BackendSource, threads: int, name: str) -> Backend:
         raise KernelUnavailable("this problem has no program to compile")
     began = time.perf_counter()
     kernel = build_kernel(name, ProgramSource(source.program, source.identity), SEEDED, threads)
-    asked = {"residuals": (lambda: source.functions.residuals, 0), "constraints": (lambda: source.functions.nlp, 1)}
+    of_output = {"residuals": (lambda: source.functions.residuals, 0), "constraints": (lambda: source.functions.nlp, 1)}
     rows = {
-        output: cache(partial(Seeds.compressed, kernel, output, *asked[output]))
-        for output in asked
+        output: cache(partial(Seeds.compressed, kernel, output, *of_output[output]))
+        for output in of_output
         if output in kernel.program.outputs
     }
     nlp = LaterNlp(lambda: Nlp(source.functions.nlp))
-    told: list[str] = []
+    notes: list[str] = []
     if isinstance(kernel, ProcessorKernel):
-        nlp = LaterNlp(lambda: _nlp(kernel, source.functions.nlp, rows.get("constraints"), told))
+        nlp = LaterNlp(lambda: _nlp(kernel, source.functions.nlp, rows.get("constraints"), notes))
     found = described(kernel, time.perf_counter() - began)
     said = found.later
     evaluator = KernelEvaluator(kernel, rows.get("residuals"), source.exact)
-    return Backend(replace(found, later=lambda: joined(said(), *told)), evaluator, nlp)
+    return Backend(replace(found, later=lambda: joined(said(), *notes)), evaluator, nlp)
 
 
-def _nlp(kernel: ProcessorKernel, expression: Function, rows: Callable[[], Seeds] | None, told: list[str]) -> Nlp:
-    """Return objective and constraints by the kernel; else by the expression, and add the reason to ``told``."""
+def _nlp(kernel: ProcessorKernel, expression: Function, rows: Callable[[], Seeds] | None, notes: list[str]) -> Nlp:
+    """Return objective and constraints by the kernel; else by the expression, and add the reason to ``notes``."""
     try:
         return external_nlp(kernel, expression, rows and rows())
     except KernelUnavailable as error:
-        told.append(f"for ipopt casadi's virtual machine evaluates, which is slower: {error}")
+        notes.append(f"for ipopt casadi's virtual machine evaluates, which is slower: {error}")
         return Nlp(expression)

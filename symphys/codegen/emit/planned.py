@@ -31,9 +31,9 @@ class Plan:
         program: what was planned, in the order of its tables; None: as it was given.
         packs: (first call of the body, number of calls) that a library of one lane may compute side by side.
         callers: for each table of ``TABLES`` the calls of the body whose entries it has.
-        shapes: of the functions for one rollout alone; empty for blocks of rollouts.
+        shapes: of the functions in a library of one lane; empty for blocks of rollouts.
         size: words before the tape; 0: the program's.
-        signature: of a plan for one rollout alone, how its C differs from that for blocks.
+        signature: of the plan of a library of one lane, how its C differs from that for blocks.
     """
 
     functions: tuple[tuple[Graph, Form], ...]

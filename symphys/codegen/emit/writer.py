@@ -80,8 +80,8 @@ def write(
 ) -> str:
     """Return the C function ``name(m, b, t, k)``: memory, adjoint memory, places as (offset, stride) pairs, step.
 
-    ``moving``: the pairs that may have a stride; None: all. ``shape``: of a function for one rollout alone. ``apart``:
-    the results that meet no other in any call.
+    ``moving``: the pairs that may have a stride; None: all. ``shape``: of a function in a library of one lane.
+    ``apart``: the results that meet no other in any call.
     """
     words = PlaceWords(dialect.word) if shape is None else PackWords(shape, len(graph.sizes), form.backward)
     cut = pieces_of(graph, form, dialect.fuses)

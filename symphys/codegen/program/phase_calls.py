@@ -1,4 +1,4 @@
-"""The calls of a phase as arrays, so that what is asked of each call is asked of all at once."""
+"""The calls of a phase as arrays, for operations on all calls at once."""
 
 from __future__ import annotations
 

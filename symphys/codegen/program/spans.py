@@ -1,4 +1,4 @@
-"""The places of many calls as arrays, so that what is asked of each word is asked of all at once."""
+"""The places of many calls as arrays, for operations on all words at once."""
 
 from __future__ import annotations
 

@@ -309,15 +309,15 @@ def compile_for(given: IO[bytes]) -> None:
     """Keep the library that a ``Background`` asks for, and print its path, or why there is none."""
     from symphys.codegen.emit.source import SourceFile
 
-    asked = json.load(given)
-    parts, texts = [SourceFile(**part) for part in asked["parts"]], asked["texts"]
-    cache = Cache(Path(asked["cache"]["folder"]), asked["cache"]["limit"])
+    request = json.load(given)
+    parts, texts = [SourceFile(**part) for part in request["parts"]], request["texts"]
+    cache = Cache(Path(request["cache"]["folder"]), request["cache"]["limit"])
     try:
         with shared_library(parts, cache, texts) as built:
             said = {"error": built.note} if built.note else {"path": str(built.path)}
     except KernelUnavailable as error:
         said = {"error": str(error)}
-    with suppress(OSError):  # who asked may have ended
+    with suppress(OSError):  # the process that started this one may have ended
         print(json.dumps(said), flush=True)
 
 

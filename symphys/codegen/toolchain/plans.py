@@ -57,7 +57,7 @@ class KeptPlan:
         names: of the outputs that are differentiated.
         texts: checksum of the C files; see ``build.texts_of``.
         functions, operations: see ``BuildReport``.
-        alone: the plan of the library of one lane; None: the same.
+        single_lane: the plan of the library of one lane; None: the same.
     """
 
     program: Program
