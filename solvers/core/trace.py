@@ -10,10 +10,10 @@ from symphys.solvers.core.outcome import Counts, TraceRow
 
 
 class SolveTrace:
-    """The iterations of a solve and their times, breaks left out."""
+    """The iterations of a solve and their times, interruptions left out."""
 
     def __init__(self, rows: Iterable[TraceRow] = (), seconds: float = 0.0) -> None:
-        """Start the clock; ``rows`` and ``seconds``: of a solve that goes on."""
+        """Start the clock; ``rows`` and ``seconds``: those of a resumed solve."""
         self._rows = list(rows)
         self._earlier, self._began = seconds, time.perf_counter()
 
@@ -28,12 +28,12 @@ class SolveTrace:
 
     @property
     def last(self) -> TraceRow | None:
-        """The last row; None before the first."""
+        """The last row; None before the first one."""
         return self._rows[-1] if self._rows else None
 
     @property
     def seconds(self) -> float:
-        """Since the solve began, breaks left out."""
+        """The time [s] since the solve began, interruptions left out."""
         return self._earlier + time.perf_counter() - self._began
 
     def append(self, counts: Counts, numbers: Iterable[float], outputs: Mapping[str, float]) -> TraceRow:
@@ -43,7 +43,7 @@ class SolveTrace:
         return row
 
     def distribute(self, work: Counts, first: int) -> None:
-        """Add work to the rows from ``first`` on, evenly, where a library reports its work at the end only."""
+        """Add work evenly to the rows from ``first`` on, for a library that reports it only at its end."""
         share = len(self) - first
         for index in range(first, len(self)):
             row, part = self._rows[index], work.share((index - first + 1) / share)
@@ -51,5 +51,5 @@ class SolveTrace:
 
 
 def counts_of(row: TraceRow) -> Counts:
-    """The work up to a row."""
+    """Return the work up to a row."""
     return Counts(row.rollouts, row.gradients, row.jacobians, row.hessians)

@@ -9,16 +9,16 @@ from scipy.linalg import lapack
 
 from symphys.types import Array, Bools
 
-ROUNDS = 100
-ARMIJO = 0.1
+MAX_ITERATIONS = 100
+ARMIJO_SHARE = 0.1
 SHRINK = 0.6
-SMALLEST = 1e-10
-FLAT = 1e-10
-"""A projected gradient below it, relative to the first, is none."""
+MIN_STEP_FACTOR = 1e-10
+GRADIENT_TOLERANCE = 1e-10
+"""Projected gradient, relative to the first one, that counts as zero."""
 
 
 class BoxSolution(NamedTuple):
-    """A minimum: ``step`` (m,), which entries are ``free`` of the bounds, and their lower Cholesky factor."""
+    """A minimum: ``step`` (m,), which entries are ``free`` of bounds, and the Cholesky factor of the free block."""
 
     step: Array
     free: Bools
@@ -46,7 +46,7 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
     x = np.clip(start, lower, upper)
     free, factor = np.zeros(len(x), np.bool_), None
     size = 1.0 + float(np.abs(gradient).max(initial=0.0))
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         slope = gradient + hessian @ x
         now = ~(((x <= lower) & (slope > 0)) | ((x >= upper) & (slope < 0)))
         if factor is None or not np.array_equal(now, free):
@@ -56,7 +56,7 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
             factor, failed = lapack.dpotrf(hessian[free][:, free], lower=1)
             if failed:
                 return None
-        if np.abs(slope[free]).max() <= FLAT * size:
+        if np.abs(slope[free]).max() <= GRADIENT_TOLERANCE * size:
             break
         ahead = np.zeros(len(x))
         ahead[free] = -lapack.dpotrs(factor, slope[free], lower=1)[0]
@@ -68,7 +68,7 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
 
 
 def _within(hessian: Array, gradient: Array, lower: Array, upper: Array) -> BoxSolution | None:
-    """The minimum without bounds, where it exists and meets them."""
+    """Return the unconstrained minimum, where it exists and lies within the bounds."""
     factor, failed = lapack.dpotrf(hessian, lower=1)
     if failed:
         return None
@@ -80,12 +80,12 @@ def _within(hessian: Array, gradient: Array, lower: Array, upper: Array) -> BoxS
 def _projected(
     hessian: Array, gradient: Array, bounds: tuple[Array, Array], x: Array, slope: Array, ahead: Array
 ) -> Array | None:
-    """The first point along the projected step that is enough lower; None where none is."""
+    """Return the first point along the projected step with enough decrease; None if there is none."""
     value, share = x @ (hessian @ x) / 2 + gradient @ x, 1.0
-    while share > SMALLEST:
+    while share > MIN_STEP_FACTOR:
         trial = np.clip(x + share * ahead, *bounds)
         gain = value - (trial @ (hessian @ trial) / 2 + gradient @ trial)
-        if gain >= ARMIJO * -(slope @ (trial - x)) and np.any(trial != x):
+        if gain >= ARMIJO_SHARE * -(slope @ (trial - x)) and np.any(trial != x):
             return trial
         share *= SHRINK
     return None

@@ -24,20 +24,20 @@ import numpy as np
 
 from symphys.solvers.core.checkpoint import damaged
 from symphys.solvers.core.convergence import converged, not_finite
-from symphys.solvers.core.driver import iterating, make_solver
+from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import best_of
-from symphys.solvers.core.vanishing_gradient import FLAT
-from symphys.solvers.methods.cma_strategy import PLATEAU, CmaState, PycmaStrategy, load
+from symphys.solvers.core.vanishing_gradient import PLATEAU_ADVICE
+from symphys.solvers.methods.cma_strategy import PLATEAU_CRITERION, CmaState, PycmaStrategy, load
 from symphys.solvers.randomized.candidates import Candidates, NominalCandidates, SampledCandidates
 from symphys.solvers.randomized.validation import ValidationBatch, rate_by_validation
 from symphys.types import Array
 
-BUDGETS = {"maxiter", "timeout"}
-CONVERGED = {"tolfun", "tolfunhist", "tolfunrel", "tolx", "ftarget"}
+BUDGET_CRITERIA = {"maxiter", "timeout"}
+CONVERGENCE_CRITERIA = {"tolfun", "tolfunhist", "tolfunrel", "tolx", "ftarget"}
 BUDGET = "the evaluations are used up: raise `evaluations`, or `sigma` if the step size in the trace was growing"
 STALLED = "the search came to rest without converging ({}): try another seed, a larger `population` or another `sigma`"
 NOT_FINITE = "not one simulation of a generation is finite: lower `sigma` or bound the variables"
@@ -71,7 +71,7 @@ class CmaOptions(SolverOptions):
     every: int = 5
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and what would be valid."""
+        """Raise ValueError, which names the option and what would be valid."""
         super().__post_init__()
         require(0 < self.sigma < math.inf, "sigma", "above 0")
         require(self.population == 0 or self.population > 2, "population", "0 or at least 3")
@@ -80,12 +80,12 @@ class CmaOptions(SolverOptions):
         at_least(1, samples=self.samples, every=self.every)
 
     def batch(self, seed: int) -> ValidationBatch:
-        """Set up validation if there is a scenario."""
+        """Return the validation batch, used with a scenario."""
         return ValidationBatch(self.validation, self.validation_width, seed)
 
 
 class CmaEs(Method[CmaState]):
-    """The method, see ``interface.Method``; every stage of smoothing draws from the same stream anew.
+    """The method, see ``interface.Method``; every stage of smoothing restarts the same random stream.
 
     pycma's strategy cannot be copied. So a state is what it can be replayed from, and the strategy that made the last
     state is kept beside it: a step from that state costs no replay.
@@ -104,7 +104,7 @@ class CmaEs(Method[CmaState]):
         self._latest: PycmaStrategy | None = None
 
     def init(self) -> Iteration[CmaState] | StopReason:
-        """The start is the first point that may be kept. Where bounds hold every variable it is the only one."""
+        """Keep the start as the first candidate; it is the only one where bounds hold every variable."""
         if self.held:
             point = self.evaluator.value(self.start)
             return Iteration(self._held_state(), point) if point.finite else not_finite(point)
@@ -116,7 +116,7 @@ class CmaEs(Method[CmaState]):
         return Iteration(strategy.state(), point, step=strategy.sigma)
 
     def step(self, state: CmaState) -> Iteration[CmaState] | StopReason:
-        """Ask for a generation, evaluate it, tell the merits."""
+        """Draw a generation, evaluate it, and update the strategy with the merits."""
         strategy, generation = self._strategy(state), len(state.merits)
         self._latest = None
         points = self.candidates.rate([self.evaluator.clip(z) for z in strategy.ask()], generation)
@@ -160,16 +160,16 @@ class CmaEs(Method[CmaState]):
         reasons = strategy.stopped()
         if not reasons:
             return None
-        if reasons & BUDGETS:
+        if reasons & BUDGET_CRITERIA:
             return StopReason(Status.BUDGET, BUDGET)
-        if PLATEAU in reasons:
-            return StopReason(Status.STALLED, FLAT)
-        if reasons & CONVERGED:
+        if PLATEAU_CRITERION in reasons:
+            return StopReason(Status.STALLED, PLATEAU_ADVICE)
+        if reasons & CONVERGENCE_CRITERIA:
             return self.candidates.converged()
         return StopReason(Status.STALLED, STALLED.format(", ".join(reasons)))
 
     def _strategy(self, state: CmaState) -> PycmaStrategy:
-        """pycma's strategy in a state."""
+        """Return pycma's strategy in a state."""
         if self._latest is None or self._latest.merits is not state.merits:
             self._latest = self._fresh(state.start)
             self._latest.replay(state)
@@ -189,7 +189,7 @@ CMA = make_solver(
     "cma",
     "CMA-ES by pycma, without derivatives",
     CmaOptions,
-    iterating(CmaEs),
+    stage_of(CmaEs),
     rate=lambda options, seed: rate_by_validation(options.batch(seed)),
     prepare=prepare,
     scenarios=None,

@@ -1,4 +1,4 @@
-"""Which of IPOPT's options can be passed on: each is tried on a tiny problem, so that a bad one is named."""
+"""Checks of IPOPT's options: each is tried on a tiny problem, so that the message names the invalid one."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ RESERVED = {
     "hsllib": LIBRARY,
     "pardisolib": LIBRARY,
 }
-"""Options that are not passed on, and why."""
+"""Options that are not passed on, each with the reason."""
 SILENT: dict[str, Any] = {"print_level": 0, "sb": "yes", "option_file_name": ""}
-"""IPOPT neither prints nor reads ipopt.opt from the current folder."""
+"""Options with which IPOPT neither prints nor reads ipopt.opt from the current folder."""
 
 
 def check(options: Mapping[str, Any]) -> None:
-    """SymphysError for the first option that IPOPT does not take, or that cannot be passed to it."""
+    """Raise SymphysError for the first option that IPOPT refuses, or that cannot be passed on."""
     for name, value in options.items():
         if name in RESERVED:
             raise refuse("ipopt", name, f"cannot be set: {RESERVED[name]}")
@@ -39,7 +39,7 @@ def check(options: Mapping[str, Any]) -> None:
 
 
 def refusal(name: str, value: Any) -> str:
-    """Why IPOPT refuses an option; empty if it does not."""
+    """Return why IPOPT refuses an option; empty if it does not."""
     x = ca.MX.sym("x")
     problem: dict[str, Any] = {"x": x, "f": x**2}
     printed = io.StringIO()
@@ -53,7 +53,7 @@ def refusal(name: str, value: Any) -> str:
 
 
 def explain(printed: str, error: str) -> str:
-    """The telling part of what IPOPT printed, or of what casadi raised."""
+    """Return the relevant part of what IPOPT printed or casadi raised."""
     lines = [" ".join(line.split()) for line in printed.splitlines() if line.strip()]
     if lines:
         start = next((i for i, line in enumerate(lines) if line.startswith(("Valid", "Allowed"))), 0)

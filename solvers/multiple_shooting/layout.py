@@ -1,4 +1,4 @@
-"""Layouts of the variables and rows of multiple shooting: one with shared entries of z, one in stages as FATROP needs.
+"""Layouts of variables and rows of multiple shooting: with shared entries of z, or in stages as FATROP needs.
 
 The shared layout has every entry of z once, then the tangents of the nodes. FATROP solves chains: the rows of a stage
 hold its own variables and the states of the next stage alone. There an entry of z that acts in several intervals is a
@@ -24,7 +24,7 @@ SPREAD = (
 
 @dataclass(frozen=True)
 class NlpLayout:
-    """Where everything is among variables w and constraint rows.
+    """The places of everything among variables w and constraint rows.
 
     Attributes:
         size, rows: how many variables and rows.
@@ -49,7 +49,7 @@ class NlpLayout:
 
 
 def shared(grid: IntervalGrid, variables: int, limits: int) -> NlpLayout:
-    """Every entry of z once, then all tangents; all defects, then all limits."""
+    """Return the layout with every entry of z once, then all tangents; all defects, then all limits."""
     n, count = grid.tangent_size, grid.intervals
     nodes = variables + np.arange(count * n).reshape(count, n)
     local = []
@@ -70,7 +70,7 @@ def shared(grid: IntervalGrid, variables: int, limits: int) -> NlpLayout:
 
 
 def staged(grid: IntervalGrid, variables: int, stages_of_limits: list[list[int]]) -> NlpLayout:
-    """The chain of stages; ``stages_of_limits``: the stages that each limit depends on, at most one."""
+    """Return the chain of stages; ``stages_of_limits``: the stages that each limit depends on, at most one."""
     for number, stages in enumerate(stages_of_limits):
         if len(stages) > 1:
             raise SymphysError(SPREAD.format(number + 1))
@@ -78,7 +78,7 @@ def staged(grid: IntervalGrid, variables: int, stages_of_limits: list[list[int]]
 
 
 class StageChain:
-    """Builds the layout in stages: variables are the states of a stage, then its controls; rows the copies likewise."""
+    """Builds the layout in stages: a stage has states, then controls; its rows have the copies likewise."""
 
     def __init__(self, grid: IntervalGrid, variables: int, stage_of_limit: list[int]) -> None:
         """Find where each entry of z is first and last needed."""
@@ -119,14 +119,14 @@ class StageChain:
         return NlpLayout(size, rows, self.home, local, np.array(nodes), defects, limits, copies, structure)
 
     def _local(self, stage: int, nodes: list[Ints], places: dict[int, int]) -> Ints:
-        """The indices of the local vector of a stage."""
+        """Return the indices of the local vector of a stage."""
         knots = self.grid.knots[stage] if stage < self.grid.intervals else self.grid.statics[:0]
         entries = [places[entry] for entry in [*knots.tolist(), *self.grid.statics.tolist()]]
         own = nodes[stage - 1] if stage else nodes[0][:0]
         return np.concatenate([own, np.array(entries, np.int64)])
 
     def _rows(self, places: list[dict[int, int]]) -> tuple[Ints, Ints, Ints, int]:
-        """Rows of the defects, of the limits, of the copies, and how many there are."""
+        """Return the rows of the defects, of the limits, of the copies, and their number."""
         grid, n, row = self.grid, self.grid.tangent_size, 0
         defects, copies = [], []
         limits = np.zeros(len(self.stage_of_limit), np.int64)

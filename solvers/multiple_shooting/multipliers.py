@@ -1,4 +1,4 @@
-"""Multipliers of multiple shooting by what they belong to, so that another solve, by either library, starts from them.
+"""Multipliers of multiple shooting by their meaning, from which another solve, by either library, starts.
 
 They are those of the defects, each in the tangent of its own node, of the limits, and of the bounds of z, unscaled. In
 the layout in stages the rows of copies have multipliers too, which follow from these and are left out.
@@ -33,7 +33,7 @@ class NlpMultipliers:
     barrier: float
 
     def by_name(self, nlp: MultipleShootingNlp) -> dict[str, Array]:
-        """Map multipliers to what they belong to; empty if there are none."""
+        """Return the multipliers as named arrays; empty if there are none."""
         if not self.rows.size:
             return {}
         layout = nlp.layout
@@ -47,7 +47,7 @@ class NlpMultipliers:
 
 
 def fitted(nlp: MultipleShootingNlp, saved: Mapping[str, Array]) -> NlpMultipliers | None:
-    """Arrange the result of ``by_name`` in the layout of this program; None if nodes or limits differ.
+    """Arrange named multipliers in the layout of a program; None if nodes or limits differ.
 
     Steps may be shorter or longer: nodes are compared as shares of the duration.
     """
@@ -72,7 +72,7 @@ def fitted(nlp: MultipleShootingNlp, saved: Mapping[str, Array]) -> NlpMultiplie
 
 
 def at_nodes(nlp: MultipleShootingNlp, w: Array, rows: Array) -> Array:
-    """(rows,) with those of the defects, which are for tangents at w's references, for tangents at its nodes."""
+    """Transform the rows (rows,) of the defects from tangents at w's references to tangents at its nodes."""
     moved = rows.copy()
     if rows.size:
         turns, defects = nlp.shots(w).turns, nlp.layout.defects
@@ -81,7 +81,7 @@ def at_nodes(nlp: MultipleShootingNlp, w: Array, rows: Array) -> Array:
 
 
 def barrier_at(nlp: MultipleShootingNlp, lower: Array, upper: Array, w: Array, bounds: Array, rows: Array) -> float:
-    """The mean product of multipliers and distances from their bounds, within what IPOPT may start from.
+    """Return the mean product of multipliers and distances from their bounds, clipped for IPOPT's start.
 
     Bounds (len(z),) are those of z; w (size,) is the iterate, ``bounds`` (size,) and ``rows`` its multipliers.
     """

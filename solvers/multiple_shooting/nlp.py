@@ -16,13 +16,13 @@ from symphys.solvers.multiple_shooting.layout import NlpLayout
 from symphys.solvers.multiple_shooting.shots import ShootingPlan, Shots
 from symphys.types import Array, Ints
 
-STEP = 1e-6
-"""Of the differences for an exact Hessian, in local vectors."""
+DIFFERENCE_STEP = 1e-6
+"""Step of the differences for an exact Hessian, in local vectors."""
 
 
 @dataclass(frozen=True)
 class ScatterPattern:
-    """A sparsity pattern and where the entries of the blocks go; several may go to one place, and add up.
+    """A sparsity pattern with the places of the entries of blocks; entries of one place add up.
 
     Attributes:
         sparsity: casadi's.
@@ -33,19 +33,19 @@ class ScatterPattern:
     place: Ints
 
     def nonzeros(self, entries: Array) -> Array:
-        """Entries added up."""
+        """Return the nonzeros: entries summed by place."""
         return np.bincount(self.place, weights=entries, minlength=self.sparsity.nnz()).astype(float)
 
 
 def pattern(shape: tuple[int, int], rows: Ints, columns: Ints) -> ScatterPattern:
-    """The pattern of entries at (rows, columns)."""
+    """Make the pattern of entries at (rows, columns)."""
     keys, place = np.unique(columns * shape[0] + rows, return_inverse=True)
     starts = np.searchsorted(keys, shape[0] * np.arange(shape[1] + 1))
     return ScatterPattern(ca.Sparsity(*shape, starts.tolist(), (keys % max(shape[0], 1)).tolist()), place)
 
 
 class MultipleShootingNlp:
-    """The program in w; the last evaluation is kept, since solvers ask for its parts one after the other."""
+    """The program in w; the last evaluation is cached, since solvers request its parts one by one."""
 
     def __init__(
         self, plan: ShootingPlan, layout: NlpLayout, limit_rows: list[Ints], scale: Array, exact: bool
@@ -78,7 +78,7 @@ class MultipleShootingNlp:
         self._kept: dict[str, Array] = {}
 
     def pack(self, z: Array, d: Array) -> Array:
-        """(size,) w of z and the tangents d (M, n), copies included."""
+        """Return w (size,) of z and the tangents d (M, n), copies included."""
         w = np.zeros(self.layout.size)
         w[self.layout.home], w[self.layout.nodes] = z / self.scale, d
         for _, copy, origin in self.layout.copies.tolist():
@@ -86,23 +86,23 @@ class MultipleShootingNlp:
         return w
 
     def unpack(self, w: Array) -> tuple[Array, Array]:
-        """Z and d (M, n)."""
+        """Return z and d (M, n)."""
         return w[self.layout.home] * self.scale, w[self.layout.nodes]
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """(size,) each, of w from those of z; copies and tangents have none."""
+        """Return the bounds (size,) of w from those of z; copies and tangents have none."""
         low, high = np.full(self.layout.size, -np.inf), np.full(self.layout.size, np.inf)
         low[self.layout.home], high[self.layout.home] = lower / self.scale, upper / self.scale
         return low, high
 
     def row_bounds(self) -> tuple[Array, Array]:
-        """(rows,) each: 0 but for the limits."""
+        """Return the bounds (rows,) of the constraints: 0 except for the limits."""
         low, high = np.zeros(self.layout.rows), np.zeros(self.layout.rows)
         low[self.layout.limits], high[self.layout.limits] = self.plan.problem.lower, self.plan.problem.upper
         return low, high
 
     def shots(self, w: Array) -> Shots:
-        """The evaluation at w."""
+        """Return the evaluation at w."""
         key = w.tobytes()
         if self._shots is None or key != self._key:
             z, d = self.unpack(w)
@@ -113,7 +113,7 @@ class MultipleShootingNlp:
         return self._shots
 
     def largest_defect(self, z: Array) -> float:
-        """Start with all nodes at their references."""
+        """Return the largest defect at z with all nodes at their references."""
         nodes = np.zeros(self.layout.nodes.shape)
         return float(np.abs(self.shots(self.pack(z, nodes)).defects).max())
 
@@ -122,7 +122,7 @@ class MultipleShootingNlp:
         return self.shots(w).measured[0]
 
     def constraints(self, w: Array) -> Array:
-        """(rows,) at w."""
+        """Return the constraints (rows,) at w."""
         shots, rows = self.shots(w), np.zeros(self.layout.rows)
         rows[self.layout.defects] = shots.defects
         rows[self.layout.limits] = shots.measured[1]
@@ -131,14 +131,14 @@ class MultipleShootingNlp:
         return rows
 
     def gradient(self, w: Array) -> Array:
-        """(size,) of the objective."""
+        """Return the gradient (size,) of the objective."""
         shots = self._sloped(w)
         if "gradient" not in self._kept:
             self._kept["gradient"] = self._gathered(shots.gradients)
         return self._kept["gradient"]
 
     def jacobian(self, w: Array) -> Array:
-        """Nonzeros of the constraints' slopes in the order of the pattern."""
+        """Return the nonzeros of the constraints' Jacobian in the order of the pattern."""
         shots, n = self._sloped(w), self.plan.grid.tangent_size
         if "jacobian" in self._kept:
             return self._kept["jacobian"]
@@ -151,14 +151,14 @@ class MultipleShootingNlp:
         return self._kept["jacobian"]
 
     def unit_slopes(self) -> Array:
-        """Nonzeros of the slopes if no interval and no limit depended on anything."""
+        """Return the nonzeros of the Jacobian if no interval and no limit depended on anything."""
         entries, copies = np.zeros(len(self.jacobian_pattern.place)), len(self.layout.copies)
         entries[: self.layout.nodes.size] = 1
         entries[len(entries) - 2 * copies :] = np.repeat([1, -1], copies)
         return self.jacobian_pattern.nonzeros(entries)
 
     def hessian(self, w: Array, factor: float, multipliers: Array, upper: bool) -> Array:
-        """Nonzeros of the Hessian of factor * objective + multipliers . constraints, or of its upper half."""
+        """Return nonzeros of the Hessian of factor * objective + multipliers . constraints, or its upper half."""
         if self.exact:
             blocks = self._differences(w, factor, multipliers)
         else:
@@ -174,7 +174,7 @@ class MultipleShootingNlp:
         return shots
 
     def _gathered(self, local: list[Array]) -> Array:
-        """(size,) the sum of local gradients."""
+        """Return (size,) the sum of local gradients."""
         scaled = [gradient * scale for gradient, scale in zip(local, self.local_scale, strict=True)]
         indices = np.concatenate(self.layout.local)
         return np.bincount(indices, weights=np.concatenate(scaled), minlength=self.layout.size).astype(float)
@@ -193,7 +193,7 @@ class MultipleShootingNlp:
         return pattern((layout.rows, layout.size), np.concatenate(rows), np.concatenate(columns))
 
     def _differences(self, w: Array, factor: float, multipliers: Array) -> list[Array]:
-        """Blocks of the exact Hessian: all stages move at once along one entry of their local vectors.
+        """Return blocks of the exact Hessian: all stages move at once along one local entry.
 
         Local gradients depend on the own local vector alone, so each move gives a column of every block.
         """
@@ -203,13 +203,13 @@ class MultipleShootingNlp:
         statics, knots = len(grid.statics), max(len(each) for each in grid.knots)
         for column in range(grid.tangent_size):
             d = base.d.copy()
-            d[:, column] += STEP
+            d[:, column] += DIFFERENCE_STEP
             after = self._lagrangian(self._moved(base.motion.z, base.motion.u, d), factor, multipliers)
             for stage in range(1, grid.intervals + 1):
-                blocks[stage][:, column] = (after[stage] - before[stage]) / STEP
+                blocks[stage][:, column] = (after[stage] - before[stage]) / DIFFERENCE_STEP
         for column in range(knots):
             u, moving = base.motion.u.copy(), [stage for stage, own in enumerate(grid.knots) if column < len(own)]
-            steps = {stage: STEP * self.scale[grid.knots[stage][column]] for stage in moving}
+            steps = {stage: DIFFERENCE_STEP * self.scale[grid.knots[stage][column]] for stage in moving}
             for stage, step in steps.items():
                 u[list(grid.steps(stage))] += step * grid.shares[stage][:, :, column]
             after = self._lagrangian(self._moved(base.motion.z, u, base.d), factor, multipliers)
@@ -217,7 +217,7 @@ class MultipleShootingNlp:
                 blocks[stage][:, grid.node_size(stage) + column] = (after[stage] - before[stage]) / step
         for column in range(statics):
             z = base.motion.z.copy()
-            step = STEP * self.scale[grid.statics[column]]
+            step = DIFFERENCE_STEP * self.scale[grid.statics[column]]
             z[grid.statics[column]] += step
             after = self._lagrangian(self._moved(z, base.motion.u, base.d), factor, multipliers)
             for stage, block in enumerate(blocks):
@@ -229,7 +229,7 @@ class MultipleShootingNlp:
         return Shots(self.plan, z, u, d)
 
     def _lagrangian(self, shots: Shots, factor: float, multipliers: Array) -> list[Array]:
-        """Local gradients of factor * objective + multipliers . constraints, the tangents' own part left out."""
+        """Return local gradients of the Lagrangian, without the tangents' own part."""
         lagrangians = [factor * gradient for gradient in shots.gradients]
         if len(self.layout.limits):
             blocks = shots.limit_slopes(self.limit_rows)

@@ -1,4 +1,4 @@
-"""The nonlinear programs of one stage of smoothing: with references anywhere, on one grid and in one layout."""
+"""The nonlinear programs of one stage of smoothing: with any references, on one grid and in one layout."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from symphys.types import Array
 
 
 class Programs:
-    """Makes the program of a stage of smoothing at any references; grid and layout are always the same."""
+    """Makes the program of a stage of smoothing at any references, with the same grid and layout."""
 
     def __init__(
         self,
@@ -27,7 +27,7 @@ class Programs:
         in_stages: bool,
         exact: bool,
     ) -> None:
-        """Find which stages the limits depend on, and what all steps have in common, at lines between the nodes.
+        """Find the stages that limits depend on, and what all steps share, at lines between the nodes.
 
         Args:
             problem: what is solved.
@@ -59,6 +59,6 @@ class Programs:
         self.layout = staged(self.grid, variables, found) if in_stages else shared(self.grid, variables, len(stages))
 
     def at(self, reference: Array) -> MultipleShootingNlp:
-        """The program with tangents at these states (M, nx)."""
+        """Return the program with tangents at these states (M, nx)."""
         plan = ShootingPlan(self.problem, self.grid, self.steps, reference, self.evaluator.smoothing, self.curved)
         return MultipleShootingNlp(plan, self.layout, self.limit_rows, self.evaluator.scale, self.exact)

@@ -1,4 +1,4 @@
-"""How candidates of a search are rated: by one rollout each, or by their mean over samples of a scenario."""
+"""Evaluation of the candidates of a search: one rollout each, or the mean over samples of a scenario."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Log
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.randomized.validation import SAMPLES, Validation, ValidationBatch, outputs_of
+from symphys.solvers.randomized.validation import SAMPLE_STREAM, Validation, ValidationBatch, outputs_of
 from symphys.types import Array
 
 
 class Candidates(Protocol):
-    """Rates candidates, and decides which points are kept.
+    """Evaluates candidates, and decides which points are kept.
 
     Attributes:
         rollouts: for each candidate.
@@ -27,29 +27,29 @@ class Candidates(Protocol):
     rollouts: int
 
     def rate(self, Z: Sequence[Array], generation: int) -> list[Point]:
-        """A generation."""
+        """Evaluate a generation."""
         ...
 
     def keep(self, z: Array, generation: int, due: bool = False) -> None:
-        """Decide whether the mean of a search is to be kept; ``due``: in whatever generation."""
+        """Decide whether the mean of a search is kept; ``due``: in whatever generation."""
         ...
 
     def converged(self) -> StopReason:
-        """Why a search ends that has converged."""
+        """Return why a converged search ends."""
         ...
 
     def conclude(self, reason: StopReason, start: Array) -> StopReason:
-        """Why a search from ``start`` (n,) ended, or that its start is kept."""
+        """Return why a search from ``start`` (n,) ended, or that its start is kept."""
         ...
 
 
 class NominalCandidates:
-    """In the problem's own sample, where the best candidate is kept."""
+    """Evaluation in the problem's own sample, where the best candidate is kept."""
 
     rollouts = 1
 
     def __init__(self, evaluator: CountingEvaluator) -> None:
-        """Evaluate by it."""
+        """Evaluate by this evaluator."""
         self.evaluator = evaluator
 
     def rate(self, Z: Sequence[Array], generation: int) -> list[Point]:
@@ -69,7 +69,7 @@ class NominalCandidates:
 
 
 class SampledCandidates:
-    """In samples that each generation draws anew, the same for all of it; means of the search are validated."""
+    """Evaluation in samples that each generation redraws; means of the search are validated."""
 
     def __init__(
         self,
@@ -80,14 +80,14 @@ class SampledCandidates:
         every: int,
         log: Log,
     ) -> None:
-        """``samples`` for each candidate; a validation after ``every`` generations."""
+        """Use ``samples`` for each candidate; validate after ``every`` generations."""
         self.evaluator, self.rollouts, self.width, self.every = evaluator, samples, width, every
         self.validation = Validation(evaluator, batch, log)
 
     def rate(self, Z: Sequence[Array], generation: int) -> list[Point]:
         """Implement ``Candidates.rate``: means; a candidate with a motion that is not finite is not finite."""
         scenario, batch, each = self.evaluator.scenario, self.validation.batch, self.rollouts
-        stream = np.random.default_rng([batch.seed, SAMPLES, generation])
+        stream = np.random.default_rng([batch.seed, SAMPLE_STREAM, generation])
         drawn = scenario.draw(stream, each, self.width, generation % len(scenario.grids))
         many = ScenarioSamples(drawn.grid, np.tile(drawn.numbers, (len(Z), 1)))
         values = self.evaluator.sample_values(np.repeat(np.array(Z), each, axis=0), many)

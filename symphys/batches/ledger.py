@@ -16,7 +16,7 @@ from symphys.runs.inspection import file_stamp
 from symphys.runs.job import Job
 from symphys.solvers import TraceRow
 
-NOT_KEPT: Mapping[str, Any] = {
+DROPPED_FIELDS: Mapping[str, Any] = {
     **{key: {} for key in ("z", "guess", "costs", "outputs", "counts", "price", "versions", "provenance")},
     "stages": (),
 }
@@ -117,4 +117,4 @@ def retried(job: Job, why: str, ledger: Ledger) -> Job:
 def slim(result: Result) -> Result:
     """Return a result without the fields that a batch does not use, so that ten thousand take little memory."""
     trust = {} if result.accepted else result.trust
-    return replace(result, **NOT_KEPT, trust=trust)
+    return replace(result, **DROPPED_FIELDS, trust=trust)

@@ -24,20 +24,20 @@ from symphys import threads
 from symphys.batches.ledger import Ledger, retried
 from symphys.batches.limits import BatchLimits, Halt, timed_out
 from symphys.batches.queue import Queue
-from symphys.batches.worker import TICK, Begun, Ended, News, Order, Ready, Stopping, serve
+from symphys.batches.worker import REPORT_INTERVAL, Begun, Ended, News, Order, Ready, Stopping, serve
 from symphys.interrupts import ignoring_interrupts
 from symphys.results.result import Result
 from symphys.runs.execute import Transcribe, give_up, stop_at_limit
 from symphys.runs.job import Job
 from symphys.solvers import TraceRow
 
-GRACE = 1.0
+GRACE_TIME = 1.0
 """[s] for a run to stop by itself after its timeout; then its process is killed, and its compilers with it."""
 BUILDING, SOLVING = "building and compiling", "solving"
 """The phases of a run before and after its first iteration; judging announces its own parts."""
 PS_TIMEOUT = 1.0
 """[s] after which ``ps``, asked where there is no /proc, is not waited for."""
-MOST_STARTS = 3
+MAX_FAILED_STARTS = 3
 """Workers in a row that end before they are ready, after which no more are tried."""
 
 
@@ -139,7 +139,7 @@ class Pool:
         for slot in self.working:
             if not slot.asked and (halt or now > slot.until):
                 slot.asked, slot.why = True, self.halt.reason if halt else timed_out(self.limits.timeout)
-                slot.until = now + GRACE if slot.why else math.inf
+                slot.until = now + GRACE_TIME if slot.why else math.inf
                 send(slot, Stopping(slot.why))
             elif slot.asked and now > slot.until and slot.process.pid and not slot.ended:
                 slot.ended = True
@@ -147,9 +147,11 @@ class Pool:
 
     def listen(self) -> None:
         """Wait for messages and read them."""
-        waited = connection.wait([each for slot in self.slots for each in (slot.pipe, slot.process.sentinel)], TICK)
+        waited = connection.wait(
+            [each for slot in self.slots for each in (slot.pipe, slot.process.sentinel)], REPORT_INTERVAL
+        )
         if not self.slots:
-            time.sleep(TICK)
+            time.sleep(REPORT_INTERVAL)
         for slot in list(self.slots):
             if slot.pipe in waited or slot.process.sentinel in waited:
                 self.take_news(slot)
@@ -208,7 +210,7 @@ class Pool:
         cause = cause_of(slot.process.exitcode)
         if not slot.ready:
             self.failed_starts += 1
-            if self.failed_starts >= MOST_STARTS:
+            if self.failed_starts >= MAX_FAILED_STARTS:
                 raise NoWorkers(f"worker processes do not start: the last {cause}")
         index = slot.index
         if index is None:

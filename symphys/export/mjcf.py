@@ -45,7 +45,7 @@ from symphys.export.mjcf_departures import Departure, departures, require_expres
 from symphys.export.mjcf_equality import equalities
 from symphys.export.mjcf_joints import freedoms
 from symphys.export.mjcf_sensors import sensor_elements, site_elements
-from symphys.export.mjcf_surfaces import APART, FRICTION_RATIO, geoms, meshes, pairs, text
+from symphys.export.mjcf_surfaces import FRICTION_RATIO, PAIRS_ONLY, geoms, meshes, pairs, text
 from symphys.export.mjcf_terrain import height_field, middle
 from symphys.model.body import Body
 from symphys.model.shapes import Terrain
@@ -160,7 +160,7 @@ def one_line(words: str) -> str:
 def ground(start: StartState, terrain: Terrain) -> Element:
     """Write the geom of a height field."""
     place = {"pos": text(middle(start, terrain))}
-    return Element("geom", {"name": terrain.name, "type": "hfield", "hfield": terrain.name, **place, **APART})
+    return Element("geom", {"name": terrain.name, "type": "hfield", "hfield": terrain.name, **place, **PAIRS_ONLY})
 
 
 class Keyframe:

@@ -29,11 +29,11 @@ from symphys.types import Array
 
 Inertias = Mapping[tuple[str, int], float]
 """The inertia of each coordinate of the trees [kg m^2] or [kg], by the joint's name and the number there."""
-STIFFEST, SOFTEST = 0.01, 0.1
+WANTED_SPEED_ERROR, MAX_SPEED_ERROR = 0.01, 0.1
 """Velocity error at which a motor gives its full torque, as a share of its largest velocity: desired, and allowed."""
-WITHIN, WITHIN_CONTACT = 1.0, 0.125
+MAX_STEP_PHASE, MAX_STEP_PHASE_CONTACT = 1.0, 0.125
 """Largest h omega of a spring, and of a compliant contact: a body may have several, whose damping adds up."""
-MOST_PARTS = 50
+MAX_PARTS = 50
 """Largest number of parts of a time step."""
 UNBOUNDED = 1e10
 """Bound of a force or a command where one of two is missing, in the unit of either."""
@@ -42,12 +42,12 @@ UNBOUNDED = 1e10
 def parts(start: StartState, found: Inertias, dt: float) -> int:
     """Return the number of parts into which a step of ``dt`` [s] is cut."""
     longest = min(_longest(start, found), default=inf)
-    return max(1, min(MOST_PARTS, math.ceil(dt / longest - 1e-9))) if longest > 0 else MOST_PARTS
+    return max(1, min(MAX_PARTS, math.ceil(dt / longest - 1e-9))) if longest > 0 else MAX_PARTS
 
 
 def steepness(motor: Servo | VelocityMotor, inertia: float, step: float) -> float:
     """Return kv on a coordinate of this inertia [N m s/rad] or [N s/m], at a time step [s]."""
-    return float(min(motor.torque / (STIFFEST * motor.velocity), 2 * inertia / step))
+    return float(min(motor.torque / (WANTED_SPEED_ERROR * motor.velocity), 2 * inertia / step))
 
 
 def inertias(start: StartState) -> Inertias:
@@ -105,12 +105,12 @@ def _longest(start: StartState, found: Inertias) -> Iterator[float]:
     for (name, _), inertia in found.items():
         motor, stiffness = joints[name].motor, _stiffness(joints[name])
         if isinstance(motor, Servo | VelocityMotor):
-            yield 2 * SOFTEST * motor.velocity * inertia / motor.torque
+            yield 2 * MAX_SPEED_ERROR * motor.velocity * inertia / motor.torque
         if stiffness > 0:
-            yield WITHIN * math.sqrt(inertia / stiffness)
+            yield MAX_STEP_PHASE * math.sqrt(inertia / stiffness)
     for pair in start.world.pairs:
         if pair.law.soft:
-            yield WITHIN_CONTACT / (2 * math.pi * float(pair.law.frequency) * max(1.0, float(pair.law.damping)))
+            yield MAX_STEP_PHASE_CONTACT / (2 * math.pi * float(pair.law.frequency) * max(1.0, float(pair.law.damping)))
 
 
 def _stiffness(joint: Joint) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from symphys.export.folder import ExportError
-from symphys.export.mjcf_bodies import APART, StartState, loose_frames, nesting_joints
+from symphys.export.mjcf_bodies import MAX_JOINT_GAP, StartState, loose_frames, nesting_joints
 from symphys.export.mjcf_equality import expressible_loop
 from symphys.export.mjcf_joints import joint_equalities
 from symphys.export.mjcf_surfaces import normal_of
@@ -17,7 +17,7 @@ from symphys.model.joints import Servo, VelocityMotor
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Terrain
 
-LISTED = 5
+MAX_LISTED = 5
 """Largest number of names in a message."""
 Kind = Literal["approximated", "left out", "refused", "measured"]
 
@@ -44,8 +44,8 @@ class Departure:
 
 def listed(names: Sequence[str]) -> str:
     """Join the first few names."""
-    more = len(names) - LISTED
-    return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MAX_LISTED
+    return ", ".join(names[:MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def require_expressible(departures: Iterable[Departure], name: str, approximate: bool) -> None:
@@ -83,7 +83,7 @@ def shorter_step(dt: float, count: int) -> Iterator[Departure]:
 def joint_departures(start: StartState) -> Iterator[Departure]:
     """Yield the departures of joints and motors."""
     world, trees = start.world, nesting_joints(start.world)
-    apart = [world.joints[k].name for k in sorted(trees) if start.gap(world.joints[k]) > APART]
+    apart = [world.joints[k].name for k in sorted(trees) if start.gap(world.joints[k]) > MAX_JOINT_GAP]
     text = "a joint that does not fit its bodies at the start; move them until its frames meet"
     yield Departure("refused", tuple(apart), text)
     frames = tuple(world.bodies[k].name for k in loose_frames(world))

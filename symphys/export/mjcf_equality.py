@@ -15,7 +15,7 @@ from symphys.maths import rotation
 from symphys.model.joints import Joint
 from symphys.model.world import World
 
-ARM = 0.05
+AXIS_ARM = 0.05
 """Distance of the two points on the axis of a hinge that are held together from its point [m]."""
 IMPEDANCE = 1e-4
 """The least that MuJoCo takes: the constraint acts as a spring and damper in addition to all other forces."""
@@ -54,7 +54,7 @@ def loop(world: World, joint: Joint) -> Iterator[Element]:
         return
     axis = np.array(rotation.matrix(np.array(on_first.orientation, float)))[:, 0]
     for name, way in ((joint.name, 1), (f"{joint.name}_axis", -1)):
-        yield Element("connect", {"name": name, **named, "anchor": text(point + way * ARM * axis)})
+        yield Element("connect", {"name": name, **named, "anchor": text(point + way * AXIS_ARM * axis)})
 
 
 def softness(joint: Joint) -> dict[str, str]:

@@ -27,9 +27,9 @@ AT_A_POINT = {
     ),
 }
 """Formulas of a point (3,) in a body's frame."""
-TURNED = re.compile(rf"rotate\({NUMBERS}, ([\w.]+)\)")
+ROTATED = re.compile(rf"rotate\({NUMBERS}, ([\w.]+)\)")
 """Formulas of a vector in axes to which the quaternion goes from those of the vector."""
-NEAR = 1e-9
+SITE_TOLERANCE = 1e-9
 """[m], or of quaternions: sites that are apart by less are one."""
 
 
@@ -78,7 +78,7 @@ def reading(world: World, name: str, formula: str, sites: list[Site]) -> Element
         if (found := pattern.fullmatch(formula)) and found[1] in bodies:
             site = site_at(world, sites, bodies[found[1]], position=json.loads(found[2]))
             return Element(kind, name=name, objtype="site", objname=site.name)
-    turned = TURNED.fullmatch(formula)
+    turned = ROTATED.fullmatch(formula)
     return same_reading(world, name, turned[2] if turned else formula, turned[1] if turned else None, sites)
 
 
@@ -129,8 +129,8 @@ def site_at(
     It is made and put into ``sites`` where there is none.
     """
     for site in (*world.sites, *sites):
-        near = position is None or np.allclose(np.array(site.position, float), position, atol=NEAR)
-        alike = orientation is None or abs(np.dot(np.array(site.orientation, float), orientation)) > 1 - NEAR
+        near = position is None or np.allclose(np.array(site.position, float), position, atol=SITE_TOLERANCE)
+        alike = orientation is None or abs(np.dot(np.array(site.orientation, float), orientation)) > 1 - SITE_TOLERANCE
         if site.body == body and near and alike:
             return site
     name = f"{world.bodies[body].name}_sensor{len(sites) or ''}"

@@ -11,7 +11,7 @@ from symphys.model.shapes import Capsule, Convex, Plane, Shape, Terrain, surface
 from symphys.model.world import Law, Side, World, side_name
 
 MJCF_PLACEMENT = {"centre": "pos", "orientation": "quat"}
-APART = {"contype": "1", "conaffinity": "0"}
+PAIRS_ONLY = {"contype": "1", "conaffinity": "0"}
 """Attributes of a geom that touches others in explicit pairs only; readers see that it is no visual geom."""
 IMPEDANCE = 0.01
 """Impedance of compliant contacts: so small that they act as springs and dampers, 1 % too soft."""
@@ -38,7 +38,7 @@ def geom(world: World, side: Side) -> Element | None:
         return None
     name = side_name(world.bodies, world.statics, side)
     placed = half_space(shape) if isinstance(shape, Plane) else solid(shape, name)
-    return Element("geom", {"name": name, **placed, **APART})
+    return Element("geom", {"name": name, **placed, **PAIRS_ONLY})
 
 
 def half_space(plane: Plane) -> dict[str, str]:

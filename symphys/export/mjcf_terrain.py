@@ -14,9 +14,9 @@ from symphys.model.heightfield import FINER, Heightfield
 from symphys.model.shapes import Terrain
 from symphys.types import Array
 
-AROUND = 10.0
+SAMPLED_MARGIN = 10.0
 """Margin around the bodies at the start within which terrain without a grid is sampled [m]."""
-STEP = 0.2
+SAMPLE_SPACING = 0.2
 """Distance of its samples [m]."""
 THICKNESS = 1.0
 """Thickness of the solid below the lowest height [m]."""
@@ -43,9 +43,9 @@ def window(start: StartState, terrain: Terrain) -> Grid:
     if isinstance(height, Heightfield):
         return Grid(height.origin, height.spacing, (len(height.heights[0]), len(height.heights)))
     places = np.array([start.of(k, "position")[:2] for k in range(len(start.world.bodies))])
-    low, high = np.floor(places.min(0) - AROUND), np.ceil(places.max(0) + AROUND)
-    columns, rows = np.rint((high - low) / STEP).astype(int) + 1
-    return Grid((float(low[0]), float(low[1])), (STEP, STEP), (int(columns), int(rows)))
+    low, high = np.floor(places.min(0) - SAMPLED_MARGIN), np.ceil(places.max(0) + SAMPLED_MARGIN)
+    columns, rows = np.rint((high - low) / SAMPLE_SPACING).astype(int) + 1
+    return Grid((float(low[0]), float(low[1])), (SAMPLE_SPACING, SAMPLE_SPACING), (int(columns), int(rows)))
 
 
 def sampled(terrain: Terrain, grid: Grid, finer: int = 1) -> Array:

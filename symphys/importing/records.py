@@ -13,7 +13,7 @@ from symphys.errors import SymphysError
 from symphys.types import Array
 
 Kind = Literal["taken", "approximated", "left out", "recovered"]
-LISTED = 6
+MAX_LISTED = 6
 """Names that a message lists at most."""
 
 
@@ -66,8 +66,8 @@ def joined(head: str, several: Sequence[Finding]) -> Finding:
 
 def listed(names: Sequence[str]) -> str:
     """Return the first few names, and how many more there are."""
-    more = len(names) - LISTED
-    return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MAX_LISTED
+    return ", ".join(names[:MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def counted(count: int, one: str, many: str = "") -> str:

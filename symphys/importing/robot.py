@@ -12,7 +12,7 @@ import numpy as np
 from symphys.files import modified
 from symphys.importing.packages import model_file
 from symphys.importing.records import CompiledModel, Finding, ImportOptions, Kind, gathered
-from symphys.importing.source import AS_IT_IS, read_source
+from symphys.importing.source import DEFAULT_OPTIONS, read_source
 from symphys.importing.tables.contacts import read_contacts
 from symphys.importing.tables.joints import read_couplings, read_joints, read_loops, read_motors
 from symphys.importing.tables.links import body_table, read_links
@@ -23,7 +23,7 @@ from symphys.importing.tables.shapes import read_shapes, read_statics
 
 KINDS: tuple[Kind, ...] = ("taken", "approximated", "left out", "recovered")
 """Kinds of findings, in the order in which they are shown."""
-MOST_KEPT = 32
+MAX_CACHED = 32
 """Robots that a process keeps, since reading one takes a second."""
 GRAVITY = (0.0, 0.0, -9.81)
 
@@ -49,7 +49,7 @@ _kept: dict[tuple[str, ImportOptions], tuple[dict[Path, int | None], Imported]] 
 """Robots by path and options, with the times of their files."""
 
 
-def read_robot(path: str | Path, options: ImportOptions = AS_IT_IS) -> Imported:
+def read_robot(path: str | Path, options: ImportOptions = DEFAULT_OPTIONS) -> Imported:
     """Read an MJCF or URDF file, unless this process has read it and none of its files has changed.
 
     ``package://name/path`` is a file of an installed package.
@@ -64,7 +64,7 @@ def read_robot(path: str | Path, options: ImportOptions = AS_IT_IS) -> Imported:
     if known is None or any(modified(file) != time for file, time in times.items()):
         source = read_source(path, options)
         known = made(source, options)
-        while len(_kept) >= MOST_KEPT:
+        while len(_kept) >= MAX_CACHED:
             _kept.pop(next(iter(_kept)))
         _kept[key] = {file: modified(file) for file in source.files}, known
     return replace(known, file=path, tables=deepcopy(known.tables))

@@ -21,15 +21,15 @@ from symphys.importing.reading.child import ANSWER, MODEL, REQUEST
 from symphys.importing.reading.folders import Folders
 from symphys.importing.records import CompiledModel, Finding, ImportOptions, ImportProblem, Inertial, JointMotor
 
-AS_IT_IS = ImportOptions()
-TIMEOUT = 120.0
+DEFAULT_OPTIONS = ImportOptions()
+COMPILE_TIMEOUT = 120.0
 """[s] that MuJoCo may take to read and compile a model."""
 START = "import sys, json; sys.path[:] = json.loads(sys.argv[2]); from pathlib import Path; "
 CALL = "from symphys.importing.reading.child import main; main(Path(sys.argv[1]))"
 MISSING = "models of robots are read by MuJoCo, which is not installed; pip install 'symphys[robots]'"
 
 
-def read_source(path: str | Path, options: ImportOptions = AS_IT_IS) -> CompiledModel:
+def read_source(path: str | Path, options: ImportOptions = DEFAULT_OPTIONS) -> CompiledModel:
     """Read and compile a model.
 
     Args:
@@ -111,10 +111,10 @@ def run(folder: Path, file: str) -> int:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            timeout=TIMEOUT,
+            timeout=COMPILE_TIMEOUT,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        text = f"MuJoCo takes longer than {TIMEOUT:g} s to read it; it was stopped"
+        text = f"MuJoCo takes longer than {COMPILE_TIMEOUT:g} s to read it; it was stopped"
         raise ImportProblem(str(file), text) from None
     return done.returncode

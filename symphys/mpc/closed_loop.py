@@ -21,9 +21,9 @@ from symphys.mpc.planner import RecedingPlan
 from symphys.mpc.plant import Plant
 from symphys.types import Array
 
-Tell = Callable[[float], None]
+OnTick = Callable[[float], None]
 """Is called with the simulated time [s]."""
-KEPT = 12
+MAX_KEPT_PLANS = 12
 """Plans that are kept for pictures, at equal distances."""
 
 
@@ -154,7 +154,7 @@ class Loop:
 def close_loop(
     controller: Controller,
     plant: Plant,
-    tell: Tell = lambda time: None,
+    tell: OnTick = lambda time: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> ClosedLoop:
     """Run the closed loop for the duration of [mpc].
@@ -169,7 +169,7 @@ def close_loop(
     """
     loop = Loop(controller, plant)
     count = max(round(controller.horizon.duration * controller.horizon.rate), 1)
-    keep = set(np.linspace(0, count, KEPT, endpoint=False).round().astype(int).tolist())
+    keep = set(np.linspace(0, count, MAX_KEPT_PLANS, endpoint=False).round().astype(int).tolist())
     resting = gc.isenabled()
     gc.collect()
     gc.disable()

@@ -20,9 +20,9 @@ from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.staged.staged_problem import RolloutStages
 from symphys.types import Array
 
-SHARES = np.array([1.0, 0.5, 0.0])
+FEEDBACK_SHARES = np.array([1.0, 0.5, 0.0])
 """Of the feedback with which a shifted plan is followed: the cheapest counts. Gains may fail across an impact."""
-GROWTH, SHRINK, STIFFEST = 8.0, 0.5, 1e8
+DAMPING_GROWTH, DAMPING_SHRINK, MAX_DAMPING = 8.0, 0.5, 1e8
 """Factors on the damping after a tick that gained nothing and after one that did, and its largest value."""
 
 
@@ -146,15 +146,15 @@ class Planner:
 
     def _improved(self, policy: PlanPolicy, x: Array, time: float, iterations: int) -> RecedingPlan:
         """Follow the policy from the state, then iterate."""
-        none = np.zeros(len(SHARES))
-        states, decisions, costs = self.follow(x, policy, none, time, SHARES)
+        none = np.zeros(len(FEEDBACK_SHARES))
+        states, decisions, costs = self.follow(x, policy, none, time, FEEDBACK_SHARES)
         best = int(np.where(np.isfinite(costs), costs, math.inf).argmin())
         plan = RecedingPlan(
             time, self.horizon.dt, states[best], decisions[best], policy.back, float(costs[best]), False
         )
         for _ in range(iterations):
             plan = self._iterate(plan)
-            if self.damping >= STIFFEST:
+            if self.damping >= MAX_DAMPING:
                 break
         return plan
 
@@ -165,11 +165,11 @@ class Planner:
         if policy is not None and all(np.isfinite(each).all() for each in policy.aligned):
             best, back = about.search(policy, self._costs), policy.aligned[1]
             if best.value < plan.cost:
-                self.damping = max(self.horizon.damping, self.damping * SHRINK)
+                self.damping = max(self.horizon.damping, self.damping * DAMPING_SHRINK)
                 decisions = best.motion.z[self._aligned.new]
                 return RecedingPlan(plan.time, plan.dt, best.motion.x, decisions, back, best.value, True)
             plan = replace(plan, back=back)
-        self.damping = min(self.damping * GROWTH, STIFFEST)
+        self.damping = min(self.damping * DAMPING_GROWTH, MAX_DAMPING)
         return replace(plan, gained=False)
 
     def _motion(self, plan: RecedingPlan) -> StagedMotion:

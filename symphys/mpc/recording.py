@@ -19,7 +19,7 @@ from symphys.trajectory import Trajectory
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 
-MOST_VALUES = 24
+MAX_VALUES = 24
 """Quantities of a plan that are recorded."""
 
 
@@ -105,7 +105,7 @@ def quantities(rollout: Rollout, floating: Sequence[str], x: Array, p: Array) ->
     names = [f"{joint.name}.{each.name}" for joint in world.joints for each in joint.kind.coordinates]
     columns = [x[:, layout[f"{name}.position"]] for name in floating]
     names += [f"{name}.position.{axis}" for name in floating for axis in "xyz"]
-    return tuple(names[:MOST_VALUES]), np.concatenate([coordinates, *columns], axis=1)[:, :MOST_VALUES]
+    return tuple(names[:MAX_VALUES]), np.concatenate([coordinates, *columns], axis=1)[:, :MAX_VALUES]
 
 
 def write_closed_loop(loop: ClosedLoop, folder: Path) -> tuple[ClosedLoopRecord, Trajectory]:

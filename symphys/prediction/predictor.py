@@ -22,9 +22,9 @@ from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.simulation import recorder, simulate
 from symphys.types import Array
 
-CLOSE = 1e-9
+SAMPLE_TOLERANCE = 1e-9
 """Steps: a sample so near to the start of a step is there."""
-SCALED = ("position", "velocity")
+SCALED_FIELDS = ("position", "velocity")
 """What a scale of lengths scales of a start."""
 
 
@@ -60,7 +60,7 @@ class Predictor:
     def __init__(self, problem: Problem, recordings: Sequence[Recording], threads: int | None = None) -> None:
         """Trace the simulation, which is compiled when it is first used; KernelUnavailable where it cannot be."""
         self.recordings, self.dt = tuple(recordings), problem.simulation.dt
-        last = math.ceil(max(r.time[-1] for r in self.recordings) / self.dt - CLOSE)
+        last = math.ceil(max(r.time[-1] for r in self.recordings) / self.dt - SAMPLE_TOLERANCE)
         steps = max(last, problem.simulation.steps) + 2
         self._given = (*given_variables(problem, self.recordings), *input_variables(self.recordings, steps))
         ends = np.cumsum([0, *(variable.guess.size for variable in self._given)]).tolist()
@@ -147,7 +147,7 @@ class Predictor:
                 late, by_late = measured[f"{name}.delay"] + measured[offset], by[f"{name}.delay"] + by[offset]
                 means, slopes = step_means(recording.inputs[name], variable.knots, self.dt, late)
                 z[part], along[part] = means.ravel(), np.outer(slopes, by_late)
-            elif name.rpartition(".")[2] in SCALED:
+            elif name.rpartition(".")[2] in SCALED_FIELDS:
                 along[part] += np.outer(z[part], by[scale])
                 z[part] *= measured[scale]
         at = (recording.time + measured[offset]) / self.dt
@@ -199,7 +199,7 @@ class _Set:
 
     def last(self, steps: int) -> int:
         """The last state that is needed."""
-        return int(min(max(math.floor(self.at[-1] + CLOSE) + 1, 1), steps - 1))
+        return int(min(max(math.floor(self.at[-1] + SAMPLE_TOLERANCE) + 1, 1), steps - 1))
 
 
 def given_variables(problem: Problem, recordings: Sequence[Recording]) -> tuple[Variable, ...]:
@@ -219,18 +219,18 @@ def _given(name: str, nominal: Array) -> Variable:
 
 def interpolated(samples: Array, at: Array) -> tuple[Array, Array]:
     """Interpolate rows of samples (steps, ...) at places in steps (n,): (n, ...), and the slope by the place."""
-    first = np.clip(np.floor(at + CLOSE).astype(int), 0, len(samples) - 2)
+    first = np.clip(np.floor(at + SAMPLE_TOLERANCE).astype(int), 0, len(samples) - 2)
     share = np.clip(at - first, 0, 1).reshape(-1, *[1] * (samples.ndim - 1))
-    share = np.where(share < CLOSE, 0.0, share)
+    share = np.where(share < SAMPLE_TOLERANCE, 0.0, share)
     rise = samples[first + 1] - samples[first]
     return np.where(share == 0, samples[first], samples[first] + share * rise), rise
 
 
-JUMP = 0.1
+MIN_JUMP_SHARE = 0.1
 """Share of the greatest speed of a body in a motion by which its velocity jumps at an impact, at least."""
-FALLS = 3.0
+MIN_JUMP_BY_GRAVITY = 3.0
 """And by so many times what gravity changes in a step: bodies that come to rest or rock have no impacts."""
-WITHIN = 1e-6
+IMPACT_OFFSET = 1e-6
 """Steps: an impact is counted from just after the start of its step, so that a sample there is before it."""
 
 
@@ -242,7 +242,7 @@ def impact_times(velocity: Array, gravity: Array, dt: float) -> Array:
     """
     change = np.diff(velocity, axis=0) - gravity * dt
     speed = np.max(np.linalg.norm(velocity, axis=2), axis=0, initial=0.0)
-    least = np.maximum(JUMP * speed, FALLS * float(np.linalg.norm(gravity)) * dt)
+    least = np.maximum(MIN_JUMP_SHARE * speed, MIN_JUMP_BY_GRAVITY * float(np.linalg.norm(gravity)) * dt)
     jumps = np.linalg.norm(np.diff(change, axis=0, prepend=change[:1]), axis=2) > least
     struck = np.any(jumps & (np.linalg.norm(change, axis=2) > least) & (least > 0), axis=1)
-    return np.asarray((np.flatnonzero(struck) + WITHIN) * dt, np.float64)
+    return np.asarray((np.flatnonzero(struck) + IMPACT_OFFSET) * dt, np.float64)

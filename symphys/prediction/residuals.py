@@ -20,7 +20,7 @@ from symphys.types import Array, Bools, Ints
 WHOLE_TURN = 2 * np.pi
 LENGTHS = ("m", "m/s", "m/s^2")
 """Units of what a scale of lengths scales."""
-GUESSED, GUESSED_TURN, LEAST = 0.01, 0.02, 1e-9
+GUESSED_NOISE_SHARE, GUESSED_NOISE_ANGLE, MIN_NOISE = 0.01, 0.02, 1e-9
 """Where the noise is not given, it begins as a share of the spread of what was measured, or as an angle [rad]."""
 
 
@@ -56,12 +56,12 @@ class RecordingResiduals:
         if first.noise is not None:
             return first.noise
         if first.orientation:
-            return np.full(3, GUESSED_TURN)
+            return np.full(3, GUESSED_NOISE_ANGLE)
         found = [m.values for r in self.predictor.recordings for m in r.measured if _key(r, m) == key]
         values = np.concatenate(found)
         spread = np.nanstd(values, axis=0)
         largest = float(np.nanmax(np.abs(values)))
-        return np.asarray(np.maximum(GUESSED * np.where(spread > 0, spread, largest), LEAST))
+        return np.asarray(np.maximum(GUESSED_NOISE_SHARE * np.where(spread > 0, spread, largest), MIN_NOISE))
 
     def rows(self, recording: int) -> ResidualRows:
         """Describe the residuals of a recording."""

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from symphys import files
 
-LONGEST = 80
+MAX_SETTINGS_LENGTH = 80
 """Characters of the settings in a folder name before they are cut."""
 
 
@@ -25,7 +25,7 @@ def case_name(problem: str, settings: Mapping[str, object], guess: str = "") -> 
     if not settings:
         return problem
     words = settings_words(settings, ",")
-    kept = re.sub(r"[^a-z0-9._=,+-]+", "_", words)[:LONGEST]
+    kept = re.sub(r"[^a-z0-9._=,+-]+", "_", words)[:MAX_SETTINGS_LENGTH]
     digest = hashlib.sha256(words.encode()).hexdigest()[:10]
     return f"{problem}@{kept}" if kept == words else f"{problem}@{kept}~{digest}"
 

@@ -136,7 +136,7 @@ def written_sets(problem: dict[str, object], variable: str) -> tuple[str, ...]:
 
 
 CHECK = ("kind", "name", "error", "tolerance", "ratio", "met", "unit")
-MOST_KEPT = 1000
+MAX_INTERNED = 1000
 
 
 class BriefReader:
@@ -223,7 +223,7 @@ class BriefReader:
         """Return ``read(value)``, the same object for equal values."""
         key = f"{kind} {value!r}"
         if key not in self.kept:
-            if len(self.kept) >= MOST_KEPT:
+            if len(self.kept) >= MAX_INTERNED:
                 self.kept.clear()
             self.kept[key] = read(value)
         return self.kept[key]

@@ -15,7 +15,7 @@ import numpy as np
 from symphys import json_values as values
 from symphys.json_values import Text
 from symphys.model.shapes import SHAPES
-from symphys.results.drawable import LARGEST, small
+from symphys.results.drawable import MAX_DRAWABLE, small
 from symphys.results.polytope import Polytope, make_polytope
 from symphys.results.scene_joints import SceneJoint
 from symphys.results.text_files import read_table
@@ -198,7 +198,7 @@ class SceneTerrain:
         if not all(small(side) and (np.diff(side) > 0).all() for side in (x, y)):
             return None
         z = np.array(found)
-        return cls(text(entry.get("name")), x, y, np.where(np.abs(z) <= LARGEST, z, np.nan))
+        return cls(text(entry.get("name")), x, y, np.where(np.abs(z) <= MAX_DRAWABLE, z, np.nan))
 
 
 @dataclass(frozen=True)

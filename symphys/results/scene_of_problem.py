@@ -112,7 +112,7 @@ MAX_HEIGHTS = 49
 """Heights along the longer side."""
 MIN_ASPECT = 0.3
 """Of the shorter side in the longer one."""
-MARGIN = 0.15
+CROP_MARGIN = 0.15
 """On each side, as a share of the longer one."""
 
 
@@ -132,7 +132,7 @@ def crop(world: World, places: Array) -> TerrainCrop:
     reach = max(size(body) for body in world.bodies)
     side = float((high - low).max()) + 2 * reach
     side = side if side > 0 else 1.0
-    room = np.maximum(high - low + 2 * reach, MIN_ASPECT * side) / 2 + MARGIN * side
+    room = np.maximum(high - low + 2 * reach, MIN_ASPECT * side) / 2 + CROP_MARGIN * side
     middle = (low + high) / 2
     return TerrainCrop(middle - room, middle + room)
 

@@ -13,10 +13,10 @@ from symphys.errors import SymphysError
 from symphys.files import check_regular, emptied
 from symphys.json_values import name, table, words
 
-HEAVY = ("z", "trust")
+LARGE_FIELDS = ("z", "trust")
 """The objects of result.json that take most of it, and that no table shows."""
-READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-MOST_AT_ONCE = 2**20
+READ_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+MAX_READ_BYTES = 2**20
 
 
 class ReportError(SymphysError):
@@ -47,12 +47,12 @@ def read_table(path: Path) -> dict[str, object]:
 
 
 def read_light_table(path: Path | str) -> dict[str, Any]:
-    """Read the JSON object in a file, with empty tables for what is ``HEAVY``, where this program has written it.
+    """Read the JSON object in a file of this program, with empty tables for ``LARGE_FIELDS``.
 
     Such tables are cut out of the text before it is parsed. Raises ReportError, as ``read_table`` does.
     """
     try:
-        content = json.loads(emptied(_read_regular(path), HEAVY))
+        content = json.loads(emptied(_read_regular(path), LARGE_FIELDS))
     except (OSError, ValueError, RecursionError):
         return read_table(Path(path))
     return content if isinstance(content, dict) else read_table(Path(path))
@@ -63,14 +63,14 @@ def _read_regular(path: Path | str) -> bytes:
 
     Paths and files of the standard library's own classes take as long as all the rest of reading a run.
     """
-    number = os.open(path, READ)
+    number = os.open(path, READ_FLAGS)
     try:
         about = os.fstat(number)
         if not stat.S_ISREG(about.st_mode):
             raise OSError(errno.EINVAL, "a regular file is needed", str(path))
         parts = [os.read(number, about.st_size + 1)]
         while parts[-1]:
-            parts.append(os.read(number, MOST_AT_ONCE))
+            parts.append(os.read(number, MAX_READ_BYTES))
         return b"".join(parts)
     finally:
         os.close(number)

@@ -35,8 +35,8 @@ Transcribe = Callable[[Problem, bool], Transcription]
 """(problem, whether it is only ever evaluated without smoothing) -> its transcription."""
 Transcriptions = Callable[[Job], Transcription]
 """Job -> the transcription of its problem, such as a ``TranscriptionCache``."""
-SAMPLES = "samples of [[scenario]] tables are evaluated by compiled kernels, and none can be made here"
-SMOOTHED = (
+NO_SAMPLES = "samples of [[scenario]] tables are evaluated by compiled kernels, and none can be made here"
+SMOOTHED_ONLY = (
     "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing, or add a stage at 0, "
     "such as smoothing = [0.1, 0.01, 0]"
 )
@@ -46,7 +46,7 @@ JUDGING = "rolling it out exactly"
 """The progress message with which judging a solution begins."""
 CHECKPOINT_INTERVAL = 10.0
 """[s] at least between two checkpoints of a run."""
-SHARE = 50
+MIN_CHECKPOINT_SPACING = 50
 """Writing checkpoints takes at most one second in so many."""
 
 
@@ -169,7 +169,7 @@ def transcribed(job: Job, transcriptions: Transcriptions) -> Transcription:
     try:
         require_kernels(backend)
     except Unavailable as error:
-        raise Unavailable(f"{SAMPLES}: {error}") from error
+        raise Unavailable(f"{NO_SAMPLES}: {error}") from error
     found = transcriptions(job)
     if found.shooting.scenario is None:
         raise Unavailable(found.backend.note)
@@ -286,7 +286,7 @@ def judge(
     known = Examination.from_json(files.strict(examined or {}))
     found = () if well else obstacles(known, judged(verdict))
     # more iterations do not help where the costs outweigh a target
-    rest = "" if found and known.outweighed else outcome.advice or SMOOTHED * smoothed
+    rest = "" if found and known.outweighed else outcome.advice or SMOOTHED_ONLY * smoothed
     return Judgement(verdict, taken.motion, examined, sentences([*found, rest]))
 
 
@@ -363,7 +363,7 @@ class CheckpointKeeper:
             raise
         except files.FileError as error:
             self.log(f"no checkpoint: {error}")
-        self.due = monotonic() + max(self.every, SHARE * (monotonic() - began))
+        self.due = monotonic() + max(self.every, MIN_CHECKPOINT_SPACING * (monotonic() - began))
 
 
 def stop_at_limit(job: Job, message: str) -> Result:

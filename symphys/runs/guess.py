@@ -22,7 +22,7 @@ from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory
 from symphys.types import Array
 
-DIGITS = 8
+DIGEST_DIGITS = 8
 """Digits of the digest in the names of folders."""
 
 
@@ -66,7 +66,7 @@ class GuessOrigin:
     @property
     def word(self) -> str:
         """The part of a folder's name that tells guesses apart; empty without one."""
-        return f"guess={self.digest[:DIGITS]}" if self.digest else ""
+        return f"guess={self.digest[:DIGEST_DIGITS]}" if self.digest else ""
 
 
 OWN_GUESS = GuessOrigin()

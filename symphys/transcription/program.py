@@ -35,14 +35,14 @@ if TYPE_CHECKING:
     from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 
 
-CHUNK = 64
-"""Numbers that a call adds up."""
+SUM_CHUNK = 64
+"""Terms that one call adds."""
 
 
 def sums_in_calls(
     layout: MemoryLayout, series: Sequence[Place], rows: int, scale: float | None
 ) -> tuple[list[FunctionCall], Place]:
-    """Calls that add up samples, and where the result lies.
+    """Return calls that sum samples, and the place of the result.
 
     Args:
         layout: takes what the calls give.
@@ -58,7 +58,7 @@ def sums_in_calls(
     calls, chunks = list[FunctionCall](), dict[int, ca.Function]()
     total = layout.take(count)
     calls.append(FunctionCall(ca.Function("zeros", [], [ca.DM.zeros(count)]), (), (total,)))
-    longest = max(CHUNK // rows, 1) * rows
+    longest = max(SUM_CHUNK // rows, 1) * rows
     for whole in series:
         for start in range(0, whole.size, longest):
             part, after = Place(whole.offset + start, min(longest, whole.size - start)), layout.take(count)
@@ -70,7 +70,7 @@ def sums_in_calls(
 
 
 def _chunk(rows: int, columns: int, scale: float | None) -> ca.Function:
-    """(sums before, samples) -> sums after."""
+    """Return (sums before, samples) -> sums after."""
     before, samples = ca.SX.sym("before", rows + (scale is not None)), ca.SX.sym("samples", rows * columns)
     after: list[Expr] = [before[i] for i in range(before.numel())]
     for k in range(rows * columns):
@@ -81,16 +81,16 @@ def _chunk(rows: int, columns: int, scale: float | None) -> ca.Function:
     return ca.Function("sums", [before, samples], [ca.vertcat(*after)])
 
 
-NOTHING: Mapping[str, Formula] = MappingProxyType({})
-ASIDE = frozenset({"name", "title", "description", "file", "text", "settings", "solvers", "solver_tables"})
-"""What no program depends on."""
+NO_FORMULAS: Mapping[str, Formula] = MappingProxyType({})
+IGNORED_FIELDS = frozenset({"name", "title", "description", "file", "text", "settings", "solvers", "solver_tables"})
+"""Fields of a problem on which no program depends."""
 
 
 class RolloutPlaces:
-    """Where a program keeps a rollout; see ``controller_calls.Places``."""
+    """The places of a rollout in a program; see ``Places``."""
 
     def __init__(self, rollout: Rollout, by_step: Sequence[str] = ()) -> None:
-        """Places for z, smoothing, times, parameters, inputs and states; ``by_step`` as in ``rollout_program``."""
+        """Reserve z, smoothing, times, parameters, inputs and states; ``by_step`` as in ``rollout_program``."""
         self.rollout, self.problem, self.steps, self.by_step = rollout, rollout.problem, rollout.steps, by_step
         self.layout = MemoryLayout()
         nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x0, rollout.given, rollout.p))
@@ -104,20 +104,20 @@ class RolloutPlaces:
         self.time = self.layout.series(1, self.steps + 1)
 
     def recorded(self, formula: Formula, shift: int) -> FunctionCall:
-        """A call of each step for the value of a formula at its start (0) or end (1); results lie one after another."""
+        """Return a call of each step for a formula at its start (0) or end (1); results are contiguous."""
         function = dense(self.rollout.compiled(formula))
         out = self.layout.series(int(function.size1_out(0)), self.steps)
         places = (self.x.later(shift), self.u, self.p, self.time.later(shift), self.z)
         return FunctionCall(function, places, (out,))
 
     def whole(self, call: FunctionCall) -> Place:
-        """All results of a call of each step, one after the other."""
+        """Return all results of a call of each step in order."""
         (out,) = call.outputs
         return Place(out.offset, out.size * self.steps)
 
 
 def dense(function: ca.Function) -> ca.Function:
-    """The function with dense results."""
+    """Return the function with dense results."""
     arguments = function.sx_in()
     results = [ca.densify(result) for result in function.call(arguments)]
     return ca.Function(function.name(), arguments, results)
@@ -126,11 +126,11 @@ def dense(function: ca.Function) -> ca.Function:
 def rollout_program(
     rollout: Rollout,
     exact: bool = False,
-    recorded: Mapping[str, Formula] = NOTHING,
+    recorded: Mapping[str, Formula] = NO_FORMULAS,
     shift: int = 1,
     by_step: Sequence[str] = (),
 ) -> Program:
-    """A program of z and smoothing, with all that is asked of a rollout: see ``_epilogue``; and ``alive``.
+    """Return a program of (z, smoothing) with the outputs of ``_epilogue``, and ``alive``.
 
     Args:
         rollout: of a problem.
@@ -176,7 +176,7 @@ def _rollout_program(
 
 def program_identity(problem: Problem, exact: bool) -> str | None:
     """Return a key of a rollout's program; problems that differ only in texts and solver options share it."""
-    data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in ASIDE}
+    data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in IGNORED_FIELDS}
     return identity_of(data, exact)
 
 
@@ -208,14 +208,14 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
             places.setdefault(slot, own)
         calls.append(_guarded(piece, places, zeros))
     if after.size > columns.size:
-        calls.append(_remember(samples, _part(after, slice(columns.size, None))))
+        calls.append(_memory_call(samples, _part(after, slice(columns.size, None))))
     if rollout.termination is not None:
         calls.append(FunctionCall(rollout.termination, (samples.x, after, samples.p), (samples.x.later(),)))
     return calls
 
 
 def _most_zeros(calls: Sequence[TracedCall]) -> int:
-    """The size of the longest result that zeros stand for."""
+    """Return the size of the longest result that zeros may replace."""
     return max(
         (
             vector.size
@@ -230,7 +230,7 @@ def _most_zeros(calls: Sequence[TracedCall]) -> int:
 
 
 def _guarded(traced: TracedCall, places: Mapping[TracedVector, Place], zeros: Place | None) -> FunctionCall:
-    """A call with its guard and its section, whose vectors lie in ``places``."""
+    """Return a call with its guard and its section, whose vectors lie in ``places``."""
     inputs, outputs = (tuple([places[slot] for slot in slots]) for slots in (traced.inputs, traced.outputs))
 
     def part_of(part: Part, size: int) -> Place:
@@ -259,7 +259,7 @@ def _alive(samples: RolloutPlaces) -> Place | None:
     return _part(samples.x, memory.columns[ALIVE]) if memory.terminates else None
 
 
-def _remember(samples: Places, result: Place) -> FunctionCall:
+def _memory_call(samples: Places, result: Place) -> FunctionCall:
     """Return the call that stores what the sensors of the next step need of this one."""
     memory, inputs = samples.rollout.memory, samples.rollout.inputs
     x, u = ca.SX.sym("x", samples.x.size), ca.SX.sym("u", samples.u.size)
@@ -268,13 +268,13 @@ def _remember(samples: Places, result: Place) -> FunctionCall:
 
 
 def _part(place: Place, columns: slice) -> Place:
-    """Some columns of a state."""
+    """Return some columns of a state."""
     start, stop, _ = columns.indices(place.size)
     return Place(place.offset + start, stop - start, place.stride)
 
 
 def _knot_calls(samples: RolloutPlaces) -> list[FunctionCall]:
-    """The call that adds a step's knots to its other inputs, which are 0 where nothing else sets them.
+    """Return the call that adds a step's knots to its other inputs.
 
     There is none where the prologue writes inputs as they are, and none without inputs.
     """
@@ -314,7 +314,7 @@ def _prologue(samples: RolloutPlaces) -> tuple[FunctionCall, ...]:
 def _epilogue(
     places: RolloutPlaces, samples: FormulaSamples, asked: Terms, formulas: Mapping[Series, FunctionCall]
 ) -> tuple[tuple[FunctionCall, ...], dict[str, Place]]:
-    """The calls after the last step, and where their results lie."""
+    """Return the calls after the last step, and the places of their results."""
     parts = {
         "merit": asked.objective + asked.penalties,
         "objective": asked.objective,

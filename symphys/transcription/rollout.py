@@ -36,7 +36,7 @@ def termination_function(
     parameters: Parameters,
     memory: SensorMemory,
 ) -> ca.Function:
-    """(x, after, p) -> the next state: ``after`` is all of it but ``alive``, as the step from x has it."""
+    """Return (x, after, p) -> the next state; ``after`` is the state after the step from x without ``alive``."""
     margin = compile_formula(problem, world, inputs, parameters, memory, termination.margin)
     x, after = ca.SX.sym("x", memory.size), ca.SX.sym("after", memory.size - 1)
     p = ca.SX.sym("p", margin.size1_in(2))
@@ -80,40 +80,40 @@ class Rollout:
 
     @property
     def controls(self) -> int:
-        """Return how many inputs variables, controllers and laws may set: all but the shares of phases."""
+        """Return the number of inputs that variables, controllers and laws may set, without shares of phases."""
         return int(self.given.shape[0]) - len(self.world.scheduled)
 
     def with_shares(self, u: Expr, tick: Expr) -> Expr:
-        """(nu,): the inputs of a step by its number, from those that may be set."""
+        """Return (nu,) the inputs of a step by its number, with the shares of phases appended."""
         return ca.vertcat(u, self.parameters.phases.at(tick)) if self.world.scheduled else u
 
     @cached_property
     def step(self) -> ca.Function:
-        """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
+        """One step (x, u, p, smoothing) -> x_next, built on demand since one expression takes a while."""
         from symphys.dynamics.functions import step_function
 
         return self.remembering(self.built(step_function))
 
     @cached_property
     def report(self) -> ca.Function:
-        """The step with all that happens in it; see ``report_function``."""
+        """The step with all reported quantities; see ``report_function``."""
         from symphys.dynamics.functions import report_function
 
         return self.remembering(self.built(report_function))
 
     @property
     def _shares(self) -> bool:
-        """Whether problems of a sweep share what is built."""
+        """Whether problems of a sweep share the built functions."""
         return bool(self.problem.varied) and not self.problem.free_duration and not self.world.scheduled
 
     def built(self, make: Callable[..., T], *more: Hashable) -> T:
-        """Build something from the world; problems of a sweep with equal worlds share it."""
+        """Build a function of the world; problems of a sweep with equal worlds share it."""
         scheme = self.parameters.scheme(self.problem.simulation)
         arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
         return kept(make, *arguments, *more) if self._shares else make(*arguments, *more)
 
     def remembering(self, step: ca.Function) -> ca.Function:
-        """A function (x, u, p, smoothing) -> (x_next, ...) of the world's state, for states with memory."""
+        """Extend a function (x, u, p, smoothing) -> (x_next, ...) to states with memory."""
         if self.memory.size == step.size1_in(0):
             return step
         x, u = ca.MX.sym("x", self.memory.size), ca.MX.sym("u", step.size1_in(1))
@@ -149,7 +149,7 @@ class Rollout:
         return self.close(self.step)
 
     def close(self, step: ca.Function) -> ca.Function:
-        """Put the controllers into a step (x, u, p, smoothing) -> (x_next, ...), which then takes [u; time] and adds u.
+        """Add the controllers to a step (x, u, p, smoothing) -> (x_next, ...), which then takes [u; time] and adds u.
 
         Without controllers the second argument is u alone, and u is not among the results.
         """
@@ -162,7 +162,7 @@ class Rollout:
         return ca.Function(f"closed_{step.name()}", [x, given, p, smoothing], [*results, u])
 
     def rolled(self, step: ca.Function) -> tuple[Expr, Expr, list[Expr]]:
-        """States (nx, N + 1), inputs (nu, N) and what else a step gives, N columns each; ``step`` is not closed."""
+        """Return states (nx, N + 1), inputs (nu, N) and the other results of ``step``, which is not closed."""
         from symphys.dynamics.horizon import roll_out
 
         given = self.given
@@ -178,35 +178,35 @@ class Rollout:
 
     @property
     def x(self) -> Expr:
-        """(nx, N + 1) states."""
+        """The states (nx, N + 1)."""
         return self._motion[0]
 
     @property
     def u(self) -> Expr:
-        """(nu, N) inputs."""
+        """The inputs (nu, N)."""
         return self.given if self.feedback is None else self._motion[1]
 
     @property
     def steps(self) -> int:
-        """N."""
+        """The number of steps ``N``."""
         return self.problem.simulation.steps
 
     @property
     def dt(self) -> float:
-        """[s] as the file has it."""
+        """The time step [s] of the file."""
         return self.problem.simulation.dt
 
     @property
     def interval(self) -> Expr:
-        """[s] the time step: ``dt``, or an expression of z where a variable sets the duration."""
+        """The time step [s]: ``dt``, or an expression of z with a free duration."""
         return self.parameters.step_length(self.problem.simulation, self.p)
 
     def compiled(self, formula: Formula) -> ca.Function:
-        """The formula as a casadi function of (x, u, p, time, z), and of its parts, one after the other."""
+        """Return the formula as a casadi function of (x, u, p, time, z), and of its parts in order."""
         return compile_formula(self.problem, self.world, self.inputs, self.parameters, self.memory, formula)
 
     def tick(self, when: str | float) -> int:
-        """The number of the state at the end, or nearest to a time [s]."""
+        """Return the number of the state at the end, or nearest to a time [s]."""
         return self.steps if isinstance(when, str) else round(when / self.dt)
 
     def sampled(self, formula: Formula, shift: int) -> Expr:
@@ -227,7 +227,7 @@ class Rollout:
 
 
 def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None, asked: Iterable[Formula] = ()) -> Rollout:
-    """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of.
+    """Make the rollout of a problem; ``inputs`` may name more than the problem itself uses.
 
     ``asked``: formulas that will be evaluated along it beside those of the problem.
     """
@@ -242,6 +242,6 @@ def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None, as
 
 
 def call(function: ca.Function, *arguments: Expr) -> list[Expr]:
-    """All results of a call."""
+    """Return all results of a call."""
     results = function(*arguments)
     return list(results) if isinstance(results, tuple) else [results]

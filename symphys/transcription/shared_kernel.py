@@ -1,4 +1,4 @@
-"""Kernels that the problems of a sweep share: numbers in which these differ are inputs, behind the decision variables.
+"""Kernels that the problems of a sweep share: the numbers that differ are inputs, after the decision variables.
 
 A kernel has all other numbers of its problem as constants, so each problem would need one of its own, and compiling
 takes longer than many a solve. Programs of problems that differ in inputs alone are equal, and compiled once.
@@ -22,14 +22,14 @@ from symphys.transcription.program import rollout_program
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.types import Array
 
-KEPT: dict[tuple[object, ...], Backend] = {}
-"""The backend of the last problem of a sweep, by all that it is made from."""
+LATEST_BACKEND: dict[tuple[object, ...], Backend] = {}
+"""The backend of the last problem of a sweep, by everything that determines it."""
 
 
 def shared_backend(
     problem: Problem, inputs: tuple[Variable, ...], nlp: Any, exact: bool, backend: str, threads: int | None
 ) -> Backend:
-    """The backend of a problem by a kernel that takes some of its numbers as inputs.
+    """Return the backend of a problem by a kernel that takes some of its numbers as inputs.
 
     Args:
         problem: of a sweep.
@@ -42,20 +42,20 @@ def shared_backend(
     rollout = symbolic_rollout(replace(problem, variables=(*problem.variables, *inputs)))
     asked = rollout_terms(rollout)
     key = (whole(rollout, asked), exact, backend, threads)
-    if key in KEPT:
-        made = KEPT[key].description
+    if key in LATEST_BACKEND:
+        made = LATEST_BACKEND[key].description
         here = replace(made, seconds=0.0, cached=None if made.cached is None else True)
-        chosen = replace(KEPT[key], description=here)
+        chosen = replace(LATEST_BACKEND[key], description=here)
     else:
         source = BackendSource(ExpressionFunctions(rollout, asked), lambda: rollout_program(rollout, exact), exact)
-        KEPT.clear()
-        chosen = KEPT[key] = choose(backend, source, threads)
+        LATEST_BACKEND.clear()
+        chosen = LATEST_BACKEND[key] = choose(backend, source, threads)
     numbers = np.concatenate([variable.guess for variable in inputs])
     return replace(chosen, evaluator=BoundEvaluator(chosen.evaluator, numbers), nlp=bound_nlp(chosen.nlp, nlp, numbers))
 
 
 def whole(rollout: Rollout, asked: Terms) -> str:
-    """All that a backend is made from, as a text: equal for problems that differ in inputs alone."""
+    """Return a text of everything that determines a backend: equal for problems that differ only in inputs."""
     parts = [getattr(asked, name) for name in ("costs", "objective", "penalties", "errors", "constraints", "outputs")]
     parts += [asked.means, *([] if asked.residuals is None else [asked.residuals])]
     text = ca.Function("whole", [rollout.z, rollout.smoothing], parts).serialize()
@@ -63,10 +63,10 @@ def whole(rollout: Rollout, asked: Terms) -> str:
 
 
 class BoundEvaluator:
-    """Evaluates points with the same numbers behind each of them; see ``Evaluator``."""
+    """An ``Evaluator`` that appends the same numbers to every point."""
 
     def __init__(self, evaluator: Evaluator, numbers: Array) -> None:
-        """``numbers``: (s,) what stands behind z."""
+        """Append ``numbers`` (s,) to z."""
         self.evaluator, self.numbers = evaluator, numbers
 
     def value(self, Z: Array, smoothing: float) -> Values:
@@ -86,11 +86,11 @@ class BoundEvaluator:
         return self.cut(self.evaluator.jacobian(self.joined(Z), smoothing))
 
     def joined(self, Z: Array) -> Array:
-        """(batch, n + s)."""
+        """Return points (batch, n + s)."""
         return np.hstack([Z, np.broadcast_to(self.numbers, (len(Z), self.numbers.size))])
 
     def cut(self, found: Values) -> Values:
-        """Derivatives by z alone."""
+        """Return the values with derivatives by z alone."""
         count = self.numbers.size
         slopes = {name: getattr(found, name) for name in ("gradient", "jacobian")}
         return replace(
@@ -99,7 +99,7 @@ class BoundEvaluator:
 
 
 def bound_nlp(shared: Nlp, expression: Any, numbers: Array) -> Nlp:
-    """Objective and constraints with these numbers behind z; ``expression``: of the problem itself."""
+    """Return objective and constraints with these numbers after z; ``expression``: of the problem itself."""
     if shared.value is None:
         return Nlp(expression)
     z, smoothing = ca.MX.sym("z", expression.size1_in(0)), ca.MX.sym("smoothing")

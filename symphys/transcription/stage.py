@@ -1,4 +1,4 @@
-"""A stage: one time step of a problem, with what is sensed there and what is asked for.
+"""A stage: one time step of a problem, with its sensors and its terms of the objective.
 
 What takes steps one after the other, with something else between them, such as actions or nets, is made of it.
 """
@@ -20,11 +20,11 @@ from symphys.transcription.rollout import Rollout
 from symphys.types import Array, Expr
 
 Value = Callable[[Formula, int], Expr]
-"""(r,) of a formula at the start (0) or at the end (1) of the step."""
+"""The value (r,) of a formula at the start (0) or at the end (1) of the step."""
 
 
 class BatchStep(Protocol):
-    """Takes a stage for many rows: a kernel, or casadi's virtual machine.
+    """Evaluates a stage for many rows, by a kernel or casadi's virtual machine.
 
     Attributes:
         sizes: of the results, by name and in their order.
@@ -40,10 +40,10 @@ class BatchStep(Protocol):
         """Return ``Kernel.doubt``."""
 
     def forward(self, rows: Array, smoothing: Sequence[float]) -> Mapping[str, Array]:
-        """(B, m) -> results by name, each (B, size)."""
+        """Evaluate rows (B, m) -> results by name, each (B, size)."""
 
     def gradient(self, rows: Array, seeds: Array, smoothing: Sequence[float]) -> tuple[Any, Array]:
-        """(B, m), (B, all sizes) -> something, and the slopes (B, m) of seeds . results."""
+        """Evaluate rows (B, m) with seeds (B, all sizes); return also the slopes (B, m) of seeds . results."""
 
 
 class Stage:
@@ -94,7 +94,7 @@ class Stage:
         return KernelStep(build_kernel(backend, program, list(program.outputs), threads))
 
     def program(self, exact: bool) -> Program:
-        """The program, whose vector is a row and whose parameter is the smoothing."""
+        """Return the program, whose vector is a row and whose parameter is the smoothing."""
         places = StagePlaces(self.rollout, sum(self.sizes))
         body = step_calls(places, exact)
         after, last, found = places.x.later().still(), list[FunctionCall](), list[Place]()
@@ -126,12 +126,12 @@ class Stage:
         )
 
     def _parts(self) -> ca.Function:
-        """A row -> its parts."""
+        """Row -> its parts."""
         row, cuts = ca.SX.sym("row", sum(self.sizes)), np.cumsum([0, *self.sizes]).tolist()
         return ca.Function("parts", [row], [row[a:b] for a, b in pairwise(cuts)][: 6 if self.sizes[-1] else 5])
 
     def interpreted(self) -> VirtualMachineStep:
-        """On casadi's virtual machine: the judge, and machines without a compiler."""
+        """Return the stage on casadi's virtual machine, for the judge and machines without a compiler."""
         rollout = self.rollout
         row, smoothing = ca.MX.sym("row", sum(self.sizes)), ca.MX.sym("smoothing")
         x, given, p, now, later, z = ca.vertsplit(row, np.cumsum([0, *self.sizes]).tolist())
@@ -150,10 +150,10 @@ class Stage:
 
 
 class StagePlaces:
-    """Where a program keeps a stage; see ``Places``."""
+    """The places of a stage in a program; see ``Places``."""
 
     def __init__(self, rollout: Rollout, row: int) -> None:
-        """Places for a row, and for what comes of it."""
+        """Reserve a row and its results."""
         self.rollout, self.layout = rollout, MemoryLayout()
         nx, nu = int(rollout.x0.shape[0]), int(rollout.given.shape[0])
         self.row, self.smoothing = self.layout.take(row), self.layout.take(1)
@@ -164,7 +164,7 @@ class StagePlaces:
 
 
 class KernelStep:
-    """A stage by a kernel; see ``BatchStep``."""
+    """A ``BatchStep`` by a kernel."""
 
     def __init__(self, kernel: Kernel) -> None:
         """Wrap a kernel of ``Stage.program``."""
@@ -179,7 +179,7 @@ class KernelStep:
 
 
 class VirtualMachineStep:
-    """A stage on casadi's virtual machine, row by row; see ``BatchStep``."""
+    """A ``BatchStep`` on casadi's virtual machine, row by row."""
 
     doubt = ""
 
@@ -203,7 +203,7 @@ class VirtualMachineStep:
 
 
 def sense_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
-    """(x, p, time) -> what these sensors read, one after the other."""
+    """Return (x, p, time) -> the readings of these sensors in order."""
     x, p, time = ca.SX.sym("x", rollout.x0.shape[0]), ca.SX.sym("p", rollout.p.shape[0]), ca.SX.sym("time")
     known = {sensor.name: sensor for sensor in rollout.problem.sensors}
     read = [rollout.control.sensor(known[name])(x, p, time) for name in sensors]

@@ -27,7 +27,7 @@ def transcribe(
     backend: str = BEST,
     threads: int | None = None,
 ) -> Transcription:
-    """Build everything that solving, judging and recording this problem needs.
+    """Transcribe a problem for solving, judging and recording.
 
     Args:
         problem: what to solve.
@@ -55,7 +55,7 @@ def transcribe(
 
 
 def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int | None) -> Transcription:
-    """Transcribe a problem, without its scenarios, as one expression: nets of any size are part of the step."""
+    """Transcribe a problem without its scenarios as one expression; nets of any size are part of the step."""
     began = perf_counter()
     rollout = symbolic_rollout(problem)
     functions = ExpressionFunctions(rollout)
@@ -83,7 +83,7 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
 
 
 def _stages(rollout: Rollout, backend: str, threads: int | None, exact: bool) -> StagedProblem:
-    """The problem step by step, for solvers that ask for it."""
+    """Return the staged problem, built on demand."""
     from symphys.transcription.staged.staged_problem import RolloutStages
 
     return RolloutStages(rollout, backend, threads, exact)
@@ -102,7 +102,7 @@ def _evaluating(
 
 
 def states_of(staged: Callable[[], StagedProblem] | None, guess: GuessedMotion | None) -> GuessedStates | None:
-    """The states of a guessed motion, where there is one and the problem can be taken step by step."""
+    """Return the states of a guessed motion, if there is one and the problem is staged."""
     if staged is None or guess is None:
         return None
     from symphys.transcription.staged.guessed_states import guessed_states
@@ -111,7 +111,7 @@ def states_of(staged: Callable[[], StagedProblem] | None, guess: GuessedMotion |
 
 
 def guessed(made: Transcription, problem: Problem) -> Transcription:
-    """The transcription of a problem that differs in nothing but its guess; what is compiled is that of ``made``."""
+    """Return ``made`` for a problem that differs only in its guess; compiled functions are shared."""
     states = states_of(made.shooting.staged, problem.guess)
     return replace(
         made, problem=problem, shooting=replace(made.shooting, blocks=blocks(problem), guessed_states=states)

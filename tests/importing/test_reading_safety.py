@@ -140,7 +140,7 @@ def test_a_crash_or_a_hang_of_mujoco_is_a_message(
     tmp_path: Path, code: str, limit: float, why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reading_process, "CALL", code)
-    monkeypatch.setattr(reading_process, "TIMEOUT", limit)
+    monkeypatch.setattr(reading_process, "COMPILE_TIMEOUT", limit)
     with pytest.raises(ImportProblem, match=why):
         read_source(model(tmp_path, ""))
 

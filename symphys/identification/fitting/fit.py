@@ -10,7 +10,7 @@ import numpy as np
 
 from symphys.identification.fitting.horizons import PartialRecordings, before_impact, first_share
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
-from symphys.identification.fitting.noise import LEAST, RescaledResiduals, noise_factors
+from symphys.identification.fitting.noise import MIN_NOISE_FACTOR, RescaledResiduals, noise_factors
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.start_values import begin_with_effect
 from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
@@ -18,13 +18,13 @@ from symphys.identification.inference.uncertainty import Uncertainty, uncertaint
 from symphys.identification.interface import RecordedResiduals, Rows
 from symphys.types import Array, Ints
 
-ROUNDS = 20
+MAX_ROUNDS = 20
 """Turns of fit and noise at most."""
-STANDS = 1e-3
+MIN_NOISE_CHANGE = 1e-3
 """The noise stands where its deviations change by less than this share."""
-EARLY = 0.1
+EARLY_TOLERANCE = 0.1
 """Standard errors that a fit may leave of a share of the recordings that is the start of another."""
-COARSE = 1e-2
+COARSE_TOLERANCE = 1e-2
 """Standard errors that a fit may leave while the noise still changes."""
 
 Monitor = Callable[[FitStep, FitState], None]
@@ -62,7 +62,7 @@ def fit(
     fit.
     """
     which = np.flatnonzero(~problem.held_back) if which is None else which
-    early = replace(options, tolerance=max(EARLY, options.tolerance))
+    early = replace(options, tolerance=max(EARLY_TOLERANCE, options.tolerance))
     for share in options.horizons:
         if start is not None and start.horizon > share:
             continue
@@ -91,9 +91,9 @@ def fit_part(
     if known:
         outcome = RecordingFit(problem, options, which).run(start, monitor, stop)
         return described(problem, outcome, which, options.loss)
-    coarse = replace(options, tolerance=max(COARSE, options.tolerance))
+    coarse = replace(options, tolerance=max(COARSE_TOLERANCE, options.tolerance))
     factors = np.array(start.noise) if start.noise else np.ones(len(problem.quantities))
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         scaled = RescaledResiduals(problem, factors)
         outcome = RecordingFit(scaled, coarse, which).run(start, monitor, stop)
         found = described(scaled, outcome, which, options.loss)
@@ -101,9 +101,9 @@ def fit_part(
             return found
         start = replace(outcome.state, noise=tuple(map(float, factors)))
         change = noise_factors(scaled, found.evaluated, which, options.loss, found.uncertainty.information)
-        if np.all(np.abs(change - 1) < STANDS):
+        if np.all(np.abs(change - 1) < MIN_NOISE_CHANGE):
             break
-        factors = np.maximum(factors * change, LEAST)
+        factors = np.maximum(factors * change, MIN_NOISE_FACTOR)
         start = replace(start, damping=math.nan, growth=2.0, quiet=0, noise=tuple(map(float, factors)))
     scaled = RescaledResiduals(problem, factors)
     outcome = RecordingFit(scaled, options, which).run(start, monitor, stop)

@@ -21,11 +21,11 @@ from symphys.identification.fitting.arrow import ArrowSystem
 from symphys.identification.fitting.remaining import DeterminedArrow
 from symphys.types import Array, Bools, Ints
 
-MOST = 200
+MAX_WEIGHTED_SIDES = 200
 """Sides of single recordings that have a part in a step: those that differ most."""
-SHARES_ADD_UP = 1e4
+SUM_WEIGHT = 1e4
 """Weight of the equations that the shares of a recording add up to 1."""
-RIDGE = 1e-12
+RELATIVE_RIDGE = 1e-12
 """Share of its largest diagonal that is added to the quadratic program."""
 
 
@@ -88,7 +88,7 @@ class KinkedModel:
         off, own = sides - sides[0], (self.gradients - self.gradients[0])[..., s:] * arrow.units[:, s:]
         apart = np.einsum("pks,st,pkt->pk", off, arrow.shared_inverse, off)
         apart += np.einsum("pka,kab,pkb->pk", own, arrow.own_inverse, own)
-        least = max(np.sort(apart, axis=None)[-min(MOST, apart.size)], 1e-12 * self.unit)
+        least = max(np.sort(apart, axis=None)[-min(MAX_WEIGHTED_SIDES, apart.size)], 1e-12 * self.unit)
         chosen: Bools = (apart >= least) & (apart > 0)
         chosen[0] = chosen.any(axis=0)
         p, k = np.nonzero(chosen)
@@ -104,8 +104,8 @@ class KinkedModel:
         square = (mine @ arrow.shared_inverse @ mine.T + same * (own[p, k] @ gained.T)) / self.unit
         linear = (2 * mine @ arrow.shared_inverse @ rest + self.gaps[p, k]) / self.unit
         values, vectors = np.linalg.eigh(square)
-        root = np.sqrt(np.maximum(values, 0) + RIDGE * max(values[-1], 1e-300))
-        weight = SHARES_ADD_UP * root[-1]
+        root = np.sqrt(np.maximum(values, 0) + RELATIVE_RIDGE * max(values[-1], 1e-300))
+        weight = SUM_WEIGHT * root[-1]
         together = (np.unique(k)[:, None] == k) * weight
         rows = np.concatenate([root[:, None] * vectors.T, together])
         right = np.concatenate([-(vectors.T @ linear) / (2 * root), np.full(len(together), weight)])

@@ -27,7 +27,7 @@ from symphys.identification.fitting.state import FitOptions, FitOutcome, FitStat
 from symphys.identification.interface import FitParameters, IdentificationError, RecordedResiduals
 from symphys.solvers.core.convergence import Progress
 from symphys.solvers.core.levenberg_marquardt import (
-    WORTH,
+    MIN_GAIN_RATIO,
     LocalModel,
     Refusal,
     Trial,
@@ -37,26 +37,26 @@ from symphys.solvers.core.levenberg_marquardt import (
 )
 from symphys.types import Array, Bools, Ints
 
-EXACT = 1e-16
+EXACT_MERIT = 1e-16
 """Merit per residual below which recordings are met exactly: residuals of 1e-8 of the noise."""
-ROUNDING = 1e-14
+RELATIVE_ROUNDING = 1e-14
 """A fall of the merit by this share of itself cannot be told from rounding."""
-PROGRESS = 1e-2
+MIN_PROGRESS = 1e-2
 """A fall of the merit by this share of itself per residual is progress: that of a tenth of a standard error."""
-HOPELESS = 1e-2
+MIN_SHARE_OF_MODEL = 1e-2
 """Of the fall that the model promises: where so many steps as patience lasts bring less, it is another merit."""
-WORTH_AT_KINK = 0.1
-"""``WORTH`` where the sides of a kink are collected: a step that gains less shows one more side."""
-AT_KINK = 1e-2
+MIN_GAIN_AT_KINK = 0.1
+"""``MIN_GAIN_RATIO`` where the sides of a kink are collected: a step that gains less shows one more side."""
+KINK_ERRORS = 1e-2
 """Standard errors: sides are collected where more are left, and a kink is a minimum where they promise no more. At most
 as many are left as noise makes, the root of how many numbers there are: more is another minimum, or chaos."""
-NEAR = 0.1
+NEARLY_CONVERGED_ERRORS = 0.1
 """Standard errors that may be left where the merit does not fall any more: intervals are no narrower than that."""
-SHORTER = (1e-4, 1e-2, 1.0, 1e2, 1e6)
+RETRY_DAMPINGS = (1e-4, 1e-2, 1.0, 1e2, 1e6)
 """Damping of own numbers, by the largest diagonal of a recording, where the whole step makes that recording worse."""
-MODELLED = 0.05
+MAX_MODEL_EXCESS = 0.05
 """Share of its cost by which a recording may end above its model."""
-MOST_SIDES = 8
+MAX_SIDES = 8
 """Points whose Jacobians are collected in an iteration."""
 EXACTLY = "the recordings are met exactly"
 BUDGET = "the iterations are used up: raise `iterations`"
@@ -188,7 +188,7 @@ class RecordingFit:
 
     def _ended(self, state: FitState, system: ArrowSystem) -> tuple[FitStatus, str] | None:
         last = state.history[-1]
-        if system.cost <= EXACT * self.size:
+        if system.cost <= EXACT_MERIT * self.size:
             return FitStatus.CONVERGED, EXACTLY
         if last.left <= self.options.tolerance:
             return FitStatus.CONVERGED, LEFT.format(left=last.left)
@@ -211,7 +211,7 @@ class RecordingFit:
         patience, last = self.options.patience, state.history[-1]
         if not patience or last.iteration - state.first < patience:
             return False
-        return state.history[-1 - patience].merit - last.merit < HOPELESS * left**2 * last.merit / self.size
+        return state.history[-1 - patience].merit - last.merit < MIN_SHARE_OF_MODEL * left**2 * last.merit / self.size
 
     def determined(self, state: FitState, system: ArrowSystem, damping: float = 0.0) -> DeterminedArrow:
         """Without what is vague at the state."""
@@ -234,13 +234,13 @@ class RecordingFit:
         if found is None:
             if model.refused:
                 return FitStatus.NOT_FINITE, TRIALS.format(names=model.refused)
-            if model.left <= math.sqrt(ROUNDING * self.size):
+            if model.left <= math.sqrt(RELATIVE_ROUNDING * self.size):
                 return FitStatus.CONVERGED, LEFT.format(left=model.left) + ", which the merit's last digits do not show"
             return self._stalled(STALLED, model.left)
         if isinstance(found[0], FitStatus):
             return found
         moved, there = found
-        progress = Progress(state.mark, state.quiet).after(there.cost, PROGRESS / self.size)
+        progress = Progress(state.mark, state.quiet).after(there.cost, MIN_PROGRESS / self.size)
         mark, quiet = progress.mark, progress.quiet
         taken = replace(damped, shared=moved.shared, own=moved.own, mark=mark, quiet=quiet)
         return self.recorded(taken, there, moved.length, began), there
@@ -248,7 +248,7 @@ class RecordingFit:
     @staticmethod
     def _stalled(reason: str, left: float) -> tuple[FitStatus, str]:
         """Near the minimum of the model that is as good as there."""
-        if left <= NEAR:
+        if left <= NEARLY_CONVERGED_ERRORS:
             return FitStatus.CONVERGED, NEARLY.format(left=left)
         return FitStatus.STALLED, reason.format(left=left)
 
@@ -309,7 +309,7 @@ class RecordedModel(LocalModel[Moved, Taken]):
         self.merit, self.left, self.refused = system.cost, state.history[-1].left, ""
         self._free = fit.free(state, system)
         self._near = self.left <= math.sqrt(sum(int(each.sum()) for each in self._free))
-        self._kink, self._kinked = self._near and self.left > AT_KINK, False
+        self._kink, self._kinked = self._near and self.left > KINK_ERRORS, False
         self._sides = KinkedModel(system, self.merit / fit.size)
 
     def trial(self, damping: float) -> Trial[Moved]:
@@ -325,7 +325,7 @@ class RecordedModel(LocalModel[Moved, Taken]):
 
     def judge(self, moved: Moved, gain: float) -> Taken | Refusal:
         """Take a step that lowers the merit enough; at a kink one that does not shows one more side."""
-        better = gain > (WORTH_AT_KINK if self._kinked else WORTH)
+        better = gain > (MIN_GAIN_AT_KINK if self._kinked else MIN_GAIN_RATIO)
         if better or (self._kinked and not self.refused):
             there = self.fit.system(moved.shared, moved.own)
             if not there.finite:
@@ -343,10 +343,10 @@ class RecordedModel(LocalModel[Moved, Taken]):
         model.add(there, *taken)
         arrow = fit.determined(self.state, self.system)
         left = fit.errors(model.step(arrow)[2], self.system)
-        if left <= max(AT_KINK, fit.options.tolerance):
+        if left <= max(KINK_ERRORS, fit.options.tolerance):
             away = arrow.step()[0] * fit.problem.shared.scale
             return FitStatus.CONVERGED, KINK.format(left=left, far=self.left), away
-        if model.sides <= MOST_SIDES:
+        if model.sides <= MAX_SIDES:
             return Refusal.AGAIN
         self._kink, self._sides = False, KinkedModel(self.system, self.merit / fit.size)
         return None
@@ -368,9 +368,11 @@ class RecordedModel(LocalModel[Moved, Taken]):
         fit, state, system = self.fit, self.state, self.system
         (d_shared, _), own, best = moved.taken, moved.own.copy(), reached.copy()
         stiff = np.einsum("kii->ki", system.blocks[:, system.s :, system.s :]).max(axis=1, initial=0.0)
-        for share in SHORTER:
+        for share in RETRY_DAMPINGS:
             excess = best - system.costs + system.expected_falls(d_shared, fit.step_of(state, own))
-            off = ~(excess <= MODELLED * np.maximum(system.costs, best)) | ((best > system.costs) & (excess > 0))
+            off = ~(excess <= MAX_MODEL_EXCESS * np.maximum(system.costs, best)) | (
+                (best > system.costs) & (excess > 0)
+            )
             some = np.flatnonzero(off)
             if not some.size or not system.blocks.shape[1] > system.s:
                 break

@@ -16,9 +16,9 @@ from symphys.identification.inference.uncertainty import Information
 from symphys.identification.interface import DerivedResiduals, RecordedResiduals, ResidualRows, Rows
 from symphys.types import Array, Ints
 
-LEAST = 1e-12
+MIN_NOISE_FACTOR = 1e-12
 """A factor on the guess of a noise is at least so large: recordings that are met exactly have none."""
-MIN_FREEDOM = 0.5
+MIN_DEGREES_OF_FREEDOM = 0.5
 """Residuals less their leverage that an estimate needs."""
 MAX_ITERATIONS, MIN_CHANGE = 50, 1e-4
 """Turns of Huber's proposal 2 on the same residuals, at most, and the change at which they end."""
@@ -75,10 +75,10 @@ def noise_factors(
         scaled = r / factors[quantity]
         squares = np.bincount(quantity, loss.influence(scaled) ** 2, minlength=count)
         freedom = np.bincount(quantity, 1 - leverage * loss.inside(scaled), minlength=count)
-        enough = (freedom > MIN_FREEDOM) & ~problem.noise_known
+        enough = (freedom > MIN_DEGREES_OF_FREEDOM) & ~problem.noise_known
         change = np.sqrt(squares / (loss.normal_square * np.where(enough, freedom, 1.0)))
-        change = np.where(enough, np.maximum(change, LEAST), 1.0)
-        factors = np.maximum(factors * change, LEAST)
+        change = np.where(enough, np.maximum(change, MIN_NOISE_FACTOR), 1.0)
+        factors = np.maximum(factors * change, MIN_NOISE_FACTOR)
         if np.all(np.abs(change - 1) < MIN_CHANGE):
             break
     return factors

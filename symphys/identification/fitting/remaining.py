@@ -1,6 +1,6 @@
 """What is left of a fit in the directions that its recordings determine.
 
-A direction whose standard error is ``VAGUE`` times the size of its numbers is vague: the quadratic model puts its
+A direction whose standard error is ``VAGUE_ERROR`` times the size of its numbers is vague: the quadratic model puts its
 minimum where that model no longer holds. An example is the spin of a ball that slides through every impact: residuals
 depend on it by little more than rounding, and noise puts its minimum thousands of rad/s away. A vague direction has no
 part in whether a fit has converged, and steps along it bring nothing.
@@ -18,9 +18,9 @@ from symphys.identification.fitting.square_root import stacked, triangle
 from symphys.identification.interface import FitParameters
 from symphys.types import Array, Bools, Ints
 
-VAGUE = 10.0
+VAGUE_ERROR = 10.0
 """Standard error of a direction by the size of its numbers, above which it is vague."""
-PART = 0.5
+MIN_COMPONENT = 0.5
 """A number takes part in a direction if its component is larger, in units of the numbers."""
 
 
@@ -81,12 +81,12 @@ def determined_root(rows: Array, damping: float) -> tuple[Array, Bools]:
     """
     left, sizes, right = np.linalg.svd(rows, full_matrices=False)
     vectors = np.swapaxes(right, -1, -2)
-    vague = sizes < 1 / VAGUE
+    vague = sizes < 1 / VAGUE_ERROR
     inverse = np.where(vague, 0.0, 1 / (np.where(vague, 1.0, sizes) ** 2 + damping))
     above = (vectors * (sizes * inverse)[..., None, :]) @ np.swapaxes(left, -1, -2)
     below = (vectors * (math.sqrt(damping) * inverse)[..., None, :]) @ right
     found = np.concatenate([above, below], axis=-1)
-    return found, np.any((np.abs(vectors) > PART) & vague[..., None, :], axis=-1)
+    return found, np.any((np.abs(vectors) > MIN_COMPONENT) & vague[..., None, :], axis=-1)
 
 
 def number_units(

@@ -20,9 +20,9 @@ ROUNDING = 1e-13
 """Singular values of columns of length 1 below this share of the largest are rounding, whatever the derivatives are."""
 NO_EFFECT = 1e-14
 """A column shorter than this share of the longest, in scaled numbers, is rounding."""
-SAFETY = 5.0
+NOISE_FACTOR = 5.0
 """Singular values up to so many times the measured noise of the derivatives are rounding."""
-TOUCHED = 1e-3
+MIN_TOUCHED_COMPONENT = 1e-3
 """A number takes part in a direction without information if its component is larger."""
 
 
@@ -70,18 +70,18 @@ def pseudo_root(rows: Array, noise: Array | float = 0.0) -> Root:
     """
     lengths = np.linalg.norm(rows, axis=-2)
     longest = np.max(lengths, axis=-1, initial=0.0, keepdims=True)
-    rounding = lengths <= np.maximum(NO_EFFECT * longest, SAFETY * np.asarray(noise))
+    rounding = lengths <= np.maximum(NO_EFFECT * longest, NOISE_FACTOR * np.asarray(noise))
     unit = np.where(rounding, 1.0, lengths)
     scaled = np.where(rounding[..., None, :], 0.0, rows / unit[..., None, :])
     left, sizes, right = np.linalg.svd(scaled, full_matrices=False)
     vectors = np.swapaxes(right, -1, -2)
     along = np.sqrt(np.einsum("...ji,...j->...i", vectors**2, (np.where(rounding, 0.0, noise) / unit) ** 2))
     largest = np.max(sizes, axis=-1, initial=0.0, keepdims=True)
-    none = sizes <= np.maximum(ROUNDING * largest, SAFETY * along)
+    none = sizes <= np.maximum(ROUNDING * largest, NOISE_FACTOR * along)
     share = np.where(none, 0.0, 1 / np.where(none, 1.0, sizes))
     whitener = vectors * share[..., None, :] / unit[..., :, None]
     inverse = whitener @ np.swapaxes(left, -1, -2)
-    touched = rounding | np.any((np.abs(vectors) > TOUCHED) & none[..., None, :], axis=-1)
+    touched = rounding | np.any((np.abs(vectors) > MIN_TOUCHED_COMPONENT) & none[..., None, :], axis=-1)
     shortest = np.min(np.where(rounding, np.inf, lengths), axis=-1, initial=np.inf) / np.maximum(longest[..., 0], EPS)
     weakest = np.minimum(np.min(np.where(none, np.inf, sizes), axis=-1, initial=1.0), shortest)
     return Root(inverse, whitener, left * ~none[..., None, :], touched, weakest)

@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
-from symphys.identification.fitting.remaining import VAGUE
+from symphys.identification.fitting.remaining import VAGUE_ERROR
 from symphys.identification.fitting.state import FitOptions, FitState, FitStatus, begin
 from symphys.identification.interface import FitParameters, RecordedResiduals
 from symphys.types import Array, Ints
 
-FACTORS = (0.01, 0.03, 0.1, 0.3, 0.5, 2.0, 4.0, 10.0)
+GUESS_FACTORS = (0.01, 0.03, 0.1, 0.3, 0.5, 2.0, 4.0, 10.0)
 """Of a guess other than 0."""
-SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
+RANGE_SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Of the range between two bounds; of a number at 0 with an open bound, of ten scales to both sides."""
 TRIAL_STEPS = 4
 """Of all numbers, from each value."""
@@ -53,25 +53,25 @@ def begin_with_effect(
 
 
 def without_effect(problem: RecordedResiduals, options: FitOptions, which: Ints) -> Ints:
-    """Shared numbers whose standard error at the guess, all others known, is ``VAGUE`` times their size."""
+    """Shared numbers whose standard error at the guess, all others known, is ``VAGUE_ERROR`` times their size."""
     parameters = problem.shared
     system = RecordingFit(problem, options, which).system(parameters.guess, problem.own.guess)
     if not system.finite:
         return np.zeros(0, np.int64)
     size = np.maximum(np.abs(parameters.guess) / parameters.scale, 1.0)
     squares = (system.reference - system.prior_block) * size**2
-    return np.flatnonzero((squares < 1 / VAGUE**2) & (parameters.lower < parameters.upper))
+    return np.flatnonzero((squares < 1 / VAGUE_ERROR**2) & (parameters.lower < parameters.upper))
 
 
 def values_to_try(parameters: FitParameters, j: int) -> list[float]:
     """Other values of a number, rising: multiples of its guess, and shares of the range between its bounds."""
     guess, lower, upper = (float(each[j]) for each in (parameters.guess, parameters.lower, parameters.upper))
-    found = {guess * factor for factor in FACTORS}
+    found = {guess * factor for factor in GUESS_FACTORS}
     if np.isfinite(lower) and np.isfinite(upper):
-        found |= {lower + share * (upper - lower) for share in SHARES}
+        found |= {lower + share * (upper - lower) for share in RANGE_SHARES}
     elif guess == 0:
         away = 10 * float(parameters.scale[j])
-        found |= {sign * share * away for sign in (-1, 1) for share in SHARES}
+        found |= {sign * share * away for sign in (-1, 1) for share in RANGE_SHARES}
     return sorted(value for value in found if lower <= value <= upper and value != guess)
 
 

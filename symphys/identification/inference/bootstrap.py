@@ -6,7 +6,7 @@ the interval; ``refitted`` fits some draws in full, which shows whether it is. I
 accelerated (BCa; Efron 1987), the acceleration from the same step with one recording left out.
 
 Unlike intervals from the Jacobian it needs no noise model: recordings that differ from each other by more than noise
-explains widen it. With fewer than ``FEWEST`` recordings a draw says nothing, and there is none.
+explains widen it. With fewer than ``MIN_RECORDINGS`` recordings a draw says nothing, and there is none.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ import scipy.stats
 from symphys.identification.fitting.arrow import ArrowSystem
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.state import FitOptions, FitState, begin
-from symphys.identification.inference.uncertainty import LEVEL, Information
+from symphys.identification.inference.uncertainty import CONFIDENCE_LEVEL, Information
 from symphys.identification.interface import IdentificationError, RecordedResiduals
 from symphys.types import Array, Ints
 
-FEWEST = 5
+MIN_RECORDINGS = 5
 """Recordings that a bootstrap needs."""
-FEWEST_DRAWS = 100
+MIN_DRAWS = 100
 """Draws that an interval needs."""
-NO_INFORMATION = 1e-10
+MIN_INFORMATION_SHARE = 1e-10
 """A draw with less than this share of the information of all recordings along a direction has none there."""
-CHUNK = 256
+DRAWS_PER_BATCH = 256
 """Draws that are solved at once, so that memory does not grow with them."""
 
 
@@ -66,15 +66,15 @@ def bootstrap(
     Raises:
         IdentificationError: too few draws for an interval.
     """
-    if draws < FEWEST_DRAWS:
-        raise IdentificationError(f"{draws} draws of a bootstrap: at least {FEWEST_DRAWS} make an interval")
+    if draws < MIN_DRAWS:
+        raise IdentificationError(f"{draws} draws of a bootstrap: at least {MIN_DRAWS} make an interval")
     recordings, s = len(information.left), len(shared)
-    if recordings < FEWEST:
-        return no_bootstrap(s, f"a bootstrap over recordings needs at least {FEWEST}, there are {recordings}")
+    if recordings < MIN_RECORDINGS:
+        return no_bootstrap(s, f"a bootstrap over recordings needs at least {MIN_RECORDINGS}, there are {recordings}")
     weights = resampling_weights(recordings, draws, seed)
     found = steps(problem, shared, system, information, weights)
     left_out = steps(problem, shared, system, information, 1.0 - np.eye(recordings))
-    tails = np.array([(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    tails = np.array([(1 - CONFIDENCE_LEVEL) / 2, (1 + CONFIDENCE_LEVEL) / 2])
     held = ~information.free_shared
     percentiles, interval = np.quantile(found, tails, axis=0).T, bca(found, shared, left_out, tails)
     percentiles[held], interval[held] = np.nan, np.nan
@@ -103,13 +103,13 @@ def steps(
     shares = rows.transpose(0, 2, 1) @ rows
     prior = whitener.T @ (system.prior_block[:, None] * whitener)
     moved = np.zeros((len(weights), s))
-    for start in range(0, len(weights), CHUNK):
-        some = weights[start : start + CHUNK]
+    for start in range(0, len(weights), DRAWS_PER_BATCH):
+        some = weights[start : start + DRAWS_PER_BATCH]
         values, vectors = np.linalg.eigh(np.tensordot(some, shares, 1) + prior)
-        known = values > NO_INFORMATION * np.max(values, axis=1, initial=0.0, keepdims=True)
+        known = values > MIN_INFORMATION_SHARE * np.max(values, axis=1, initial=0.0, keepdims=True)
         along = np.einsum("bij,bi->bj", vectors, (some @ sides + system.prior_gradient) @ whitener)
         along = np.where(known, along / np.where(known, values, 1.0), 0.0)
-        moved[start : start + CHUNK] = -np.einsum("bij,bj->bi", vectors, along) @ whitener.T
+        moved[start : start + DRAWS_PER_BATCH] = -np.einsum("bij,bj->bi", vectors, along) @ whitener.T
     return np.clip(shared + moved * problem.shared.scale, problem.shared.lower, problem.shared.upper)
 
 

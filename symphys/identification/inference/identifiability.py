@@ -28,7 +28,7 @@ OPEN_ERROR = 1.0
 """Standard error of a direction, in units of the numbers, above which it is called open."""
 ZERO_COMPONENT = 0.02
 """A component of a direction is none if it is smaller, relative to the largest."""
-EXPONENTS = (1, 2, 3)
+TRIED_EXPONENTS = (1, 2, 3)
 """Largest powers that are tried."""
 NO_INFORMATION_ERROR = 1e3
 """Standard error, in units of the numbers, above which a direction has no information at all."""
@@ -200,7 +200,7 @@ def kernel(directions: Array) -> Array:
 
 def whole_powers(weights: Array) -> Array | None:
     """Return (n,) small integers, the first above 0, that weights (n,) are a multiple of; None without any."""
-    for most in EXPONENTS:
+    for most in TRIED_EXPONENTS:
         powers = weights / weights[np.argmax(np.abs(weights))] * most
         near = np.round(powers)
         if np.all(np.abs(powers - near) <= POWER_TOLERANCE * most) and np.all(near != 0):

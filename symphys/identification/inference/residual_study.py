@@ -20,21 +20,21 @@ from symphys.results.identification.record import PredictionErrors, QuantityResi
 from symphys.types import Array, Bools, Ints
 
 COLUMNS = ("quantity", "component", "time", "noise", "impact")
-LAGS = 10
+MAX_LAGS = 10
 """ResidualSamples over which the test looks."""
-FEWEST = 20
+MIN_RESIDUALS = 20
 """Residuals that a verdict needs."""
-BINS = 8
+TIME_BINS = 8
 """Means over a time."""
-CORRELATED, UNLIKELY, COURSE = 0.2, 1e-3, 0.1
+MAX_AUTOCORRELATION, MAX_PROBABILITY, MAX_EXPLAINED_SHARE = 0.2, 1e-3, 0.1
 """An effect is missing where the correlation is above the first, or where means explain more than the third, and the
 probability of that under noise is below the second."""
-COURSES = {
+COURSE_NAMES = {
     "by_time": "the time in the recording",
     "by_impact": "the time since the impact",
     "by_recording": "which recording it is",
 }
-FARTHER, NEARER = 1.25, 0.8
+MAX_NOISE_RATIO, MIN_NOISE_RATIO = 1.25, 0.8
 """Root mean squares by noise beyond which the given noise is called too small, or too large."""
 
 
@@ -110,20 +110,23 @@ def quantity_residuals(name: str, unit: str, known: bool, part: ResidualSamples)
         text="",
         **{name: share for name, (share, _) in shares.items()},
     )
-    return judged(measured, [name for name, (share, chance) in shares.items() if share > COURSE and chance < UNLIKELY])
+    return judged(
+        measured,
+        [name for name, (share, chance) in shares.items() if share > MAX_EXPLAINED_SHARE and chance < MAX_PROBABILITY],
+    )
 
 
 def judged(found: QuantityResiduals, courses: Sequence[str]) -> QuantityResiduals:
     """Add the verdict, in words; ``courses``: the shares that count."""
-    if found.count < FEWEST:
+    if found.count < MIN_RESIDUALS:
         return replace(found, verdict="too few", text=f"{found.count} residuals are too few for a verdict")
-    reasons = [f"{getattr(found, name):.0%} depends on {COURSES[name]}" for name in courses]
-    if abs(found.autocorrelation) > CORRELATED and found.ljung_box < UNLIKELY:
+    reasons = [f"{getattr(found, name):.0%} depends on {COURSE_NAMES[name]}" for name in courses]
+    if abs(found.autocorrelation) > MAX_AUTOCORRELATION and found.ljung_box < MAX_PROBABILITY:
         reasons.insert(0, f"one sample is like the next (correlation {found.autocorrelation:.2f})")
     missing = bool(reasons)
-    if found.noise_known and found.ratio > FARTHER:
+    if found.noise_known and found.ratio > MAX_NOISE_RATIO:
         reasons.append(f"it is {found.ratio:.2g} times the given noise")
-    if found.noise_known and found.ratio < NEARER:
+    if found.noise_known and found.ratio < MIN_NOISE_RATIO:
         reasons.append(f"it is {found.ratio:.2g} of the given noise, which is too large")
     text = "; ".join(reasons) or "no memory, no course, and the size of the noise"
     return replace(found, verdict="missing effect" if missing else "noise", text=text)
@@ -139,7 +142,7 @@ def series(part: ResidualSamples) -> list[Array]:
 def ljung_box(runs: Sequence[Array]) -> tuple[float, float, int]:
     """Return lag-1 correlation, probability under white noise, and lags, pooled over series of mean 0."""
     longest = max((len(run) for run in runs), default=0)
-    lags = min(LAGS, longest // 4)
+    lags = min(MAX_LAGS, longest // 4)
     power = sum(float(run @ run) for run in runs)
     count = sum(len(run) for run in runs)
     if lags < 1 or not power > 0:
@@ -155,10 +158,10 @@ def ljung_box(runs: Sequence[Array]) -> tuple[float, float, int]:
 
 
 def binned(time: Array, component: Ints) -> Ints:
-    """Return (m,) the group of each sample: one of ``BINS`` parts in the order of time, by component."""
+    """Return (m,) the group of each sample: one of ``TIME_BINS`` parts in the order of time, by component."""
     if not time.size:
         return np.zeros(0, np.int64)
-    edges = np.unique(np.quantile(time, np.linspace(0, 1, BINS + 1)[1:-1]))
+    edges = np.unique(np.quantile(time, np.linspace(0, 1, TIME_BINS + 1)[1:-1]))
     return np.asarray(np.searchsorted(edges, time, side="right") * (int(component.max()) + 1) + component)
 
 
@@ -167,7 +170,7 @@ def explained(r: Array, group: Ints) -> tuple[float, float]:
 
     The share is 0 at least, and nan where there are too few; the probability is that of the F test.
     """
-    if r.size < FEWEST:
+    if r.size < MIN_RESIDUALS:
         return np.nan, np.nan
     _, index, sizes = np.unique(group, return_inverse=True, return_counts=True)
     count, freedom = len(sizes), r.size - len(sizes)

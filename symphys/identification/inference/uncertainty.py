@@ -28,7 +28,7 @@ from symphys.identification.fitting.remaining import DeterminedArrow, number_uni
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.square_root import (
     EPS,
-    TOUCHED,
+    MIN_TOUCHED_COMPONENT,
     Root,
     eliminate,
     pseudo_root,
@@ -38,12 +38,12 @@ from symphys.identification.fitting.square_root import (
 from symphys.identification.interface import FitParameters, RecordedResiduals, Rows
 from symphys.types import Array, Bools, Ints
 
-LEVEL = 0.95
+CONFIDENCE_LEVEL = 0.95
 SUSPICIOUS = 1e-8
 """Singular values below this share of the largest are compared with the rounding of the derivatives."""
-NUDGE = 8 * EPS
+RELATIVE_NUDGE = 8 * EPS
 """Relative change of all numbers at which the Jacobian is evaluated once more, to see its rounding."""
-MOST_NOISE = 1e-9
+MAX_DERIVATIVE_NOISE = 1e-9
 """Largest rounding, as a share of the longest column; a larger change comes from a kink."""
 
 
@@ -124,7 +124,7 @@ def make_information(
     moved = rounding[:, :, :s] + rounding[:, :, s:] @ found.gain
     lengths = np.linalg.norm(stacked(moved), axis=0)
     longest = float(np.max(np.linalg.norm(rows, axis=0), initial=0.0))
-    shared = pseudo_root(triangle(rows), np.minimum(lengths, MOST_NOISE * longest) * free_shared)
+    shared = pseudo_root(triangle(rows), np.minimum(lengths, MAX_DERIVATIVE_NOISE * longest) * free_shared)
     return Information(shared, found.left, found.own, found.gain, free_shared, free_own)
 
 
@@ -151,7 +151,9 @@ def derivative_noise(
         (k, n, n) roots of the changes of each recording, and (k, o) lengths of those of its own columns, in scales.
     """
     nudged = [
-        np.clip(values + NUDGE * np.maximum(np.abs(values), parameters.scale), parameters.lower, parameters.upper)
+        np.clip(
+            values + RELATIVE_NUDGE * np.maximum(np.abs(values), parameters.scale), parameters.lower, parameters.upper
+        )
         for parameters, values in ((problem.shared, shared), (problem.own, own))
     ]
     again, s, n = problem.jacobian(nudged[0], nudged[1], which), len(shared), len(shared) + own.shape[1]
@@ -164,7 +166,7 @@ def derivative_noise(
             found[k] = triangle(changed)
         longest[k] = np.max(np.linalg.norm(first[2] * weight[:, s:], axis=0), initial=0.0)
     own_lengths = np.linalg.norm(found[:, :, s:], axis=1)
-    return found, np.minimum(own_lengths, MOST_NOISE * longest[:, None])
+    return found, np.minimum(own_lengths, MAX_DERIVATIVE_NOISE * longest[:, None])
 
 
 def uncertainty(
@@ -206,13 +208,13 @@ def uncertainty(
     own_error = np.full(own.shape, np.nan)
     units = number_units((problem.shared, problem.own), (shared, own), (free_shared, free_own), which)
     vague_own = DeterminedArrow(system, units).vague_own
-    open_own = bread.own_open | vague_own | np.any((np.abs(bread.gain) > TOUCHED) & open_shared, axis=2)
+    open_own = bread.own_open | vague_own | np.any((np.abs(bread.gain) > MIN_TOUCHED_COMPONENT) & open_shared, axis=2)
     fitted = np.where(open_own, np.inf, np.sqrt(np.maximum(own_variance, 0))) * problem.own.scale[which]
     own_error[which] = np.where(free_own, fitted, np.nan)
     correlation, known = np.full(covariance.shape, np.nan), np.flatnonzero(np.isfinite(error) & (error > 0))
     some = np.ix_(known, known)
     correlation[some] = covariance[some] / np.outer(error[known], error[known])
-    tail = (1 + LEVEL) / 2
+    tail = (1 + CONFIDENCE_LEVEL) / 2
     quantile = float(scipy.stats.norm.ppf(tail) if noise_known else scipy.stats.t.ppf(tail, max(freedom, 1)))
     own_free = np.ones(own.shape, bool)
     own_free[which] = free_own

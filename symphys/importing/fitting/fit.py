@@ -26,33 +26,33 @@ from symphys.model.shapes import Shape
 from symphys.suggest import hint, quote
 from symphys.types import Array
 
-POINTS = 320
+SURFACE_POINTS = 320
 """Points of the outer surface in a search; half as many outside, a quarter inside."""
-MOST_STEPS = 20
+MAX_EVALUATIONS = 20
 """Evaluations of a search, for each power."""
 POWERS = (1, 2, 4)
 """Powers of a distance, as a share of the mesh's size, in the residuals."""
-WIDTHS = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
+SIZE_COUNTS = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
 """Number of sizes of a solid."""
-TURNS = {"sphere": 0, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
+ROTATION_COUNTS = {"sphere": 0, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
 """Rotational degrees of freedom that change a solid."""
 MIN_SIZE = 1e-3
 """The least size of a solid, as a share of the mesh's size."""
 CLUSTER_STEPS = 25
 """Iterations of k-means."""
-SEVERAL = {"spheres": ("sphere", (2, 4, 8)), "capsules": ("capsule", (2, 3, 4))}
+SHAPE_COUNTS = {"spheres": ("sphere", (2, 4, 8)), "capsules": ("capsule", (2, 3, 4))}
 """Fits by more than one shape: the kind, and the counts that are tried."""
-KINDS = (*WIDTHS, *SEVERAL)
+KINDS = (*SIZE_COUNTS, *SHAPE_COUNTS)
 """Everything that ``fit`` tries, in the order of simplicity."""
 GAIN_PER_SHAPE = 0.07
 """Relative decrease of the largest deviation that justifies one more shape."""
-NEGLIGIBLE = 0.005
+NEGLIGIBLE_DEVIATION = 0.005
 """Share of the mesh's size that is added to compared deviations: smaller differences do not matter."""
-SIDES = ((0, 2), (1, 2), (0, 1))
+VIEW_AXES = ((0, 2), (1, 2), (0, 1))
 """The axes to the right and up in each view."""
-MOST_FACES = 8000
+MAX_FACES = 8000
 """Faces of a mesh that are drawn, at most."""
-RINGS = 24
+CIRCLE_CORNERS = 24
 """Corners of a drawn circle."""
 
 
@@ -112,8 +112,8 @@ def fits(vertices: ArrayLike, faces: ArrayLike, kinds: Sequence[str] = KINDS) ->
     mesh = checked(vertices, faces)
     found = []
     for kind in kinds:
-        if kind in SEVERAL:
-            single, counts = SEVERAL[kind]
+        if kind in SHAPE_COUNTS:
+            single, counts = SHAPE_COUNTS[kind]
             found += [measured(kind, mesh, improved(mesh, several(single, mesh, count))) for count in counts]
         else:
             cloud = cloud_of(mesh)
@@ -130,7 +130,7 @@ def best(found: Sequence[Fit]) -> Fit:
 
 def cost(each: Fit) -> float:
     """Return the deviation [mm] with a penalty for each additional shape."""
-    return (each.deviation_mm + NEGLIGIBLE * each.size_mm) * (1 + GAIN_PER_SHAPE) ** (len(each.shapes) - 1)
+    return (each.deviation_mm + NEGLIGIBLE_DEVIATION * each.size_mm) * (1 + GAIN_PER_SHAPE) ** (len(each.shapes) - 1)
 
 
 def measured(kind: str, mesh: Mesh, solids: list[Placed]) -> Fit:
@@ -164,12 +164,14 @@ def improved(mesh: Mesh, start: Sequence[Placed]) -> list[Placed]:
 
     cloud, solids = cloud_of(mesh), list(start)
     for power in POWERS:
-        numbers = np.zeros(sum(3 + TURNS[solid.kind] + WIDTHS[solid.kind] for solid in solids))
+        numbers = np.zeros(sum(3 + ROTATION_COUNTS[solid.kind] + SIZE_COUNTS[solid.kind] for solid in solids))
 
         def residuals(change: Array, power: int = power, solids: list[Placed] = solids) -> Array:
             return np.asarray((10 * cloud.deviations(changed(solids, change, mesh.size)) / mesh.size) ** power)
 
-        found = least_squares(residuals, numbers, method="trf", max_nfev=MOST_STEPS, x_scale=0.1, xtol=1e-4, ftol=1e-4)
+        found = least_squares(
+            residuals, numbers, method="trf", max_nfev=MAX_EVALUATIONS, x_scale=0.1, xtol=1e-4, ftol=1e-4
+        )
         solids = changed(solids, found.x, mesh.size)
     return solids
 
@@ -196,9 +198,9 @@ def cloud_of(mesh: Mesh) -> Cloud:
     low, high = mesh.outer.min(axis=0), mesh.outer.max(axis=0)
     margin = 0.3 * (high - low).max()
     grid = low - margin + np.random.default_rng(2).random((2000, 3)) * (high - low + 2 * margin)
-    outside = thinned(grid[mesh.outside(grid)], POINTS // 2)
+    outside = thinned(grid[mesh.outside(grid)], SURFACE_POINTS // 2)
     away = np.asarray(mesh.tree.query(outside)[0], float)
-    return Cloud(thinned(mesh.outer, POINTS), thinned(mesh.filling, POINTS // 4), outside, away)
+    return Cloud(thinned(mesh.outer, SURFACE_POINTS), thinned(mesh.filling, SURFACE_POINTS // 4), outside, away)
 
 
 def changed(solids: Sequence[Placed], numbers: Array, size: float) -> list[Placed]:
@@ -207,7 +209,7 @@ def changed(solids: Sequence[Placed], numbers: Array, size: float) -> list[Place
 
     found, at = [], 0
     for solid in solids:
-        turns, width = TURNS[solid.kind], WIDTHS[solid.kind]
+        turns, width = ROTATION_COUNTS[solid.kind], SIZE_COUNTS[solid.kind]
         shift, turn, growth = np.split(numbers[at : at + 3 + turns + width], [3, 3 + turns])
         axes = solid.axes @ Rotation.from_rotvec(np.append(turn, [0] * (3 - turns))).as_matrix()
         sizes = np.maximum(solid.sizes * np.exp(np.clip(growth, -3, 3)), MIN_SIZE * size)
@@ -299,12 +301,12 @@ def draw_fit(fitted: Fit, vertices: ArrayLike, faces: ArrayLike, path: Path | st
     from matplotlib.figure import Figure
 
     mesh = checked(vertices, faces)
-    triangles = 1000 * mesh.vertices[mesh.faces[:: max(1, -(-len(mesh.faces) // MOST_FACES))]]
+    triangles = 1000 * mesh.vertices[mesh.faces[:: max(1, -(-len(mesh.faces) // MAX_FACES))]]
     wires = [1000 * wire for shape in fitted.shapes for wire in outline(shape)]
     figure = Figure(figsize=(11, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
-    for k, side in enumerate(SIDES):
-        axes: Any = figure.add_subplot(1, len(SIDES), k + 1)
+    for k, side in enumerate(VIEW_AXES):
+        axes: Any = figure.add_subplot(1, len(VIEW_AXES), k + 1)
         seen, lines = triangles[:, :, side], [wire[:, side] for wire in wires]
         axes.add_collection(PolyCollection(list(seen), facecolor="0.8", edgecolor="0.6", linewidth=0.15))
         axes.add_collection(LineCollection(lines, colors="#1f5fbf", linewidths=0.8))
@@ -329,7 +331,7 @@ def outline(shape: Shape) -> list[Array]:
 
 def own_lines(shape: Shape) -> list[Array]:
     """Return lines on a shape in its own axes: edges of a polytope, circles of round shapes."""
-    turn = np.linspace(0, 2 * np.pi, RINGS + 1)
+    turn = np.linspace(0, 2 * np.pi, CIRCLE_CORNERS + 1)
     circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
     sizes = shape.sizes
     if shape.kind == "box":

@@ -22,9 +22,9 @@ VIEWS = 48
 """Number of viewing directions."""
 PIXELS = 48
 """Pixels of a view, along the longest side."""
-WITNESSES = 4
+MIN_WITNESSES = 4
 """Views that must see a point in front of the surface."""
-SURROUNDED = 5
+GAP_NEIGHBOURS = 5
 """Number of nearer neighbours, of eight, from which a pixel counts as a gap between samples."""
 GOLDEN = (1 + 5**0.5) / 2
 
@@ -102,9 +102,9 @@ class Mesh:
         return np.asarray(self.samples[self.ahead(self.samples) > -slack / 2])
 
     def ahead(self, points: Array) -> Array:
-        """Return how far points lie in front of the surface (n,) [m] for ``WITNESSES`` views: one may be a gap."""
+        """Return how far points lie in front of the surface (n,) [m] for ``MIN_WITNESSES`` views: one may be a gap."""
         ahead = np.array([view.ahead(points) for view in self.views])
-        return np.asarray(np.partition(ahead, -WITNESSES, axis=0)[-WITNESSES])
+        return np.asarray(np.partition(ahead, -MIN_WITNESSES, axis=0)[-MIN_WITNESSES])
 
     def outside(self, points: Array) -> NDArray[np.bool_]:
         """Return whether points lie in front of the surface (n,), as seen from some directions.
@@ -140,12 +140,12 @@ class Mesh:
 
 
 def filled(depth: Array) -> Array:
-    """Raise depths to the ``SURROUNDED``-th nearest of eight neighbours, since no sample may have fallen on a pixel."""
+    """Raise depths to the ``GAP_NEIGHBOURS``-th nearest of eight neighbours: a pixel may have no sample."""
     padded = np.pad(depth, 1, constant_values=-np.inf)
     rows, columns = depth.shape
     shifts = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
     around = np.sort([padded[i : i + rows, j : j + columns] for i, j in shifts], axis=0)
-    return np.asarray(np.maximum(depth, around[-SURROUNDED]))
+    return np.asarray(np.maximum(depth, around[-GAP_NEIGHBOURS]))
 
 
 def triangle_distances(triangles: Array, point: Array) -> Array:

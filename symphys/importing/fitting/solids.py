@@ -12,7 +12,7 @@ from symphys.types import Array
 
 FOOT_STEPS = 8
 """Newton steps towards the foot of a perpendicular on an ellipsoid."""
-SPREAD = 1500
+SURFACE_POINTS = 1500
 """Points on the surface of a solid."""
 
 
@@ -94,7 +94,7 @@ DISTANCES: dict[str, Callable[[Array, Array], Array]] = {
 """Signed distances by the kinds of shapes."""
 
 
-def directions(count: int = SPREAD) -> Array:
+def directions(count: int = SURFACE_POINTS) -> Array:
     """Return unit vectors (count, 3), spread evenly by a Fibonacci spiral."""
     z = 1 - (2 * np.arange(count) + 1) / count
     turn = np.pi * (1 + 5**0.5) * np.arange(count)

@@ -25,7 +25,7 @@ FIXED = (*ASKED, *FOUND, *SPENT, *ORIGIN)
 """Columns that every table has; settings come after ASKED, outputs and costs after FOUND."""
 NUMBERS = frozenset(("seed", "objective", "worst", *SPENT))
 """Those of FIXED that hold numbers."""
-MOST_EXACT = 2**53
+MAX_EXACT_INTEGER = 2**53
 """Whole numbers below are doubles, too; a column holds no larger ones as whole."""
 UNITS = {"solve_seconds": "s", "compile_seconds": "s", "build_seconds": "s", "peak_memory": "bytes"}
 """Where they have one; the names of outputs have their own."""

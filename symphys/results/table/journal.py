@@ -22,15 +22,15 @@ from typing import Any
 from symphys import files
 from symphys.json_values import UNPRINTABLE
 from symphys.results.file_names import RESULT
-from symphys.results.table.columns import FIXED, MOST_EXACT, NUMBERS, numeric
+from symphys.results.table.columns import FIXED, MAX_EXACT_INTEGER, NUMBERS, numeric
 
-NAME = ".runs.jsonl"
+JOURNAL_FILE = ".runs.jsonl"
 """Of the journal, in the folder that `symphys solve --out` names."""
-ROWS = 1
+ROW_FORMAT = 1
 """The format of rows: lines of another are skipped."""
-MARK = b'{"crc":"'
+LINE_PREFIX = b'{"crc":"'
 """What every line begins with; eight digits follow, then ``",``, then what they are the checksum of."""
-BODY = len(MARK) + 10
+BODY_START = len(LINE_PREFIX) + 10
 """Where that begins."""
 TEXTS = frozenset(FIXED) - NUMBERS - {"solved"}
 """Columns that hold texts."""
@@ -59,7 +59,7 @@ class Journal:
     @property
     def path(self) -> Path:
         """Return the file."""
-        return self.out / NAME
+        return self.out / JOURNAL_FILE
 
     def add(self, folder: Path, written: tuple[dict[str, Any], dict[str, Any]] | None = None) -> None:
         """Keep the row of a run that has ended, once its result.json is written.
@@ -125,25 +125,25 @@ def stamp_of(status: os.stat_result) -> Stamp:
 
 def line(place: str, kept: Kept) -> bytes:
     """Return a line with its end."""
-    content = {"rows": ROWS, "run": place, "stamp": kept.stamp, "row": kept.row}
+    content = {"rows": ROW_FORMAT, "run": place, "stamp": kept.stamp, "row": kept.row}
     try:
         text = json.dumps(content, separators=(",", ":"), allow_nan=False)
     except ValueError:  # few rows have a number that is not finite
         text = json.dumps(files.strict(content), separators=(",", ":"), allow_nan=False)
     body = text[1:].encode()
-    return MARK + b'%08x",' % zlib.crc32(body) + body + b"\n"
+    return LINE_PREFIX + b'%08x",' % zlib.crc32(body) + body + b"\n"
 
 
 def entry(text: bytes) -> Iterable[tuple[str, Kept]]:
     """Return the run and its row in a line; nothing for one that is damaged. What a torn line was glued to is found."""
-    text = text[max(text.rfind(MARK), 0) :].rstrip(b"\n")
-    body = text[BODY:]
-    if not text.startswith(MARK) or text[len(MARK) : BODY] != b'%08x",' % zlib.crc32(body):
+    text = text[max(text.rfind(LINE_PREFIX), 0) :].rstrip(b"\n")
+    body = text[BODY_START:]
+    if not text.startswith(LINE_PREFIX) or text[len(LINE_PREFIX) : BODY_START] != b'%08x",' % zlib.crc32(body):
         return []
     try:
         match json.loads(b"{" + body):
             case {"rows": int(rows), "run": str(run), "stamp": [int(time), int(size)], "row": dict(row)}:
-                return [(run, Kept((time, size), row))] if rows == ROWS and sound(row) else []
+                return [(run, Kept((time, size), row))] if rows == ROW_FORMAT and sound(row) else []
     except (ValueError, RecursionError):  # a right checksum of what is no JSON, or is nested too deep
         return []
     return []
@@ -158,7 +158,7 @@ def sound(row: Mapping[str, Any]) -> bool:
         elif kind is float:
             odd = column in TEXTS or not math.isfinite(value)
         elif kind is int:
-            odd = column in TEXTS or abs(value) >= MOST_EXACT
+            odd = column in TEXTS or abs(value) >= MAX_EXACT_INTEGER
         else:
             odd = kind is not bool or numeric(column) or column in TEXTS
         if odd or UNPRINTABLE.search(column):

@@ -19,7 +19,7 @@ from symphys.results.case_name import case_name
 from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.result import CheckRecord, Result
 from symphys.results.run import is_result, read_or_note
-from symphys.results.table.columns import COST, MOST_EXACT, OUTPUT, UNFINISHED, UNREADABLE, Row, setting_column
+from symphys.results.table.columns import COST, MAX_EXACT_INTEGER, OUTPUT, UNFINISHED, UNREADABLE, Row, setting_column
 from symphys.results.text_files import ReportError, read_light_table
 
 WAITING = "there is no result yet: the run goes on, or was stopped before its end"
@@ -119,7 +119,7 @@ def table(value: object) -> Mapping[str, Any]:
 
 def number(value: object) -> float | int | None:
     """Return a number, whole where it is; None for what is not known."""
-    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < MOST_EXACT:
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < MAX_EXACT_INTEGER:
         return value
     read = values.number(value)
     return None if math.isnan(read) else read

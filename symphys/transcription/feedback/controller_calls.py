@@ -1,4 +1,4 @@
-"""Sensors, controllers and force laws as calls of a program: a call for each sensor, and for each row of a net."""
+"""Sensors, controllers and force laws as calls of a program: one for each sensor and each row of a net."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from symphys.types import Expr
 
 
 class Places(Protocol):
-    """Where a program keeps a rollout."""
+    """The places of a rollout in a program."""
 
     rollout: Rollout
     layout: MemoryLayout
@@ -30,17 +30,17 @@ class Places(Protocol):
 
 
 def control_calls(rollout: Rollout, places: Places) -> list[FunctionCall]:
-    """The calls that come before those of a step: from ``x`` and ``given`` to ``u``; none without feedback."""
+    """Return the calls before those of a step, from ``x`` and ``given`` to ``u``; none without feedback."""
     if rollout.feedback is None:
         return []
     return ControllerCalls(rollout, places).calls
 
 
 class ControllerCalls:
-    """Writes the calls of one step, one after the other."""
+    """Makes the calls of one step in order."""
 
     def __init__(self, rollout: Rollout, places: Places) -> None:
-        """Write all of them."""
+        """Make all calls."""
         self.rollout, self.places = rollout, places
         self.calls: list[FunctionCall] = []
         laws, given = rollout.control.laws, places.given
@@ -53,7 +53,7 @@ class ControllerCalls:
             self.calls.append(FunctionCall(laws, (places.x, given, places.p, places.time), (places.u,)))
 
     def used(self) -> list[str]:
-        """The sensors that some controller uses."""
+        """Return the sensors that some controller reads."""
         return list(dict.fromkeys(name for c in self.rollout.problem.controllers for name in c.senses))
 
     def sense(self, name: str) -> Place:
@@ -63,7 +63,7 @@ class ControllerCalls:
         return self.call(self.rollout.control.sensor(sensor), places.x, places.p, places.time)
 
     def call(self, function: ca.Function, *inputs: Place) -> Place:
-        """A call with one result; where that lies."""
+        """Add a call with one result and return the place of the result."""
         result = self.places.layout.take(int(function.numel_out(0)))
         self.calls.append(FunctionCall(function, inputs, (result,)))
         return result
@@ -86,7 +86,7 @@ class ControllerCalls:
         return part(self.places.p, self.rollout.parameters.columns[f"{controller.name}.{key}"])
 
     def net(self, net: Net, weights: Place, senses: Sequence[Place]) -> list[Place]:
-        """A call for each output of a layer."""
+        """Add a call for each output of a layer."""
         values, layers = list(senses), tuple(net.layers())
         for layer in layers:
             result = self.places.layout.take(layer.outputs)
@@ -106,7 +106,7 @@ class ControllerCalls:
         straight: Place | None,
         senses: Sequence[Place],
     ) -> tuple[ca.Function, tuple[Place, ...]]:
-        """One output of a layer: a function and its arguments."""
+        """Return the function of one output of a layer, and its arguments."""
         width, start = layer.inputs, layer.matrix.start
         products = [([*values], part(weights, slice(start + k * width, start + (k + 1) * width)))]
         if straight is not None:
@@ -119,7 +119,7 @@ class ControllerCalls:
         return row_function(layer.activation, sizes, len(biases)), (*places, *biases)
 
     def add_up(self, outputs: Sequence[Sequence[Place]], result: Place) -> None:
-        """The inputs: what variables give and what all controllers add."""
+        """Add the call that sums the inputs of variables and of all controllers."""
         controllers = self.rollout.problem.controllers
         given = ca.SX.sym("given", self.places.u.size)
         total, symbols = ca.SX(given), list[Expr]()
@@ -137,12 +137,12 @@ class ControllerCalls:
 
 
 def part(place: Place, columns: slice) -> Place:
-    """Some words of a place."""
+    """Return some words of a place."""
     return Place(place.offset + columns.start, columns.stop - columns.start, place.stride)
 
 
 def row_function(activation: Activation, sizes: Sequence[tuple[list[int], int]], biases: int) -> ca.Function:
-    """(values ..., weights) of a product, then those of the straight one if there is one, a bias -> one output."""
+    """Return (values ..., weights), those of a skip connection if there is one, and a bias -> one output."""
     symbols, products = list[Expr](), list[Expr]()
     for values, held in sizes:
         own = [ca.SX.sym("value", size) for size in values]

@@ -22,16 +22,16 @@ from symphys.transcription.feedback.sensor_memory import SensorMemory
 from symphys.transcription.formula_names import Instant, Parameters, instant, namespace
 from symphys.types import Expr
 
-LEAST_PIVOT = 0.5
-"""Laws that push the stronger the faster a body goes grow by at most its inverse within a step."""
-QUARTER = 0.25
-"""Of a step: so far from its ends it is asked which step a time belongs to, so that rounding does not matter."""
+MIN_PIVOT = 0.5
+"""Least pivot: force laws that grow with speed grow by at most its inverse within a step."""
+STEP_MARGIN = 0.25
+"""Share of a step by which times are shifted from its ends, so that rounding does not select another step."""
 
 
 def force_function(
     problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory
 ) -> ca.Function:
-    """(x, u, p, time) -> the inputs: u, and what all laws of the state add; x with its memory."""
+    """Return (x, u, p, time) -> the inputs: u plus all force laws of the state; x with its memory."""
     at = instant(world, inputs, parameters, memory, 0)
     scheme = parameters.scheme(problem.simulation)
     ahead = half_step_function(world, scheme, inputs, parameters.symbols)
@@ -49,13 +49,13 @@ def force_function(
 
 
 def _with_slope(first: Expr, slope: Expr) -> Expr:
-    """(nu,): f of f = first + slope f, by elimination among the entries that the slope (nu, nu) depends on."""
+    """Solve f = first + slope f for f (nu,), by elimination among the entries that the slope (nu, nu) has."""
     slope = ca.sparsify(slope)
     own = sorted(set(slope.sparsity().get_triplet()[1]))
     rows = [{j: float(i == j) - slope[i, j] for j in own if i == j or slope.has_nz(i, j)} for i in own]
     right = {i: first[i] for i in own}
     for k, i in enumerate(own):
-        pivot = ca.fmax(rows[k][i], LEAST_PIVOT)
+        pivot = ca.fmax(rows[k][i], MIN_PIVOT)
         for below in range(k + 1, len(own)):
             share = rows[below].get(i)
             if share is None:
@@ -67,7 +67,7 @@ def _with_slope(first: Expr, slope: Expr) -> Expr:
     found: dict[int, Expr] = {}
     for k, i in reversed(list(enumerate(own))):
         known = sum((rows[k][j] * found[j] for j in own[k + 1 :] if j in rows[k]), ca.SX(0))
-        found[i] = (right[i] - known) / ca.fmax(rows[k][i], LEAST_PIVOT)
+        found[i] = (right[i] - known) / ca.fmax(rows[k][i], MIN_PIVOT)
     solved = ca.SX.zeros(first.size1())
     for i, value in found.items():
         solved[i] = value
@@ -83,7 +83,7 @@ def _added(
     laws: Sequence[ForceLaw],
     at: Instant,
 ) -> Expr:
-    """(nu,): what laws give at an instant."""
+    """Return (nu,) the inputs that laws add at an instant."""
     total, columns = ca.SX.zeros(at.u.shape[0]), input_columns(world, inputs)
     wanted = frozenset[str]().union(*(law.formula.names for law in laws))
     names = namespace(problem, world, inputs, parameters, memory, at, wanted)
@@ -103,8 +103,8 @@ def _added(
 
 
 def _within(tick: Expr, shares: tuple[float, float], steps: int) -> Expr:
-    """1 in the steps of a phase, else 0: at the start of a step, whose number ``tick`` is, or half a step later."""
-    first, last = (round(share * steps) - QUARTER for share in shares)
+    """Return 1 in the steps of a phase, else 0: at the start of a step number ``tick``, or half a step later."""
+    first, last = (round(share * steps) - STEP_MARGIN for share in shares)
     return ca.logic_and(tick > first, tick < last)
 
 
@@ -118,7 +118,7 @@ class Control:
         self.problem, self.world, self.inputs, self.parameters, self.memory = problem, world, inputs, parameters, memory
 
     def sensor(self, sensor: Sensor) -> ca.Function:
-        """(x, p, time) -> what a sensor reads; x with its memory."""
+        """Return (x, p, time) -> the reading of a sensor; x with its memory."""
         at = instant(self.world, self.inputs, self.parameters, self.memory, 0)
         wanted = frozenset[str]().union(*(formula.names for formula in sensor.formulas))
         names = namespace(self.problem, self.world, self.inputs, self.parameters, self.memory, at, wanted)
@@ -128,11 +128,11 @@ class Control:
         return ca.Function("sense", [at.x, at.p, at.time], [ca.densify(ca.vertcat(*parts))])
 
     def numbers(self, controller: FeedbackController, p: Expr) -> dict[str, Expr]:
-        """The controller's numbers among the parameters."""
+        """Return the controller's numbers among the parameters."""
         return {key: p[self.parameters.columns[f"{controller.name}.{key}"]] for key in controller.law.sizes}
 
     def place(self, controller: FeedbackController) -> ca.DM:
-        """(nu, m) sparse: which input each output is added to, scaled."""
+        """Return (nu, m) sparse: the input that each output is added to, scaled."""
         columns = input_columns(self.world, self.inputs)
         rows = [columns[name].start + component for name, component in controller.drives]
         count = len(rows)
@@ -141,7 +141,7 @@ class Control:
         )
 
     def function(self) -> ca.Function:
-        """(x, u, p, time) -> the inputs: u, which variables give, and what all controllers and force laws add."""
+        """(x, u, p, time) -> the inputs: u of the variables, plus all controllers and force laws."""
         at = instant(self.world, self.inputs, self.parameters, self.memory, 0)
         read = {s.name: self.sensor(s)(at.x, at.p, at.time) for s in self.problem.sensors}
         u = at.u

@@ -1,4 +1,4 @@
-"""One step for batches of states and actions: values, and what adjoints become on their way back."""
+"""One step for batches of states and actions: values, and adjoints of the results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from symphys.codegen.backends.precision import warn
 from symphys.model.state_layout import GIVEN, Layout
 from symphys.problem import ALIVE, Cost, Problem, Target
 from symphys.transcription.decision_variables import start_of
-from symphys.transcription.open_step.opening import Opening, opened
+from symphys.transcription.open_step.opening import ExternalControlProblem, opened
 from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.stage import BatchStep, Stage, Value, sense_function
@@ -26,7 +26,7 @@ from symphys.types import Array, Expr
 
 
 def looks_at_variables(problem: Problem) -> bool:
-    """Whether a cost or target has a variable in its formula."""
+    """Whether the formula of a cost or target reads a variable."""
     names = {variable.name for variable in problem.variables}
     return any(not names.isdisjoint(each.formula.names) for each in asked(problem))
 
@@ -37,7 +37,7 @@ def asked(problem: Problem) -> list[Cost | Target]:
 
 
 def moments(problem: Problem) -> tuple[int, ...]:
-    """The steps, by number, in which something is asked for at one instant: at their starts, in the last at its end."""
+    """Return the numbers of the steps with a cost at one instant: at their start, in the last step at its end."""
     last = problem.simulation.steps
     instants = {each.at for each in asked(problem) if each.at != "always"}
     return tuple(sorted({last if isinstance(at, str) else round(at / problem.simulation.dt) for at in instants}))
@@ -66,12 +66,12 @@ def costs(rollout: Rollout, value: Value) -> tuple[Expr, Expr]:
 
 
 def size(value: Expr, squares: bool) -> Expr:
-    """A cost of a value: its square, or itself."""
+    """Return the cost of a value: its square, or itself."""
     return ca.sumsqr(value) if squares else value
 
 
 def open_stage(rollout: Rollout, sensors: Sequence[str]) -> Stage:
-    """A step with the costs ``running`` and ``moments``; see ``costs``."""
+    """Return a stage with the costs ``running`` and ``moments``; see ``costs``."""
 
     def ask(value: Value) -> dict[str, Expr]:
         return dict(zip(("running", "moments"), costs(rollout, value), strict=True))
@@ -80,7 +80,7 @@ def open_stage(rollout: Rollout, sensors: Sequence[str]) -> Stage:
 
 
 def observe_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
-    """(x, p, time) -> what these sensors read; without any, the states of all bodies."""
+    """Return (x, p, time) -> the readings of these sensors; without any, the states of all bodies."""
     if sensors:
         return sense_function(rollout, sensors)
     x, p, time = ca.SX.sym("x", rollout.x0.shape[0]), ca.SX.sym("p", rollout.p.shape[0]), ca.SX.sym("time")
@@ -89,13 +89,13 @@ def observe_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
 
 
 def body_columns(rollout: Rollout) -> list[tuple[str, slice]]:
-    """Name and columns of the state of each body."""
+    """Return name and columns of the state of each body."""
     layout = Layout(rollout.world)
     return [(f"{body.name}.{key}", layout[f"{body.name}.{key}"]) for body in rollout.world.bodies for key in GIVEN]
 
 
 class StepStart(NamedTuple):
-    """Where motions begin: ``state`` (B, s), ``observation`` (B, o), and the ``inputs`` (B, N, i) of all steps.
+    """The start of motions: ``state`` (B, s), ``observation`` (B, o), and the ``inputs`` (B, N, i) of all steps.
 
     Arrays of numpy, or of the library that they were asked of.
     """
@@ -106,7 +106,7 @@ class StepStart(NamedTuple):
 
 
 class StepResult(NamedTuple):
-    """What a step gives: ``state`` (B, s) and ``observation`` (B, o) after it, and its ``cost`` (B,)."""
+    """The results of a step: ``state`` (B, s) and ``observation`` (B, o) after it, and its ``cost`` (B,)."""
 
     state: Array
     observation: Array
@@ -135,7 +135,7 @@ class CompiledStep:
     upper: Array
     smoothing: float
     backend: str
-    _opening: Opening
+    _opening: ExternalControlProblem
     _place: Array
     _rollout: Rollout
     _sampler: Sampler | None
@@ -143,22 +143,22 @@ class CompiledStep:
 
     @property
     def state_size(self) -> int:
-        """Numbers in a state."""
+        """The number of entries of a state."""
         return sum(self._sizes)
 
     @property
     def action_size(self) -> int:
-        """Numbers in an action."""
+        """The number of entries of an action."""
         return len(self.actions)
 
     @property
     def input_size(self) -> int:
-        """Numbers that act on the world in a step: forces, torques and commands, in all."""
+        """The number of forces, torques and commands that act on the world in a step."""
         return len(self._place)
 
     @cached_property
     def observation_size(self) -> int:
-        """Numbers in an observation."""
+        """The number of entries of an observation."""
         return int(self._start.size1_out(3))
 
     @cached_property
@@ -176,7 +176,7 @@ class CompiledStep:
 
     @property
     def steps(self) -> int:
-        """N, in the duration of the problem."""
+        """The number of steps N in the duration of the problem."""
         return self._rollout.steps
 
     def start(self, count: int = 1, seed: int | None = None) -> StepStart:
@@ -234,7 +234,7 @@ class CompiledStep:
         cost: ArrayLike,
         inputs: ArrayLike | None = None,
     ) -> tuple[Array, Array, Array]:
-        """Adjoints (B, s) of the state, (B, m) of the action and (B, i) of the inputs, from those of what a step gives.
+        """Return adjoints of state (B, s), action (B, m) and inputs (B, i), from those of the results of a step.
 
         Args:
             state: (B, s), and the others as the step was called.
@@ -266,7 +266,7 @@ class CompiledStep:
         return back, u @ self._place, u
 
     def rest(self, state: ArrayLike) -> Array:
-        """(B,) what all steps that are left cost motions that are over, in which nothing moves any more."""
+        """Return (B,) the cost of all remaining steps of motions that are over."""
         states = np.array(matrix("state", state, self.state_size))
         still, special = np.zeros((len(states), self.action_size)), self._instants
         ticks, total = self._ticks(states), np.zeros(len(states))
@@ -280,7 +280,7 @@ class CompiledStep:
         return total
 
     def alive(self, state: ArrayLike) -> NDArray[np.bool_]:
-        """(B,) whether a motion is not over by the problem's [termination]."""
+        """Return (B,) whether motions are not over by the problem's [termination]."""
         states = matrix("state", state, self.state_size)
         memory = self._rollout.memory
         if not memory.terminates:
@@ -288,24 +288,24 @@ class CompiledStep:
         return np.asarray(states[:, memory.columns[ALIVE].start] > 0)
 
     def tick(self, state: ArrayLike) -> NDArray[np.int64]:
-        """(B,) how many steps lie behind a state."""
+        """Return (B,) the number of steps before a state."""
         return self._ticks(matrix("state", state, self.state_size))
 
     def _ticks(self, states: Array) -> NDArray[np.int64]:
         return np.rint(states[:, self._clock] / self._rollout.dt).astype(np.int64)
 
     def _now(self, states: Array) -> NDArray[np.bool_]:
-        """(B, moments): which instants fall into the step from here."""
+        """Return (B, moments) which instants fall into the step from here."""
         wanted = [min(tick, self.steps - 1) for tick in moments(self.problem)]
         return np.equal(self._ticks(states)[:, None], np.array(wanted, np.int64).reshape(1, -1))
 
     @cached_property
     def _instants(self) -> list[int]:
-        """The steps, by number, into which an instant falls."""
+        """The numbers of the steps with an instant."""
         return sorted({min(tick, self.steps - 1) for tick in moments(self.problem)})
 
     def _rows(self, states: Array, actions: Array, inputs: ArrayLike | None) -> Array:
-        """(B, m) of the kernel."""
+        """Return the rows (B, m) of the kernel."""
         nx, np_, count = self._sizes[0], self._sizes[1], len(states)
         if len(actions) != count:
             raise ValueError(f"{count} states and {len(actions)} actions: give one for each")
@@ -333,12 +333,12 @@ class CompiledStep:
 
     @cached_property
     def _nominal(self) -> Array:
-        """(N, i) what acts besides, as the guess has it."""
+        """The other inputs (N, i), those of the guess."""
         return np.asarray(self.start().inputs[0])
 
     @cached_property
     def _start(self) -> ca.Function:
-        """(z) -> x0, the inputs of all steps one after the other, p, what is observed."""
+        """(z) -> x0, the inputs of all steps in order, p, the observation."""
         rollout = self._rollout
         start = start_of(rollout.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
         x0 = rollout.memory.start(start.x0)
@@ -355,7 +355,7 @@ def compile_open_step(
     backend: str = BEST,
     threads: int | None = None,
 ) -> CompiledStep:
-    """The step of a problem whose commands are actions; see ``symphys.compile_step``."""
+    """Compile the step of a problem whose commands are actions; see ``symphys.compile_step``."""
     opening = opened(problem, controllers, sensors)
     sampler = None if opening.problem.scenarios is None else Sampler(opening.problem)
     whole = opening.problem if sampler is None else sampler.problem
@@ -378,7 +378,9 @@ def compile_open_step(
     )
 
 
-def evaluated_by(rollout: Rollout, opening: Opening, exact: bool, backend: str, threads: int) -> tuple[BatchStep, str]:
+def evaluated_by(
+    rollout: Rollout, opening: ExternalControlProblem, exact: bool, backend: str, threads: int
+) -> tuple[BatchStep, str]:
     """Choose a kernel, or casadi's virtual machine without a compiler, and describe the choice."""
     note, stage = "", open_stage(rollout, opening.sensors)
     if backend in PRECISIONS:
@@ -392,7 +394,7 @@ def evaluated_by(rollout: Rollout, opening: Opening, exact: bool, backend: str, 
 
 
 def matrix(name: str, value: ArrayLike, columns: int) -> Array:
-    """(B, columns); ValueError, which names the shape that fits."""
+    """Return (B, columns); ValueError names the shape that fits."""
     array = np.asarray(value, float)
     if array.ndim != 2 or array.shape[1] != columns:
         raise ValueError(f"{name} must be (batch, {columns}), not {array.shape}")
@@ -400,5 +402,5 @@ def matrix(name: str, value: ArrayLike, columns: int) -> Array:
 
 
 def tiled(row: Array, count: int) -> Array:
-    """One row, as often as that."""
+    """Return ``count`` copies of a row."""
     return np.repeat(row, count, axis=0)

@@ -1,4 +1,4 @@
-"""A problem with its controllers taken off: what acts instead of them, and within which bounds."""
+"""A problem with its controllers removed: the actions in their place, with bounds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from symphys.types import Array
 
 @dataclass(frozen=True)
 class Action:
-    """One number that acts: what it is added to, times ``scale``, and its bounds."""
+    """One number of an action: the input that it is added to, times ``scale``, and its bounds."""
 
     input: str
     component: int
@@ -31,8 +31,8 @@ class Action:
 
 
 @dataclass(frozen=True)
-class Opening:
-    """A problem whose commands are actions from outside.
+class ExternalControlProblem:
+    """A problem whose commands are external actions.
 
     Attributes:
         problem: without the controllers and variables whose place the actions take.
@@ -45,12 +45,12 @@ class Opening:
     sensors: tuple[str, ...]
 
     def names(self) -> tuple[str, ...]:
-        """The input and component that each action adds to: ``knee.command``, ``ball.force[2]``."""
+        """Return the input and component that each action adds to: ``knee.command``, ``ball.force[2]``."""
         sizes = input_sizes(self.problem.world())
         return tuple(a.input if sizes[a.input] == 1 else f"{a.input}[{a.component}]" for a in self.acting)
 
     def bounds(self, end: Literal["lower", "upper"]) -> Array:
-        """(m,) of the actions; may be infinite."""
+        """Return bounds (m,) of the actions; may be infinite."""
         return np.array([getattr(action, end) for action in self.acting], float)
 
     def inputs(self, problem: Problem) -> tuple[str, ...]:
@@ -58,7 +58,7 @@ class Opening:
         return tuple(dict.fromkeys([*input_names(problem), *(action.input for action in self.acting)]))
 
     def place(self, world: World, inputs: Sequence[str]) -> Array:
-        """(nu, m) what an action adds to u, which stacks ``inputs``."""
+        """Return (nu, m) the share of each action in u, which stacks ``inputs``."""
         columns = input_columns(world, inputs)
         place = np.zeros((inputs_size(world, inputs), len(self.acting)))
         for k, action in enumerate(self.acting):
@@ -66,8 +66,10 @@ class Opening:
         return place
 
 
-def opened(problem: Problem, controllers: Sequence[str] | None = None, sensors: Sequence[str] | None = None) -> Opening:
-    """Take controllers off a problem.
+def opened(
+    problem: Problem, controllers: Sequence[str] | None = None, sensors: Sequence[str] | None = None
+) -> ExternalControlProblem:
+    """Replace controllers of a problem by external actions.
 
     Args:
         problem: any.
@@ -99,11 +101,11 @@ def opened(problem: Problem, controllers: Sequence[str] | None = None, sensors: 
         variables=tuple(variable for variable in problem.variables if variable not in dropped),
         controllers=tuple(controller for controller in problem.controllers if controller not in taken),
     )
-    return Opening(rest, tuple(actions), observed(problem, taken, sensors))
+    return ExternalControlProblem(rest, tuple(actions), observed(problem, taken, sensors))
 
 
 def chosen(problem: Problem, names: Sequence[str] | None) -> tuple[FeedbackController, ...]:
-    """The controllers that are taken off."""
+    """Return the controllers that are removed."""
     known = {controller.name: controller for controller in problem.controllers}
     if names is None:
         varied = {slot.name for variable in problem.variables for slot in variable.slots}
@@ -113,7 +115,7 @@ def chosen(problem: Problem, names: Sequence[str] | None) -> tuple[FeedbackContr
 
 
 def observed(problem: Problem, taken: Sequence[FeedbackController], names: Sequence[str] | None) -> tuple[str, ...]:
-    """The sensors that are observed."""
+    """Return the observed sensors."""
     known = [sensor.name for sensor in problem.sensors]
     if names is not None:
         return tuple(known_name(name, known, "sensor") for name in names)
@@ -121,7 +123,7 @@ def observed(problem: Problem, taken: Sequence[FeedbackController], names: Seque
 
 
 def known_name(name: str, known: Sequence[str] | dict[str, FeedbackController], kind: str) -> str:
-    """The name; SymphysError where nothing is called so."""
+    """Return the name; SymphysError if it is unknown."""
     if name not in known:
         there = hint(name, known) if known else "there is none"
         raise SymphysError(f"no {kind} is called {quote(name)}; {there}")
@@ -150,7 +152,7 @@ def knots(variable: Variable) -> list[Action]:
 
 
 def commands(problem: Problem) -> list[Action]:
-    """The commands of all motors."""
+    """Return the commands of all motors as actions."""
     found = []
     for joint in problem.world().joints:
         if joint.motor is not None:
@@ -160,7 +162,7 @@ def commands(problem: Problem) -> list[Action]:
 
 
 def reach(joint: Joint, k: int) -> tuple[float, float]:
-    """Bounds of a command: the limits of the joint for a servo, else the largest torque or velocity."""
+    """Return the bounds of a command: the joint limits for a servo, else the largest torque or velocity."""
     motor = joint.motor
     if isinstance(motor, Servo):
         widest = np.pi if joint.kind.coordinates[k].turns else np.inf
@@ -180,7 +182,7 @@ def slots(variable: Variable) -> str:
 
 
 def refuse_motion_parts(problem: Problem) -> None:
-    """ProblemError if a cost or target takes something of a whole motion, which a single step does not have."""
+    """Raise ProblemError if a cost or target depends on the whole motion."""
     issues = [
         Issue(f'{kind} "{each.name}"', f"{each.formula.parts[0].name} is of a whole motion, and this is a single step")
         for kind, every in (("cost", problem.costs), ("target", problem.targets))
@@ -207,7 +209,7 @@ def refuse_motion_parts(problem: Problem) -> None:
 
 
 def refuse_formulas(problem: Problem, taken: Mapping[str, str]) -> None:
-    """ProblemError if a cost or target looks at what is taken off, by name; the values say what to look at instead."""
+    """Raise ProblemError if a cost or target reads a removed name; the values say what to read instead."""
     issues = [
         Issue(f'{kind} "{each.name}"', f"looks at {name}, whose place the actions take; it may look at {instead}")
         for kind, every in (("cost", problem.costs), ("target", problem.targets))

@@ -1,1 +1,1 @@
-"""Samples of scenarios: numbers and poses that are drawn, behind z in the vector of a kernel."""
+"""Samples of scenarios: random numbers and poses, placed after z in the vector of a kernel."""

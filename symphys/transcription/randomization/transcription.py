@@ -29,14 +29,14 @@ from symphys.types import Array
 
 
 class SampleEvaluator(Protocol):
-    """Evaluates rows (B, n + s), each a point with the numbers of a sample behind it."""
+    """Evaluates rows (B, n + s): points followed by the numbers of a sample."""
 
     def sample_values(self, rows: Array, smoothing: float) -> Values:
-        """Return what was found, without gradients."""
+        """Return values without gradients."""
         ...
 
     def sample_gradients(self, rows: Array, smoothing: float, discount: float, skipped: int) -> Values:
-        """Return what was found, with gradients (B, n + s).
+        """Return values with gradients (B, n + s).
 
         Args:
             rows: see above.
@@ -48,7 +48,7 @@ class SampleEvaluator(Protocol):
 
 
 class KernelSamples:
-    """Evaluates samples by a kernel; see ``SampleEvaluator``."""
+    """A ``SampleEvaluator`` by a kernel."""
 
     def __init__(self, kernel: Kernel) -> None:
         """Wrap a kernel of the sampler's problem whose merit is seeded."""
@@ -66,12 +66,12 @@ class KernelSamples:
 
 
 class ScenarioGrids:
-    """See ``ScenarioEvaluator``: a sampler, and what evaluates its samples, for each grid."""
+    """A ``ScenarioEvaluator``: a sampler and an evaluator for each time grid."""
 
     def __init__(
         self, grids: Sequence[str], samplers: Sequence[Sampler], evaluators: Sequence[SampleEvaluator]
     ) -> None:
-        """Combine the evaluators of grids, which have names."""
+        """Combine the samplers and evaluators of grids, which have names."""
         self.grids, self.samplers, self.evaluators = tuple(grids), tuple(samplers), tuple(evaluators)
 
     def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> ScenarioSamples:
@@ -99,7 +99,7 @@ class ScenarioGrids:
 
 
 class NominalEvaluator(WithoutResiduals):
-    """Evaluates points in the nominal sample; see ``Evaluator``."""
+    """An ``Evaluator`` in the nominal sample."""
 
     def __init__(self, scenario: ScenarioGrids) -> None:
         """Wrap an evaluator of samples."""
@@ -115,7 +115,7 @@ class NominalEvaluator(WithoutResiduals):
 
 
 def _joined(Z: Array, drawn: ScenarioSamples) -> Array:
-    """(batch, n + s)."""
+    """Return rows (batch, n + s)."""
     return np.hstack([np.broadcast_to(Z, (len(drawn.numbers), Z.shape[1])), drawn.numbers])
 
 
@@ -125,13 +125,13 @@ def values(outputs: Outputs, gradient: Array | None = None) -> Values:
     return Values(*common(outputs), gradient=gradient, alive=alive)
 
 
-WITHOUT = "there are no samples of scenarios"
+NO_SAMPLES = "there are no samples of scenarios"
 
 
 def with_scenarios(
     plain: Transcription, problem: Problem, exact: bool, backend: str, threads: int | None
 ) -> Transcription:
-    """``plain``, which is of the problem without its scenarios, with kernels that know them in place of its backend.
+    """Return ``plain``, transcribed without scenarios, with kernels of the scenarios as its backend.
 
     Where there can be no kernels it stays as it is, and its backend's note says so.
     """
@@ -144,7 +144,7 @@ def with_scenarios(
         samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]
         made = [_evaluating(each.problem, exact, backend, count) for each in samplers]
     except (KernelUnavailable, ProgramError) as error:
-        description = replace(plain.backend, note=f"{WITHOUT}: {error}")
+        description = replace(plain.backend, note=f"{NO_SAMPLES}: {error}")
         return replace(plain, problem=problem, backend=description)
     scenario = ScenarioGrids(list(grids), samplers, [evaluator for evaluator, _ in made])
     shooting = replace(

@@ -1,4 +1,4 @@
-"""The augmented objective to second order, term by term: only what is not 0 is added."""
+"""The augmented objective to second order, summed term by term over nonzero entries only."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from symphys.types import Array, Ints
 
 
 class ExpansionSums:
-    """An expansion that is being added up.
+    """An expansion while it is being summed.
 
     Slopes are complete. Curvature is kept where an expansion has a place for it: of two different states, and of
     control knots that are named together with what happens at other steps, it is left out.
     """
 
     def __init__(self, sizes: tuple[int, int, int, int], of_constants: Array, knots: tuple[Ints, Ints]) -> None:
-        """Zeros.
+        """Start with zeros.
 
         Args:
             sizes: N, n, m and s.
@@ -35,7 +35,7 @@ class ExpansionSums:
         self.sx, self.su = np.zeros((steps + 1, s, n)), np.zeros((steps, s, m))
 
     def slope(self, term: StageTerm, blocks: Blocks, by_s: Array, weight: Array) -> None:
-        """Add the slope of ``weight`` (T, r) times the term's values; ``by_s`` (T, r, s) theirs by static entries."""
+        """Add the slope of ``weight`` (T, r) times the term's values; ``by_s`` (T, r, s): slopes by static entries."""
         steps = term.steps
         for total, ticks, block in (
             (self.x, term.states, blocks.x),
@@ -68,27 +68,27 @@ class ExpansionSums:
         self._of_knots(blocks.constants, by_s, scaled)
 
     def by_constants(self, slopes: Array) -> Array:
-        """(T, r, s) slopes by the static entries of z, from those by all constants (T, r, c)."""
+        """Return slopes (T, r, s) by the static entries of z, from those by all constants (T, r, c)."""
         return np.asarray(slopes @ self.of_constants)
 
     def by_statics(self, blocks: Blocks) -> Array:
-        """(T, r, s) slopes by the static entries of z, through the constants."""
+        """Return slopes (T, r, s) by the static entries of z, through the constants."""
         return np.asarray(blocks.constants.slopes @ self.of_constants[blocks.constants.columns])
 
     def expansion(self) -> Expansion:
-        """The sums."""
+        """Return the expansion."""
         return Expansion(
             self.value, self.x, self.xx, self.u, self.uu, self.ux, self.uy, self.s, self.ss, self.sx, self.su
         )
 
     def knots_of(self, block: Block) -> tuple[Array, Ints]:
-        """(T, r, k) the slopes by knots among constants, and their places (k, 2)."""
+        """Return slopes (T, r, k) by knots among constants, and their places (k, 2)."""
         which, places = self.knots
         _, mine, theirs = np.intersect1d(block.columns, which, return_indices=True)
         return block.slopes[:, :, mine], np.asarray(places[theirs], np.int64)
 
     def _of_knots(self, block: Block, by_s: Array, scaled: Array) -> None:
-        """Knots of one step with each other and with static entries."""
+        """Add second derivatives of knots of one step by each other and by static entries."""
         slopes, places = self.knots_of(block)
         for step in np.unique(places[:, 0]) if len(places) else ():
             here = places[:, 0] == step
@@ -99,7 +99,7 @@ class ExpansionSums:
 
 
 def _add(total: Array, ticks: Ints, rows: Block, columns: Block) -> None:
-    """Add rows' columns, tick by tick, to total (N, a, b)."""
+    """Add columns of rows to total (N, a, b), tick by tick."""
     if len(rows.columns) and len(columns.columns):
         products = rows.slopes.transpose(0, 2, 1) @ columns.slopes
         total[ticks[:, None, None], rows.columns[:, None], columns.columns] += products

@@ -1,4 +1,4 @@
-"""States where a motion is guessed to pass: those of the guess's rollout, moved to what is named."""
+"""States of a guessed motion: those of the guess's rollout, moved to the named quantities."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from symphys.types import Array, Ints
 
 
 def guessed_states(stages: RolloutStages, guess: GuessedMotion, z: Array, ticks: Ints, smoothing: float) -> Array:
-    """(M, nx) at the ticks (M,), each at least 1.
+    """Return states (M, nx) at the ticks (M,), each at least 1.
 
     What is named, and its rate, is moved along the tangent, so that joints stay closed; all else is that of the rollout
     of z (n,), of its first step from where on it is not finite.
@@ -62,7 +62,7 @@ def _stretch(stages: RolloutStages, z: Array) -> float:
 
 
 def _quantities(stages: RolloutStages, guess: GuessedMotion, states: Array, z: Array) -> dict[str, Array]:
-    """(M, components) of all quantities of the owners of what is guessed."""
+    """Return (M, components) of all quantities of the owners of the guessed ones."""
     rollout = stages.rollout
     world, layout = rollout.world, Layout(rollout.world)
     x, p = ca.SX.sym("x", layout.size), ca.SX.sym("p", int(rollout.p.shape[0]))

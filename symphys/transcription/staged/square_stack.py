@@ -1,4 +1,4 @@
-"""Squares and limits to second order about a motion, all at once: their slopes lie on top of each other.
+"""Squares and limits about a motion to second order, their slopes stacked in one matrix.
 
 A term that looks at one state alone is a row at each of the N + 1 states, whichever steps ask for it: formulas that
 running costs read at either side of a step are evaluated once. A term of the state after a step that also looks at what
@@ -36,7 +36,7 @@ class SquareStack:
         static: bool,
         evaluated: Evaluated,
     ) -> None:
-        """Write down their slopes; nothing is compiled before it is asked for.
+        """Collect the slopes; functions are compiled on demand.
 
         Args:
             symbols: that the terms are expressions of.
@@ -144,7 +144,7 @@ class SquareStack:
                 sums.sx[:-1, :, :n] += curve[:, s, first]
 
     def _violations(self, r: Array, multipliers: Array, penalties: Array) -> tuple[Array, Array]:
-        """(T, R) values, those of limits as their shifted violations, and weights."""
+        """Return (T, R) values, those of limits as shifted violations, and weights."""
         some, r, weights = self._limited, r.copy(), self._weights.copy()
         multiplier, penalty = (np.append(each, 0.0)[self._limits] for each in (multipliers, penalties))
         moved = r[:, some] + multiplier / np.where(penalty > 0, penalty, 1.0)
@@ -176,5 +176,5 @@ def square_stacks(
 
 
 def _padded(slope: ca.SX, columns: int) -> ca.SX:
-    """A slope that may have no columns, with as many as it should have."""
+    """Return a slope, padded to ``columns`` if it has none."""
     return slope if slope.shape[1] == columns else ca.SX(slope.shape[0], columns)

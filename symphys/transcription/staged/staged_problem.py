@@ -1,4 +1,4 @@
-"""A problem step by step, as ``symphys.shooting.StagedProblem`` has it."""
+"""A problem step by step: the implementation of ``symphys.shooting.StagedProblem``."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class SlopedTerm(NamedTuple):
 
 
 class RolloutStages:
-    """The steps of a rollout, compiled; see ``symphys.shooting.StagedProblem`` for what is public.
+    """The compiled steps of a rollout; ``symphys.shooting.StagedProblem`` describes the public methods.
 
     A state is that of the rollout, then the sums that formulas take of a whole motion. Inputs are those of the rollout,
     then control knots that formulas name, each at the first step in which it acts.
@@ -93,7 +93,7 @@ class RolloutStages:
         self.lower, self.upper, self.penalties = columns[0], columns[1], columns[2]
 
     def begin(self, x: Array, time: float) -> None:
-        """Let motions begin at a state (nx,) and a time [s]; the duration must not vary, and no formula take sums."""
+        """Let motions begin at a state (nx,) and time [s]; requires a fixed duration and no sums."""
         assert not self._sums and not self.rollout.problem.free_duration
         self._first, self._linearization.step.clock = x, time
         self._groups.clock = time / self.rollout.dt
@@ -102,26 +102,26 @@ class RolloutStages:
 
     @property
     def description(self) -> str:
-        """What evaluates slopes, in words."""
+        """Describe the evaluator of the derivatives."""
         return self._linearization.step.description
 
     def start(self, Z: Array) -> Array:
-        """(B, nx)."""
+        """Return first states (B, nx)."""
         return self._begun(Z)[0]
 
     def parameters(self, Z: Array) -> Array:
-        """(B, np)."""
+        """Return parameters (B, np)."""
         return self._begun(Z)[1]
 
     def _begun(self, Z: Array) -> tuple[Array, Array, Array]:
-        """First states, parameters, and the starts that formulas take, a row for each z."""
+        """Return first states, parameters, and starts of formulas, a row for each z."""
         states, p, starts = self._distinct(Z)
         if len(p) == len(Z) == len(states):
             return states, p, starts
         return np.repeat(states[:1], len(Z), axis=0), np.repeat(p, len(Z), axis=0), np.repeat(starts, len(Z), axis=0)
 
     def _distinct(self, Z: Array) -> tuple[Array, Array, Array]:
-        """The same, one row without static entries; those that were asked for last are kept."""
+        """Return ``_begun`` of distinct rows, one without static entries; the last result is cached."""
         single = not len(self.statics)  # then they are the same for all z
         key = 0 if single else len(Z), Z[:, self.statics].tobytes()
         if self._known is None or self._known[0] != key:
@@ -136,7 +136,7 @@ class RolloutStages:
     _known: tuple[tuple[int, bytes], tuple[Array, Array, Array]] | None = None
 
     def _constants(self, Z: Array, U: Array) -> Array:
-        """(B, c): what the terms read that is the same all along each motion; knots are those of the inputs."""
+        """Return (B, c) the numbers of terms that are constant along each motion; knots are those of U."""
         if self._groups.symbols.plain:
             return self._begun(Z)[1]
         _, p, starts = self._begun(Z)
@@ -146,7 +146,7 @@ class RolloutStages:
         return np.concatenate([p, named, starts], axis=1)
 
     def step(self, k: int, X: Array, U: Array, Z: Array, smoothing: float) -> Array:
-        """(B, nx) after step k."""
+        """Return states (B, nx) after step k."""
         plain = X[:, : X.shape[1] - self._sums]
         after = self._linearization.step.step(k, plain, U[:, : self._given], self.parameters(Z), smoothing)
         if not self._sums:
@@ -158,7 +158,7 @@ class RolloutStages:
         return self._groups.summed(StepRows(X, after, U[:, : self._given], constants, ticks))
 
     def roll_out(self, z: Array, smoothing: float) -> StagedMotion:
-        """The motion of z."""
+        """Return the motion of z."""
         motion = self._linearization.motion(z, smoothing, self._first)
         u = np.asarray(self.weights @ z).reshape(self.steps, self.input_size)
         if not self._sums:
@@ -177,7 +177,7 @@ class RolloutStages:
         smoothing: float,
         shares: Array | float = 1.0,
     ) -> Followed | None:
-        """The motions of step lengths (B,); None with sums, and without a compiler."""
+        """Return the motions of step lengths (B,); None with sums, and without a compiler."""
         if self._sums:
             return None
         sizes = PolicySizes(policy.old.shape[1], policy.new.shape[1], self.input_size, len(self.statics))
@@ -196,7 +196,7 @@ class RolloutStages:
     _rolled: PolicyRollout | None = None
 
     def linearize(self, motion: StagedMotion) -> Linearized:
-        """Slopes of all steps."""
+        """Return the derivatives of all steps."""
         found = self._with_knots(self._linearization.linearize(self._plain(motion)))
         return self._with_sums(found, motion) if self._sums else found
 
@@ -240,21 +240,21 @@ class RolloutStages:
         return Linearized(a, b, c, start)
 
     def retract(self, X: Array, D: Array) -> Array:
-        """(B, nx)."""
+        """Return states (B, nx)."""
         if not self._sums:
             return self.tangent.retract(X, D)
         moved = self.tangent.retract(X[:, : -self._sums], D[:, : -self._sums])
         return np.concatenate([moved, X[:, -self._sums :] + D[:, -self._sums :]], axis=1)
 
     def difference(self, X: Array, Y: Array) -> Array:
-        """(B, n)."""
+        """Return tangents (B, n)."""
         if not self._sums:
             return self._linearization.step.difference(X, Y)
         apart = self._linearization.step.difference(X[:, : -self._sums], Y[:, : -self._sums])
         return np.concatenate([apart, Y[:, -self._sums :] - X[:, -self._sums :]], axis=1)
 
     def measure(self, Z: Array, X: Array, U: Array) -> tuple[Array, Array]:
-        """Objectives (B,) and limits (B, c)."""
+        """Return objectives (B,) and limits (B, c)."""
         objective, limits = np.zeros(len(Z)), [np.zeros((len(Z), 0))]
         values = self._groups.values(X, U[:, :, : self._given], self._constants(Z, U))
         for term, each in values:
@@ -267,7 +267,7 @@ class RolloutStages:
         return objective, np.concatenate(limits, axis=1)
 
     def expand(self, motion: StagedMotion, multipliers: Array, penalties: Array) -> Expansion:
-        """The augmented objective to second order."""
+        """Return the augmented objective to second order."""
         sizes = self.steps, self.tangent_size, self.input_size, len(self.statics)
         sums, first = ExpansionSums(sizes, self._of_constants(motion), self._knots), 0
         stacked = not len(self._knots[0]) and not self._beside(motion).any()
@@ -307,14 +307,14 @@ class RolloutStages:
         return square_stacks(self._groups.symbols, self.terms, bounds, static, self._evaluated)
 
     def _curve(self, sums: ExpansionSums, each: SlopedTerm, weight: Array) -> None:
-        """Add the second derivative of weight (T,) times a number, as far as it is positive."""
+        """Add the positive part of the second derivative of weight (T,) times a number."""
         rows = each.slopes.curvature(each.found, np.sign(weight))
         if rows is not None:
             share = np.broadcast_to(np.abs(weight)[:, None], rows.x.slopes.shape[:2])
             sums.curvature(each.term, rows, sums.by_statics(rows), share)
 
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Any, Any, Any]:
-        """Limits, and their slopes by all states, inputs and static entries."""
+        """Return limits, and their derivatives by all states, inputs and static entries."""
         n, m, s, first = self.tangent_size, self.input_size, len(self.statics), 0
         values, by_s = [np.zeros(0)], [np.zeros((0, s))]
         x, u = (_Entries(), _Entries())
@@ -336,11 +336,11 @@ class RolloutStages:
         return np.concatenate(values), by_state, by_input, csr_array(np.concatenate(by_s))
 
     def _beside(self, motion: StagedMotion) -> Array:
-        """(nx, s): what static entries do to the first state beside its tangent."""
+        """Return (nx, s) the derivatives of the first state by static entries, off its tangent."""
         return self._linearization.start_slopes(self._plain(motion))[1] if len(self.statics) else np.zeros((0, 0))
 
     def _sloped(self, motion: StagedMotion, after: Array, kinds: frozenset[Kind]) -> list[SlopedTerm]:
-        """Terms of some kinds with their slopes, from the states of a motion to the states ``after`` (N, nx)."""
+        """Return terms of some kinds with slopes, from a motion to the states ``after`` (N, nx)."""
         if not any(term.kind in kinds for term in self.terms):
             return []
         constants = self._constants(motion.z[None], motion.u[None])
@@ -357,13 +357,13 @@ class RolloutStages:
         return result
 
     def _plain(self, motion: StagedMotion) -> StagedMotion:
-        """Without sums and knots."""
+        """Return the motion without sums and knots."""
         size = motion.x.shape[1] - self._sums
         u = motion.u[:, : self._given]
         return StagedMotion(motion.z, motion.x[:, :size], u, motion.smoothing, motion.gapless)
 
     def _of_constants(self, motion: StagedMotion) -> Array:
-        """(c, s): the constants of the terms by the static entries of z."""
+        """Return (c, s) derivatives of the constants of terms by the static entries of z."""
         if not len(self.statics):
             return np.zeros((int(self._groups.symbols.constants.shape[0]), 0))
         of_p = self._linearization.start_slopes(self._plain(motion))[2]
@@ -373,19 +373,19 @@ class RolloutStages:
 
 
 class _Entries:
-    """Entries of a sparse matrix that are being gathered."""
+    """Collects the entries of a sparse matrix."""
 
     def __init__(self) -> None:
         self.rows, self.columns, self.values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
 
     def add(self, rows: Ints, columns: Ints, values: Array) -> None:
-        """Blocks (T, r, c) at rows (T, r) and columns (T or 1, 1, c)."""
+        """Add blocks (T, r, c) at rows (T, r) and columns (T or 1, 1, c)."""
         self.rows.append(np.broadcast_to(rows[:, :, None], values.shape).ravel())
         self.columns.append(np.broadcast_to(columns, values.shape).ravel())
         self.values.append(values.ravel())
 
     def matrix(self, rows: int, columns: int) -> Any:
-        """(rows, columns) scipy.sparse.csr_array."""
+        """Return a scipy.sparse.csr_array (rows, columns)."""
         from scipy.sparse import csr_array
 
         places = np.concatenate(self.rows), np.concatenate(self.columns)
@@ -393,7 +393,7 @@ class _Entries:
 
 
 def _input_weights(rollout: Rollout, named: Ints, statics: Ints) -> tuple[Any, tuple[Ints, Ints]]:
-    """(N * m, len(z)) scipy.sparse: u = weights @ z; which of ``named`` are knots, and the step and input of each.
+    """Return (N * m, len(z)) sparse: u = weights @ z; and which of ``named`` are knots, with step and input.
 
     The inputs of a step are those of the rollout, then the named knots that begin to act there.
     """
@@ -420,7 +420,7 @@ def _input_weights(rollout: Rollout, named: Ints, statics: Ints) -> tuple[Any, t
 
 
 def _limit(limit: Constraint, term: StageTerm, dt: float) -> tuple[Array, Array, Array]:
-    """(T * r,) each: bounds and weights of squared violations, tick after tick."""
+    """Return (T * r,) bounds and weights of squared violations, tick by tick."""
     ticks = len(term.steps)
     lower, upper = (np.tile(np.broadcast_to(end, (term.size,)), ticks) for end in (limit.lower, limit.upper))
     return lower, upper, np.full(len(lower), limit.penalty * (dt if limit.at == "always" else 1.0))

@@ -1,4 +1,4 @@
-"""The tangent of a state: the numbers by which states can differ, places and velocities first, forces last.
+"""The tangent of a state: minimal coordinates of its changes, poses and velocities first, forces last.
 
 Of each kinematic tree its coordinates and then their rates (``tree_chart``); of each other body its position, a
 rotation vector (world frame), velocity and angular velocity; then what carries on as it is: forces of pairs, joints and
@@ -28,11 +28,11 @@ from symphys.model.joints import Joint, kinematic_trees, tree_joints
 from symphys.model.state_layout import BODY_FIELDS, Layout
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.stage_functions import ByColumns
-from symphys.transcription.staged.tree_chart import Moving, Pose, TreeChart
+from symphys.transcription.staged.tree_chart import JointCoordinateChart, Moving, Pose
 from symphys.types import Array, Expr
 
 Parts = Mapping[str, Expr]
-"""Of a state, by the names of ``Layout``."""
+"""Parts of a state by the names of ``Layout``."""
 POSES, VELOCITIES, REACTIONS = BODY_FIELDS[:2], BODY_FIELDS[2:4], BODY_FIELDS[4:]
 
 
@@ -71,7 +71,7 @@ class Tangent:
 
     @cached_property
     def retraction(self) -> ca.Function:
-        """(x, d, p) -> the state that is so far from x."""
+        """(x, d, p) -> retract(x, d), the state at the tangent d from x."""
         x, d, p = ca.SX.sym("x", self._layout_size), ca.SX.sym("d", self.size), self._p
         return ca.Function("retract", [x, d, p], [ca.densify(ca.cse(self._retracted(x, d)))])
 
@@ -83,21 +83,21 @@ class Tangent:
 
     @cached_property
     def basis(self) -> ca.Function:
-        """(x, p) -> (nx, n) how retract(x, d) changes with d, at d = 0."""
+        """(x, p) -> (nx, n) the derivative of retract(x, d) by d, at d = 0."""
         x, d, p = ca.SX.sym("x", self._layout_size), ca.SX.sym("d", self.size), self._p
         slope = ca.substitute(ca.jacobian(self.retraction(x, d, p), d), d, ca.SX.zeros(self.size))
         return ca.Function("basis", [x, p], [ca.cse(slope)])
 
     @cached_property
     def projection(self) -> ca.Function:
-        """(x, p) -> (n, nx) how difference(x, y) changes with y, at y = x."""
+        """(x, p) -> (n, nx) the derivative of difference(x, y) by y, at y = x."""
         x, y, p = ca.SX.sym("x", self._layout_size), ca.SX.sym("y", self._layout_size), self._p
         slope = ca.substitute(ca.jacobian(self.distance(x, y, p), y), y, x)
         return ca.Function("projection", [x, p], [ca.cse(slope)])
 
     @cached_property
     def shift(self) -> ca.Function:
-        """(x, p) -> (nx, np) how a state changes with p while its tangent does not: where p moves joints."""
+        """(x, p) -> (nx, np) the derivative of a state by p at a fixed tangent, where p moves joints."""
         x, p = ca.SX.sym("x", self._layout_size), self._p
         old = self._parts(x)
         kept, rebuilt = self._rebuilt(old)
@@ -110,16 +110,16 @@ class Tangent:
         return ca.Function("shift", [x, p], [ca.vertcat(slope, memory)])
 
     def retract(self, X: ArrayLike, D: ArrayLike, p: ArrayLike | None = None) -> Array:
-        """(B, nx), (B, n) -> (B, nx): the states that are so far from others; ``p`` None: as the guess has it."""
+        """Return the states (B, nx) at tangents D (B, n) from X (B, nx); ``p`` None: the guess's parameters."""
         return self._batch(self._retractions, (X, D), p)
 
     def difference(self, X: ArrayLike, Y: ArrayLike, p: ArrayLike | None = None) -> Array:
-        """(B, nx), (B, nx) -> (B, n): D with retract(X, D) = Y."""
+        """Return D (B, n) with retract(X, D) = Y, for X and Y (B, nx)."""
         return self._batch(self._distances, (X, Y), p)
 
     @cached_property
     def nominal(self) -> Array:
-        """(np,) the parameters as the guess has them."""
+        """The parameters (np,) of the guess."""
         return np.array(ca.DM(ca.vertcat(ca.DM(0, 1), *self.rollout.parameters.nominal))).ravel()
 
     @cached_property
@@ -149,7 +149,7 @@ class Tangent:
 
     @property
     def _layout_size(self) -> int:
-        """Nx."""
+        """Return the size ``nx`` of a state."""
         return self.rollout.memory.size
 
     @cached_property
@@ -157,17 +157,17 @@ class Tangent:
         return Layout(self.rollout.world)
 
     @cached_property
-    def _charts(self) -> tuple[tuple[int, TreeChart | None], ...]:
+    def _charts(self) -> tuple[tuple[int, JointCoordinateChart | None], ...]:
         """Yield each tree with the index of its root, then each free body with its index."""
         world = self.rollout.world
         trees = kinematic_trees(world.joints)
         held = {body for tree in trees for body in tree.bodies}
         free = ((i, None) for i in range(len(world.bodies)) if i not in held)
-        return (*((tree.root, TreeChart(tree, world.joints)) for tree in trees), *free)
+        return (*((tree.root, JointCoordinateChart(tree, world.joints)) for tree in trees), *free)
 
     @cached_property
     def _raw(self) -> tuple[tuple[str, int], ...]:
-        """Parts of the world's state that carry on as they are, and how many numbers each has."""
+        """Return the parts of the world's state that are their own tangent, and their sizes."""
         world, scheme = self.rollout.world, self.rollout.problem.simulation.scheme()
         of_bodies = {f"{body.name}.{field}" for body in world.bodies for field, _ in BODY_FIELDS}
         in_trees = {joint.unwrapped for joint in self._in_trees}
@@ -179,12 +179,12 @@ class Tangent:
 
     @cached_property
     def _in_trees(self) -> tuple[Joint, ...]:
-        """The joints whose coordinates are numbers of the tangent."""
+        """Return the joints whose coordinates are entries of the tangent."""
         joints = self.rollout.world.joints
         return tuple(joints[k] for k in sorted(tree_joints(joints)))
 
     def _turned(self, old: Parts, new: Parts) -> dict[str, Expr]:
-        """Changes of angle of the other joints from one pose to the other, by half a turn at most."""
+        """Return changes of angle of the other joints between two poses, by half a turn at most."""
         found, world = dict[str, Expr](), self.rollout.world
         for joint in world.joints:
             if joint.unwrapped is None or joint in self._in_trees:
@@ -199,7 +199,7 @@ class Tangent:
 
     @cached_property
     def _acted(self) -> tuple[str, ...]:
-        """Reactions that other parts of the state do not tell: torques of contacts; without warm start all."""
+        """Return the independent reactions: torques of contacts; without warm start all reactions."""
         world = self.rollout.world
         touching = {i for pair in world.pairs for i in bodies_of(pair)}
         if self.rollout.problem.simulation.scheme().warm_start:
@@ -209,7 +209,7 @@ class Tangent:
 
     @cached_property
     def _carried(self) -> tuple[tuple[str, int], ...]:
-        """All numbers after coordinates and rates, by name."""
+        """Return all entries after coordinates and rates, by name, with sizes."""
         torques = tuple((name, 3) for name in self._acted)
         memory = self._layout_size - self._layout.size
         return (*self._raw, *torques, *((("memory", memory),) if memory else ()))
@@ -267,7 +267,7 @@ class Tangent:
         return ca.vertcat(ca.SX(0, 1), *found, y[self._layout.size :] - x[self._layout.size :])
 
     def _rebuilt(self, old: Parts) -> tuple[list[tuple[Expr, Expr]], Expr]:
-        """The state from how joints, rates and reactions are: symbols for these with their values, and the state."""
+        """Return the state as a function of joint errors, rates and reactions: symbols with values, and the state."""
         kept, new = list[tuple[Expr, Expr]](), dict(old)
 
         def known(value: Expr) -> Expr:
@@ -293,7 +293,7 @@ class Tangent:
         return kept, self._layout.pack(new)
 
     def _given(self, state: Parts) -> list[tuple[Expr, Expr]]:
-        """Force and torque on each body as far as other parts of the state tell them: joints', and forces of pairs."""
+        """Return force and torque on each body from the forces of pairs and joints in the state."""
         world = self.rollout.world
         total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in world.bodies]
         for pair in world.pairs:
@@ -321,21 +321,25 @@ class Tangent:
 
 
 class _Cursor:
-    """Takes parts of a column one after the other."""
+    """Takes consecutive parts of a column."""
 
     def __init__(self, column: Expr) -> None:
         self.column, self.at = column, 0
 
     def take(self, count: int) -> Expr:
-        """The next ``count`` numbers."""
+        """Return the next ``count`` numbers."""
         self.at += count
         return self.column[self.at - count : self.at]
 
 
 def _carried_on(
-    chart: TreeChart, poses: Mapping[int, Pose], moving: Mapping[int, Moving], moved: Mapping[int, Pose], more: Expr
+    chart: JointCoordinateChart,
+    poses: Mapping[int, Pose],
+    moving: Mapping[int, Moving],
+    moved: Mapping[int, Pose],
+    more: Expr,
 ) -> dict[int, Moving]:
-    """Velocities at the new poses, of rates that changed by ``more``; what velocities are off the joints stays."""
+    """Return velocities at the new poses, with rates changed by ``more`` and the same violation of joints."""
     rates = chart.rates(poses, moving)
     fit, after = chart.velocities(poses, rates), chart.velocities(moved, rates + more)
     return {i: (after[i][0] + (moving[i][0] - fit[i][0]), after[i][1] + (moving[i][1] - fit[i][1])) for i in after}

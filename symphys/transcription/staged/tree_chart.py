@@ -1,4 +1,4 @@
-"""A kinematic tree about a state, in its own coordinates: poses and velocities of its bodies, and back.
+"""Joint coordinates of a kinematic tree about a state: to poses and velocities of its bodies, and back.
 
 Coordinates are increments: of a root that floats its position (3) [m] and a rotation vector (3) [rad], world frame; of
 each joint what it leaves free, [rad] or [m]. A ball joint turns about the axes of its second frame. Rates are those of
@@ -21,21 +21,21 @@ from symphys.types import Expr
 Pose = tuple[Expr, Expr]
 """Position (3,) and orientation (4,)."""
 Moving = tuple[Expr, Expr]
-"""Velocity and angular velocity (3,) each."""
-NOW = ca.SX(0)
-HOME: Pose = (ca.SX.zeros(3), ca.SX([1, 0, 0, 0]))
-"""Of the world."""
+"""Velocity and angular velocity, (3,) each."""
+START = ca.SX(0)
+WORLD_POSE: Pose = (ca.SX.zeros(3), ca.SX([1, 0, 0, 0]))
+"""The pose of the world."""
 
 
 @dataclass(frozen=True)
-class TreeChart:
-    """A tree whose coordinates are asked for; bodies are keys of all mappings."""
+class JointCoordinateChart:
+    """A chart of a tree in joint coordinates; all mappings have bodies as keys."""
 
     tree: KinematicTree
     joints: Sequence[Joint]
 
     def moved(self, poses: Mapping[int, Pose], along: Expr) -> dict[int, Pose]:
-        """The poses after coordinates went on by ``along`` (size,)."""
+        """Return the poses after the coordinates changed by ``along`` (size,)."""
         own = tuple(None if link.joint is None else self.joints[link.joint] for link in self.tree.links)
         starts = [None if joint is None else self._start(link, joint, poses) for link, joint in self._links()]
         places = [poses[link.body][0] for link in self.tree.links]
@@ -52,7 +52,7 @@ class TreeChart:
         after: Mapping[int, Pose],
         angles: tuple[Mapping[str, Expr], Mapping[str, Expr]],
     ) -> Expr:
-        """(size,) coordinates that lead from one to the other, through whole turns.
+        """Return (size,) the change of coordinates between two poses, whole turns included.
 
         ``angles``: of both, ``Joint.unwrapped`` by its name.
         """
@@ -65,12 +65,12 @@ class TreeChart:
                 old, new = (self.coordinates(joint, *each) for each in zip((before, after), angles, strict=True))
                 found.append(new - old)
             elif link.count:
-                placed = self._frames(joint, before).placed(NOW)
+                placed = self._frames(joint, before).placed(START)
                 found.append(ca.mtimes(placed.b[:, : link.count].T, self._turned(link, before, after)))
         return ca.vertcat(ca.SX(0, 1), *found)
 
     def turned(self, angles: Mapping[str, Expr], along: Expr) -> dict[str, Expr]:
-        """``Joint.unwrapped`` by its name, after coordinates went on by ``along`` (size,)."""
+        """Return ``Joint.unwrapped`` by name, after coordinates changed by ``along`` (size,)."""
         return {
             joint.unwrapped: angles[joint.unwrapped] + along[list(link.coordinates)]
             for link, joint in self._links()
@@ -78,20 +78,20 @@ class TreeChart:
         }
 
     def coordinates(self, joint: Joint, poses: Mapping[int, Pose], angles: Mapping[str, Expr]) -> Expr:
-        """(count,) of a joint; ``angles``: ``Joint.unwrapped`` by its name."""
-        placed = self._frames(joint, poses).placed(NOW)
+        """Return (count,) of a joint; ``angles``: ``Joint.unwrapped`` by its name."""
+        placed = self._frames(joint, poses).placed(START)
         near = ca.SX(0, 1) if joint.unwrapped is None else angles[joint.unwrapped]
         return ca.vertcat(*(joint.value(k, placed, near) for k in range(len(joint.kind.coordinates))))
 
     def rates(self, poses: Mapping[int, Pose], moving: Mapping[int, Moving]) -> Expr:
-        """(size,) of bodies at these poses with these velocities."""
+        """Return rates (size,) of bodies at these poses with these velocities."""
         found = []
         for link, joint in self._links():
             if joint is None:
                 found += [*moving[link.body]]
                 continue
             frames = self._frames(joint, poses)
-            placed, arms = frames.placed(NOW), frames.lever_arms(NOW)
+            placed, arms = frames.placed(START), frames.lever_arms(START)
             linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
             for sign, arm, body in zip((1, -1), arms, joint.bodies, strict=False):
                 velocity, spin = moving[body]
@@ -109,11 +109,11 @@ class TreeChart:
                 found[link.body] = own[:3], own[3:]
                 continue
             frames = self._frames(joint, poses)
-            arms = frames.lever_arms(NOW)
+            arms = frames.lever_arms(START)
             above, mine = (arms[1], arms[0]) if link.sign > 0 else arms
             velocity, spin = (ca.SX.zeros(3), ca.SX.zeros(3)) if link.parent is None else found[link.parent]
             linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)
-            for k, (slide, turn) in enumerate(joint.kind.motions(frames.placed(NOW))):
+            for k, (slide, turn) in enumerate(joint.kind.motions(frames.placed(START))):
                 linear, angular = linear + own[k] * slide, angular + own[k] * turn
             after = spin + link.sign * angular
             at = velocity + ca.cross(spin, above) + link.sign * linear
@@ -121,7 +121,7 @@ class TreeChart:
         return found
 
     def held(self, poses: Mapping[int, Pose], angles: Mapping[str, Expr]) -> Expr:
-        """Return how frames of joints lie to each other (7 a joint,): rotation (4), place in the second (3) [m].
+        """Return the errors of joints (7 each): rotation (4), offset in the second frame (3) [m].
 
         For a screw its coordinate follows, and the place is that at coordinate 0. ``angles``: see ``coordinates``.
         """
@@ -136,7 +136,7 @@ class TreeChart:
         return ca.vertcat(ca.SX(0, 1), *found)
 
     def rebuilt(self, poses: Mapping[int, Pose], held: Expr) -> dict[int, Pose]:
-        """The poses in which frames lie to each other as ``held`` has it; the first link's as they are if it floats."""
+        """Return the poses with joint errors ``held``; a floating root keeps its pose."""
         found, row = dict[int, Pose](), 0
         for link, joint in self._links():
             if joint is None:
@@ -148,7 +148,7 @@ class TreeChart:
                 apart = apart + _along(joint, held[row : row + link.count])
                 row += link.count
             own, other = joint.frames if link.sign > 0 else joint.frames[::-1]
-            parent = HOME if link.parent is None else found[link.parent]
+            parent = WORLD_POSE if link.parent is None else found[link.parent]
             place, q = _frame(parent, other)
             if link.sign > 0:
                 place, q = place + rotation.rotate(q, apart), rotation.multiply(q, turn)
@@ -160,8 +160,8 @@ class TreeChart:
         return found
 
     def _sides(self, joint: Joint, poses: Mapping[int, Pose]) -> tuple[Pose, Pose]:
-        """Place and orientation of the frames of both sides."""
-        second = HOME if joint.second is None else poses[joint.second]
+        """Return the poses of the frames of both sides."""
+        second = WORLD_POSE if joint.second is None else poses[joint.second]
         return _frame(poses[joint.first], joint.frames[0]), _frame(second, joint.frames[1])
 
     def _links(self) -> Iterator[tuple[Link, Joint | None]]:
@@ -172,14 +172,14 @@ class TreeChart:
         return joint_frames_at(joint, tuple(poses[i] for i in joint.bodies))
 
     def _start(self, link: Link, joint: Joint, poses: Mapping[int, Pose]) -> JointStart:
-        """The joint as it is: what it is off is part of how its sides are apart."""
+        """Return the joint's start; its violation is part of the distance of its sides."""
         frames = self._frames(joint, poses)
-        placed, arms = frames.placed(NOW), tuple(arm.at(NOW) for arm in frames.arms)
+        placed, arms = frames.placed(START), tuple(arm.at(START) for arm in frames.arms)
         ordered = (arms[1], arms[0]) if link.sign > 0 else (arms[0], arms[1])
         return JointStart(ordered, placed.apart, joint.kind.axes(placed), HERE.turn)
 
     def _turned(self, link: Link, before: Mapping[int, Pose], after: Mapping[int, Pose]) -> Expr:
-        """(3,) rotation vector of a ball joint's first side against its second; see ``final_poses``."""
+        """Return (3,) the rotation vector of a ball joint's first side against its second."""
         own = rotation.multiply(after[link.body][1], inverse(before[link.body][1]))
         if link.parent is not None:
             parent = rotation.multiply(after[link.parent][1], inverse(before[link.parent][1]))
@@ -188,7 +188,7 @@ class TreeChart:
 
 
 def _along(joint: Joint, values: Expr) -> Expr:
-    """Return how far coordinates (count,) displace the first frame, (3,) [m], second frame."""
+    """Return the displacement (3,) [m] of the first frame by coordinates (count,), in the second frame."""
     axes = ca.DM.eye(3)[:, [each.axis for each in joint.kind.coordinates]]
     return joint.kind.transform(axes, values)[1]
 
@@ -199,5 +199,5 @@ def _frame(pose: Pose, frame: JointFrame) -> Pose:
 
 
 def inverse(q: Expr) -> Expr:
-    """(4,) of a unit quaternion."""
+    """Return the inverse (4,) of a unit quaternion."""
     return ca.vertcat(q[0], -q[1:4])

@@ -125,7 +125,7 @@ def test_small_batches_are_prepared_once_and_differences_compiled() -> None:
     motion = made.motion(guess_of(made.rollout.problem), 0.0)
     _, u, p = made.begun(motion.z)
     large = made.step.step(np.arange(len(u)), motion.x[:-1], u, p, 0.0)
-    assert len(u) > linearized_step.FEW
+    assert len(u) > linearized_step.MAX_LENT_ROWS
     for first in (0, 3, 9):
         few = slice(first, first + 4)
         found = made.step.step(np.arange(first, first + 4), motion.x[few], u[few], p, 0.0)
