@@ -1,4 +1,4 @@
-"""A batch that is done elsewhere: an engine starts drivers, and this process follows what they do and computes nothing.
+"""A batch that runs elsewhere: an engine starts drivers, and this process monitors them without computing.
 
 Results are read from run folders; messages of drivers come from their ``Board``.
 """
@@ -28,11 +28,11 @@ from symphys.runs.job import Job
 from symphys.runs.record import failure
 
 MIN_POLL_INTERVAL = 0.25
-"""[s] at least between two looks at the board."""
+"""[s] between two reads of the board, at least."""
 MIN_POLL_SPACING = 20
-"""Looking at the board takes at most one second in so many."""
+"""Least time between reads of the board, in units of the time to read it."""
 MAX_ROUNDS = 3
-"""Times that drivers are restarted while no run ends."""
+"""Largest number of restarts of drivers while no run ends."""
 GRACE_TIME = 5.0
 """[s] for drivers to end by themselves when nothing is left, and for their runs when the batch's time is up."""
 

@@ -20,7 +20,7 @@ DROPPED_FIELDS: Mapping[str, Any] = {
     **{key: {} for key in ("z", "guess", "costs", "outputs", "counts", "price", "versions", "provenance")},
     "stages": (),
 }
-"""Fields that a result loses in the memory of a batch; its folder has them."""
+"""Fields of a result that a batch drops from memory; its folder has them."""
 
 
 class Observer:
@@ -94,7 +94,7 @@ class Ledger:
                 write_table(out)
 
     def wait_for(self, indices: Collection[int]) -> None:
-        """Say, once, that the runs that are left are those that other commands are at."""
+        """Report, once, that the remaining runs are claimed by other commands."""
         if self.waited or not indices:
             return
         self.waited = True

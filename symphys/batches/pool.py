@@ -32,13 +32,13 @@ from symphys.runs.job import Job
 from symphys.solvers import TraceRow
 
 GRACE_TIME = 1.0
-"""[s] for a run to stop by itself after its timeout; then its process is killed, and its compilers with it."""
+"""[s] for a run to stop by itself after its timeout; then its process and its compilers are killed."""
 BUILDING, SOLVING = "building and compiling", "solving"
 """The phases of a run before and after its first iteration; judging announces its own parts."""
 PS_TIMEOUT = 1.0
 """[s] after which ``ps``, asked where there is no /proc, is not waited for."""
 MAX_FAILED_STARTS = 3
-"""Workers in a row that end before they are ready, after which no more are tried."""
+"""Workers in a row that may end before they are ready; then no more are started."""
 
 
 class NoWorkers(Exception):

@@ -9,7 +9,7 @@ from time import monotonic
 from symphys.runs.job import Job
 
 CLAIM_POLL_INTERVAL = 1.0
-"""[s] between two looks at a run that another command has claimed."""
+"""[s] between two checks of a run that another command has claimed."""
 
 
 class Queue:

@@ -16,7 +16,7 @@ Files = Mapping[str, bytes]
 
 
 class ExportError(SymphysError):
-    """A problem that cannot be exported, or a file in the way."""
+    """Raised for a problem that cannot be exported, or a file in the way."""
 
 
 def write_folders(folders: Mapping[Path, Files]) -> list[Path]:

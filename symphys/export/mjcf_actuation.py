@@ -30,9 +30,9 @@ from symphys.types import Array
 Inertias = Mapping[tuple[str, int], float]
 """The inertia of each coordinate of the trees [kg m^2] or [kg], by the joint's name and the number there."""
 WANTED_SPEED_ERROR, MAX_SPEED_ERROR = 0.01, 0.1
-"""Velocity error at which a motor gives its full torque, as a share of its largest velocity: desired, and allowed."""
+"""Velocity error at full torque, as a share of a motor's largest velocity: desired, and allowed."""
 MAX_STEP_PHASE, MAX_STEP_PHASE_CONTACT = 1.0, 0.125
-"""Largest h omega of a spring, and of a compliant contact: a body may have several, whose damping adds up."""
+"""Largest h omega of a spring, and of a compliant contact: the damping of several adds up."""
 MAX_PARTS = 50
 """Largest number of parts of a time step."""
 UNBOUNDED = 1e10

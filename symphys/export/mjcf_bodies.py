@@ -30,7 +30,7 @@ ROUNDING = 1e-15
 
 @dataclass(frozen=True)
 class StartState:
-    """A world in a state: at the start, or as the file of its model has it.
+    """A world in a state: at the start, or at the reference pose of its model file.
 
     Attributes:
         world: a world of numbers, without symbols.

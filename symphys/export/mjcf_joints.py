@@ -1,4 +1,4 @@
-"""Joints of trees as MJCF joints of the child, the start as numbers of a keyframe, and what ties coordinates."""
+"""Joints of trees as MJCF joints of the child, the keyframe of the start, and constraints between coordinates."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def joint_equalities(reference: StartState) -> Iterator[Element]:
 
 
 def coupled(reference: StartState, coupling: JointCoupling) -> Element:
-    """A coupling; MuJoCo counts coordinates from where they are in the file, and the polynomial with them."""
+    """Return the equality of a coupling, whose polynomial counts coordinates from the pose of the file."""
     joints = [reference.world.joints[k] for k in (coupling.first, coupling.second) if k is not None]
     shifts = [float(reference.values(joint)[0]) for joint in joints]
     polynomial = Polynomial([float(c) for c in coupling.polynomial])

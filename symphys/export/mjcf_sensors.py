@@ -1,4 +1,4 @@
-"""Sites and sensors: what formulas of a problem read where MJCF has a sensor for it."""
+"""Sites and sensors of MuJoCo for those sensors of a problem that have a counterpart."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ AT_A_POINT = {
 }
 """Formulas of a point (3,) in a body's frame."""
 ROTATED = re.compile(rf"rotate\({NUMBERS}, ([\w.]+)\)")
-"""Formulas of a vector in axes to which the quaternion goes from those of the vector."""
+"""Formula of a vector in the axes to which the quaternion rotates those of the vector."""
 SITE_TOLERANCE = 1e-9
-"""[m], or of quaternions: sites that are apart by less are one."""
+"""Distance [m], or of quaternions, below which two sites are one."""
 
 
 @dataclass
 class SensorElements:
-    """Sensors of a model.
+    """Sensors and sites of a model.
 
     Attributes:
         elements: of the sensors.
@@ -49,7 +49,7 @@ class SensorElements:
 
 
 def sensor_elements(world: World, sensors: Sequence[Sensor]) -> SensorElements:
-    """All that have a counterpart; a sensor of several formulas becomes as many, with numbers."""
+    """Return all sensors with a counterpart; those of several formulas become several, with numbers."""
     found = SensorElements()
     for sensor in sensors:
         for k, formula in enumerate(sensor.formulas):
@@ -63,7 +63,7 @@ def sensor_elements(world: World, sensors: Sequence[Sensor]) -> SensorElements:
 
 
 def reading(world: World, name: str, formula: str, sites: list[Site]) -> Element | None:
-    """The sensor of a formula that is one name; None where there is none. ``sites`` gets the one that it needs."""
+    """Return the sensor of a formula that is one name; None without one. Adds the site that it needs to ``sites``."""
     if formula == "time":
         return Element("clock", name=name)
     geared = {
@@ -83,7 +83,7 @@ def reading(world: World, name: str, formula: str, sites: list[Site]) -> Element
 
 
 def same_reading(world: World, name: str, sensed: str, turn: str | None, sites: list[Site]) -> Element | None:
-    """The sensor of MuJoCo that reads what a sensor does, after ``turn`` (4,) as text; None where there is none."""
+    """Return MuJoCo's counterpart of a sensor, after ``turn`` (4,) as text; None without one."""
     sensor = named_sensors(world).get(sensed)
     if sensor is None or sensor.kind.mjcf is None:
         return None
@@ -103,7 +103,7 @@ def same_reading(world: World, name: str, sensed: str, turn: str | None, sites: 
 
 
 def mount_of(world: World, owner: Any) -> tuple[int, Sequence[float]] | None:
-    """The body whose axes are those of a sensor, and the sensor's point (3,) on it; None where MuJoCo has none.
+    """Return the body whose axes a sensor has, and the sensor's point (3,) on it; None where MuJoCo has none.
 
     A joint's is the body that hangs on it: MuJoCo reads what a body's parent exerts on it.
     """
@@ -124,7 +124,7 @@ def site_at(
     position: Sequence[float] | None = None,
     orientation: Sequence[float] | None = None,
 ) -> Site:
-    """A site of a body with this place and these axes, any where they are None.
+    """Return a site of a body at a position and orientation, of which either may be None: any.
 
     It is made and put into ``sites`` where there is none.
     """
@@ -139,7 +139,7 @@ def site_at(
 
 
 def site_elements(sites: Sequence[Site], body: int | None) -> list[Element]:
-    """The sites of a body, in its frame; those of the world for None."""
+    """Return the sites of a body in its frame; those of the world for None."""
     return [
         Element("site", name=site.name, pos=text(site.position), quat=text(site.orientation))
         for site in sites

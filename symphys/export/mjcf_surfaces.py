@@ -92,6 +92,6 @@ def softness(law: Law, step: float, factor: float) -> dict[str, str]:
 
 
 def normal_of(world: World, sides: tuple[Side, Side]) -> tuple[Any, ...] | None:
-    """(3,): the normal of a contact with a plane; None where the frame of MuJoCo's contact turns with a body."""
+    """Return the normal (3,) of a contact with a plane; None where MuJoCo's contact frame rotates with a body."""
     shape, other = world.surface(sides[1]), world.surface(sides[0])
     return tuple(shape.normal) if isinstance(shape, Plane) and not isinstance(other, Capsule) else None

@@ -1,4 +1,4 @@
-"""Model predictive control: a plan at every tick from what is measured, and the closed loop with a plant."""
+"""Model predictive control: a plan at every tick from the measured state, and the closed loop with a plant."""
 
 from symphys.mpc.closed_loop import ClosedLoop, close_loop
 from symphys.mpc.controller import Controller

@@ -1,4 +1,4 @@
-"""The closed loop in simulated time: a controller measures a plant at every tick, and plans act when they are ready.
+"""The closed loop in simulated time: a controller measures a plant at every tick, and plans act once computed.
 
 A plan that is asked for at t acts from t + latency on. Until then the plan before goes on. The solver works on one plan
 at a time: ticks that come while it works are missed.
@@ -22,14 +22,14 @@ from symphys.mpc.plant import Plant
 from symphys.types import Array
 
 OnTick = Callable[[float], None]
-"""Is called with the simulated time [s]."""
+"""A function of the simulated time [s]."""
 MAX_KEPT_PLANS = 12
-"""Plans that are kept for pictures, at equal distances."""
+"""Largest number of plans that are kept for pictures, at equal distances."""
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """What happened.
+    """The states, inputs, plans and latencies of a closed loop.
 
     Attributes:
         plant: that was controlled.
@@ -65,7 +65,7 @@ class ClosedLoop:
 
     @property
     def share(self) -> float:
-        """Of the ticks whose plan was ready before the next one."""
+        """The share of ticks whose plan was ready before the next tick."""
         return self.in_time / max(self.ticks, 1)
 
 
@@ -73,7 +73,7 @@ class Loop:
     """A closed loop, tick by tick."""
 
     def __init__(self, controller: Controller, plant: Plant) -> None:
-        """RecedingPlan once from the first state, before time begins."""
+        """Plan once from the first state, before time begins."""
         self.controller, self.plant = controller, plant
         self.horizon, self.settings = controller.horizon, controller.horizon.plant
         self._rng = np.random.default_rng([self.settings.seed, 1])
@@ -90,7 +90,7 @@ class Loop:
         self.states, self.inputs = [self.x], list[Array]()
 
     def tick(self, number: int, keep: bool) -> None:
-        """One tick: a plan is asked for unless the solver is busy; then the plant goes on to the next."""
+        """Advance by one tick: request a plan unless the solver is busy, then simulate to the next tick."""
         now = number * self.horizon.tick
         if now >= self.ready - 1e-12:
             self._ask(now, keep)
@@ -133,7 +133,7 @@ class Loop:
         return self.controller.reader.noisy(self.x, settings.noise, settings.rate_noise, self._rng)
 
     def result(self, ticks: int, stopped: str) -> ClosedLoop:
-        """What happened in so many ticks."""
+        """Return the closed loop after so many ticks."""
         columns = {key: np.array(values, float) for key, values in self.log.items()}
         gained = columns.pop("gained") > 0
         return ClosedLoop(

@@ -1,4 +1,4 @@
-"""What a closed loop leaves behind: its record, the motion of the plant, and the files of its run folder."""
+"""The record of a closed loop, the motion of the plant, and the files of its run folder."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 
 MAX_VALUES = 24
-"""Quantities of a plan that are recorded."""
+"""Largest number of recorded quantities of a plan."""
 
 
 def record_of(loop: ClosedLoop) -> ClosedLoopRecord:
-    """The record of a closed loop."""
+    """Return the record of a closed loop."""
     controller, horizon = loop.controller, loop.controller.horizon
     settings = horizon.plant
     kind = settings.latency if isinstance(settings.latency, str) else f"{settings.latency:g}"
@@ -75,7 +75,7 @@ def _number(kind: str) -> float:
 
 
 def differences(settings: PlantSettings) -> str:
-    """What the plant differs in, but for its step, in words."""
+    """Return the differences of the plant from the model, except for its step, in words."""
     parts = [f"masses times {settings.masses:g}"] if settings.masses != 1 else []
     parts += [f"{key} = {value}" for key, value in settings.set.items()]
     if settings.noise or settings.rate_noise:
@@ -86,7 +86,7 @@ def differences(settings: PlantSettings) -> str:
 
 
 def target_record(loop: ClosedLoop, target: Target) -> TargetRecord:
-    """How far the plant is from a target at the end, and for how long it has been within its tolerance."""
+    """Return the error of a target at the end, and how long it has been within its tolerance."""
     rollout, count = loop.plant.rollout, len(loop.x)
     u = np.concatenate([loop.u, loop.u[-1:]])
     p, z = np.tile(loop.plant.p[:, None], count), np.zeros((int(rollout.z.shape[0]), count))
@@ -98,7 +98,7 @@ def target_record(loop: ClosedLoop, target: Target) -> TargetRecord:
 
 
 def quantities(rollout: Rollout, floating: Sequence[str], x: Array, p: Array) -> tuple[tuple[str, ...], Array]:
-    """What is drawn of states (K, nx): coordinates of joints, positions of bodies that float; names, and (K, q)."""
+    """Return names and values (K, q) of drawn quantities: joint coordinates, positions of floating bodies."""
     world, layout = rollout.world, Layout(rollout.world)
     read = reading_function(world, rollout.parameters.symbols).map(len(x))
     coordinates = np.array(read(x[:, : layout.size].T, np.tile(p[:, None], len(x)))[0]).T.reshape(len(x), -1)
@@ -109,7 +109,7 @@ def quantities(rollout: Rollout, floating: Sequence[str], x: Array, p: Array) ->
 
 
 def write_closed_loop(loop: ClosedLoop, folder: Path) -> tuple[ClosedLoopRecord, Trajectory]:
-    """Write the files of a run folder, each at once and whole; the record last."""
+    """Write the files of a run folder, each atomically, the record last."""
     problem = loop.plant.problem
     motion, record = loop.plant.motion(loop.time, loop.x, loop.u), record_of(loop)
     files.make_folder(folder)

@@ -1,4 +1,4 @@
-"""``symphys.identify``: what recordings say about the variables of a problem; replays of the worst recordings."""
+"""``symphys.identify``: estimates of a problem's variables from recordings; replays of the worst recordings."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from symphys.trajectory import Trajectory, shapes
 from symphys.types import Array
 
 STATE_FILE = "identification_state.json"
-"""Of a folder: where an interrupted fit goes on."""
+"""The file of an output folder from which an interrupted fit resumes."""
 FIRST_DAMPING = 1e-6
-"""The first of the fit. Of 285 tosses of a cube 25 steps from it bring the merit to 0.055e6; from 1e-3 15 to 0.30e6."""
+"""First damping of the fit: for 285 tosses of a cube 1e-6 gives 0.055e6 in 25 steps, 1e-3 0.30e6 in 15."""
 CHOICES = {"loss": ("squares", "huber"), "check": ("none", "cma")}
-"""Settings that have one of some values."""
+"""Settings with a fixed set of values."""
 Monitor = Callable[[FitStep], None]
 
 
@@ -46,7 +46,7 @@ def identify(
     stop: Callable[[], bool] | None = None,
     **settings: Any,
 ) -> Identification:
-    """Estimate a problem's variables from its recordings, and say what one may believe of the estimates.
+    """Estimate a problem's variables from its recordings, with uncertainty and residual analysis.
 
     Args:
         problem: what ``load`` takes, with [[recording]] tables.
@@ -97,7 +97,7 @@ def identify(
 
 
 def with_settings(given: IdentifySettings, settings: dict[str, Any]) -> IdentifySettings:
-    """Replace settings of the file; SymphysError names one that there is not, or that has no such value."""
+    """Replace settings of the file; SymphysError names an unknown setting or an invalid value."""
     for name in settings:
         if name not in vars(given):
             raise SymphysError(f"identify has no setting {name!r}; {hint(name, vars(given))}")
@@ -122,7 +122,7 @@ def state_key(problem: Problem, settings: IdentifySettings) -> str:
 
 
 def saved_state(folder: Path, key: str, residuals: RecordingResiduals) -> FitState | None:
-    """Read where an interrupted fit of the same problem stopped; None where there is none."""
+    """Read the state of an interrupted fit of the same problem; None without one."""
     if not (folder / STATE_FILE).exists():
         return None
     saved = files.read_json(folder / STATE_FILE)
@@ -130,9 +130,9 @@ def saved_state(folder: Path, key: str, residuals: RecordingResiduals) -> FitSta
 
 
 MAX_REPLAYS = 3
-"""Recordings that are replayed."""
+"""Largest number of replayed recordings."""
 POSE = re.compile(r"(?P<body>[^.]+)\.(?P<field>position|orientation)(\[(?P<component>[0-9])\])?")
-"""A quantity that is a pose, or one number of it."""
+"""Pattern of a quantity that is a pose, or one number of it."""
 
 
 def worst_replays(

@@ -1,4 +1,4 @@
-"""What a problem predicts for each of its recordings, and the derivatives of that by what is identified."""
+"""Predictions of a problem for each of its recordings, and their derivatives by the identified numbers."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from symphys.transcription.simulation import recorder, simulate
 from symphys.types import Array
 
 SAMPLE_TOLERANCE = 1e-9
-"""Steps: a sample so near to the start of a step is there."""
+"""Distance [steps] from the start of a step within which a sample is at the start."""
 SCALED_FIELDS = ("position", "velocity")
-"""What a scale of lengths scales of a start."""
+"""Fields of a start that a scale of lengths multiplies."""
 
 
 @dataclass(frozen=True)
 class PredictedSamples:
-    """A recording as it is predicted.
+    """The prediction of a recording.
 
     Attributes:
         values: (n, m) the quantities at its samples, of the world, not scaled.
@@ -46,7 +46,7 @@ class PredictedSamples:
 
 
 class Predictor:
-    """Simulates recordings: what was measured, at the times of the samples.
+    """Simulates recordings: the measured quantities at the times of the samples.
 
     The simulation's z has first what recordings set at the start, then what drives it, then the problem's variables.
 
@@ -58,7 +58,7 @@ class Predictor:
     """
 
     def __init__(self, problem: Problem, recordings: Sequence[Recording], threads: int | None = None) -> None:
-        """Trace the simulation, which is compiled when it is first used; KernelUnavailable where it cannot be."""
+        """Trace the simulation, which is compiled at first use; KernelUnavailable without a compiler."""
         self.recordings, self.dt = tuple(recordings), problem.simulation.dt
         last = math.ceil(max(r.time[-1] for r in self.recordings) / self.dt - SAMPLE_TOLERANCE)
         steps = max(last, problem.simulation.steps) + 2
@@ -83,7 +83,7 @@ class Predictor:
         self._recorded = np.array([self._coordinates(each) for each in self.recordings])
 
     def values(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[PredictedSamples]:
-        """The recordings at shared (s,) and own (K, o) numbers."""
+        """Predict the recordings at shared (s,) and own (K, o) numbers."""
         set_ = [self._set(shared, own[k], k) for k in which]
         lasts = [each.last(self._motion.steps) for each in set_]
         for each, samples in zip(set_, self._motion.values(np.array([e.z for e in set_]), lasts), strict=True):
@@ -100,7 +100,7 @@ class Predictor:
             yield PredictedSamples(values, by, each.scale, each.by_scale)
 
     def impacts(self, shared: Array, own: Array, which: Sequence[int]) -> Iterator[Array]:
-        """Yield (i,) [s] the instants of impacts of the recordings, on their clocks."""
+        """Yield the times (i,) [s] of impacts of the recordings, on their clocks."""
         set_ = [self._set(shared, own[k], k) for k in which]
         lasts = [each.last(self._motion.steps) for each in set_]
         z = np.array([each.z for each in set_])
@@ -109,7 +109,7 @@ class Predictor:
             yield impact_times(velocity.reshape(len(velocity), -1, 3), self._gravity, self.dt) - offset
 
     def motion(self, shared: Array, own: Array, k: int) -> tuple[Trajectory, int, Array]:
-        """A recording's motion by the exact rollout, how many of its steps were measured, and when."""
+        """Return a recording's motion by the exact rollout, the number of its measured steps, and its start time."""
         each, rollout = self._set(shared, own, k), self._motion.rollout
         record = simulate(rollout, recorder(rollout), each.z, 0.0)
         return record.motion, each.last(rollout.steps), each.at * self.dt
@@ -154,7 +154,7 @@ class Predictor:
         return _Set(z, along, at, by[offset], measured[scale], by[scale])
 
     def _start(self, recording: Recording, guess: Array) -> Array:
-        """Return (n,) z at the guess, with what the recording sets."""
+        """Return z (n,) of the guess with the values that the recording sets."""
         z = guess.copy()
         for variable, part in zip(self._given, self._parts, strict=True):
             z[part] = recording.start.get(variable.slots[0].name, variable.guess)
@@ -188,7 +188,7 @@ class Predictor:
 
 @dataclass(frozen=True)
 class _Set:
-    """z (n,) of a recording with its derivatives (n, s + o), places of samples in steps, and how it was measured."""
+    """z (n,) of a recording with derivatives (n, s + o), places of samples in steps, and scale of lengths."""
 
     z: Array
     along: Array
@@ -198,12 +198,12 @@ class _Set:
     by_scale: Array
 
     def last(self, steps: int) -> int:
-        """The last state that is needed."""
+        """Return the last state that is needed."""
         return int(min(max(math.floor(self.at[-1] + SAMPLE_TOLERANCE) + 1, 1), steps - 1))
 
 
 def given_variables(problem: Problem, recordings: Sequence[Recording]) -> tuple[Variable, ...]:
-    """Return what recordings set at the start, as variables that no solver chooses."""
+    """Return the initial values that recordings set, as variables that no solver chooses."""
     names = dict.fromkeys(name for recording in recordings for name in recording.start)
     nominal = problem.initial | {
         f"{joint.name}.{UNWRAPPED}": problem.parametric.starts()[f"{joint.name}.start"]
@@ -218,7 +218,7 @@ def _given(name: str, nominal: Array) -> Variable:
 
 
 def interpolated(samples: Array, at: Array) -> tuple[Array, Array]:
-    """Interpolate rows of samples (steps, ...) at places in steps (n,): (n, ...), and the slope by the place."""
+    """Interpolate rows of samples (steps, ...) at places in steps (n,): (n, ...), and the derivative by place."""
     first = np.clip(np.floor(at + SAMPLE_TOLERANCE).astype(int), 0, len(samples) - 2)
     share = np.clip(at - first, 0, 1).reshape(-1, *[1] * (samples.ndim - 1))
     share = np.where(share < SAMPLE_TOLERANCE, 0.0, share)
@@ -227,15 +227,15 @@ def interpolated(samples: Array, at: Array) -> tuple[Array, Array]:
 
 
 MIN_JUMP_SHARE = 0.1
-"""Share of the greatest speed of a body in a motion by which its velocity jumps at an impact, at least."""
+"""Least jump of a body's velocity at an impact, as a share of its greatest speed in the motion."""
 MIN_JUMP_BY_GRAVITY = 3.0
-"""And by so many times what gravity changes in a step: bodies that come to rest or rock have no impacts."""
+"""Least jump in units of gravity's change in a step: resting or rocking bodies have no impacts."""
 IMPACT_OFFSET = 1e-6
-"""Steps: an impact is counted from just after the start of its step, so that a sample there is before it."""
+"""Offset [steps] of an impact from the start of its step, so that a sample there is before it."""
 
 
 def impact_times(velocity: Array, gravity: Array, dt: float) -> Array:
-    """Return (i,) [s] the starts of steps with an impact, of velocities (n, bodies, 3) [m/s] at the starts of n steps.
+    """Return the times (i,) [s] of steps with an impact, of velocities (n, bodies, 3) [m/s] before n steps.
 
     An impact changes a velocity by more than gravity (3,) [m/s^2] and by another amount than the step before, so that
     motors and springs, which act over many steps, make none. The first step has none: nothing is before it.

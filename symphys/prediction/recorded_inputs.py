@@ -1,4 +1,4 @@
-"""Recorded commands, forces and torques as inputs of the time steps, and how these change with a delay.
+"""Recorded commands, forces and torques as inputs of the time steps, and their derivatives by a delay.
 
 Inputs act over a whole step. That of step k is the mean of the recorded one over the step, so that its impulse is
 exact, whatever the rates of samples and steps:
@@ -21,11 +21,11 @@ from symphys.transcription.randomization.sampler import hidden
 from symphys.types import Array
 
 JUMP_TOLERANCE = 1e-9
-"""Of a step: a jump so near to the end of a step is there."""
+"""Distance [steps] from the end of a step within which a jump is at the end."""
 
 
 def input_variables(recordings: Iterable[Recording], steps: int) -> tuple[Variable, ...]:
-    """Return a variable for each recorded input, with a knot for each step, that nobody chooses; 0 at its guess."""
+    """Return a variable for each recorded input, with a knot for each step; no solver chooses it."""
     sizes = {name: each.values.shape[1] for recording in recordings for name, each in recording.inputs.items()}
     return tuple(
         hidden(f"{name}:recorded", "control", VariableSlot(name, tuple(range(size))), np.zeros(size * steps), steps)
@@ -34,7 +34,7 @@ def input_variables(recordings: Iterable[Recording], steps: int) -> tuple[Variab
 
 
 def delays(recording: Recording) -> Mapping[str, float]:
-    """[s] of its inputs, by the names with which variables set them: ``knee.command.delay``."""
+    """Return the delays [s] of a recording's inputs by name: ``knee.command.delay``."""
     return {f"{name}.delay": each.delay for name, each in recording.inputs.items()}
 
 

@@ -1,4 +1,4 @@
-"""mpc.json and mpc.npz of a run folder: one definition for who writes and who reads.
+"""mpc.json and mpc.npz of a run folder: one definition for writer and reader.
 
 | file | holds |
 |---|---|
@@ -57,7 +57,7 @@ class TargetRecord:
 
     @property
     def met(self) -> bool:
-        """Whether it holds at the end; NaN never does."""
+        """Whether the target holds at the end; NaN never does."""
         return self.error <= self.tolerance
 
 
@@ -131,12 +131,12 @@ class ClosedLoopRecord:
 
     @property
     def done(self) -> bool:
-        """Whether it went to its end and every target is met there; without targets, that it went to its end."""
+        """Whether the loop ran to its end and meets every target there."""
         return not self.stopped and all(target.met for target in self.targets)
 
     @property
     def held(self) -> float:
-        """[s] for how long all targets were met without a break up to the end."""
+        """Return how long [s] up to the end all targets were met without a break."""
         return min((target.held for target in self.targets), default=0.0)
 
     @property

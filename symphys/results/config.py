@@ -1,4 +1,4 @@
-"""config.json: what exactly was asked for, and the key by which a finished run is recognised."""
+"""config.json: the settings of a run, and the key by which a finished run is recognised."""
 
 from __future__ import annotations
 

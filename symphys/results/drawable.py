@@ -1,4 +1,4 @@
-"""What can be drawn: axes, their ticks and what is computed from positions overflow far below the largest double.
+"""Drawable numbers: axes, their ticks and derived lengths overflow far below the largest double.
 
 Tables have every number as it is. Figures leave out what is beyond ``MAX_DRAWABLE``, and the page says so.
 """
@@ -13,17 +13,17 @@ import numpy as np
 
 T = TypeVar("T")
 MAX_DRAWABLE = 1e50
-"""In whatever unit: no length, cost or time of a sensible motion is near it, and its sixth power is a double still."""
+"""Largest drawable number in any unit; its sixth power is still a double."""
 OVERSIZED = f"Numbers beyond {MAX_DRAWABLE:g} are left out of the figures; tables have them."
 
 
 def small(numbers: Any) -> bool:
-    """Whether all of them are finite and can be drawn."""
+    """Whether all numbers are finite and can be drawn."""
     return bool(np.all(np.abs(np.asarray(numbers, float)) <= MAX_DRAWABLE))
 
 
 def largest(array: Any) -> float:
-    """Return the largest size of those that are finite; 0 without any."""
+    """Return the largest size of the finite numbers; 0 without any."""
     sizes = np.abs(np.asarray(array, float))
     return float(np.max(sizes[np.isfinite(sizes)], initial=0.0))
 

@@ -1,4 +1,4 @@
-"""scene.json: what a picture of a motion needs of its world. Frozen records, their writing and their reading.
+"""scene.json: the part of a world that pictures of a motion need. Frozen records, their writing and their reading.
 
 What cannot be read, or is too large to draw, is left out of the picture.
 """
@@ -109,7 +109,7 @@ def _points(value: object) -> Array:
 
 
 SIZES: dict[int, Callable[[object], Any]] = {0: _points, 1: values.number, 3: values.vector}
-"""How a size is read, by its ``SizeKey.count``."""
+"""Readers of a size, by its ``SizeKey.count``."""
 
 
 def _orientation(value: object) -> Array:
@@ -189,7 +189,7 @@ class SceneTerrain:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> SceneTerrain | None:
-        """Terrain; None if its heights are no grid over rising x and y."""
+        """Read terrain; None if its heights are no grid over rising x and y."""
         entry = values.table(value)
         x, y, rows = values.numbers(entry.get("x")), values.numbers(entry.get("y")), entry.get("z")
         found = [values.numbers(row) for row in rows] if isinstance(rows, list) else []

@@ -14,13 +14,13 @@ from symphys.files import check_regular, emptied
 from symphys.json_values import name, table, words
 
 LARGE_FIELDS = ("z", "trust")
-"""The objects of result.json that take most of it, and that no table shows."""
+"""The largest objects of result.json, which no table shows."""
 READ_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 MAX_READ_BYTES = 2**20
 
 
 class ReportError(SymphysError):
-    """A folder or file from which no report can be made."""
+    """Raised for a folder or file from which no report can be made."""
 
 
 def read_words(path: Path) -> str:

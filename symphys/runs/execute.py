@@ -1,4 +1,4 @@
-"""One run from its beginning to a finished folder: claim it, solve, judge by the exact rollout, examine, write."""
+"""One run from start to finished folder: claim it, solve, judge by the exact rollout, examine, write."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ JUDGING = "rolling it out exactly"
 CHECKPOINT_INTERVAL = 10.0
 """[s] at least between two checkpoints of a run."""
 MIN_CHECKPOINT_SPACING = 50
-"""Writing checkpoints takes at most one second in so many."""
+"""Least time between checkpoints, in units of the time to write one."""
 
 
 def no_callback(_: object) -> None:
@@ -146,7 +146,7 @@ def with_claim(
 
 
 def is_over(job: Job, found: RunInspection) -> bool:
-    """Whether there is nothing to do: the run is over and not to be repeated."""
+    """Whether the run is over and not to be repeated."""
     return found.state not in UNFINISHED and (not job.outdated or found.stamp != job.outdated)
 
 

@@ -44,7 +44,7 @@ class RunFolder:
         settings: Mapping[str, object] | None = None,
         guess: str = "",
     ) -> RunFolder:
-        """OUT/<case>/<solver>-seed<k>; FileError for a problem whose name would lead out of OUT."""
+        """Return OUT/<case>/<solver>-seed<k>; FileError for a problem whose name would lead out of OUT."""
         if problem in {"", ".", ".."}:
             raise files.FileError(f"a problem called {problem!r} can have no folder: rename its file")
         return cls(out / case_name(problem, settings or {}, guess) / f"{solver}-seed{seed}")

@@ -1,4 +1,4 @@
-"""Another run as the guess: its variables by name, resampled onto the problem's knots, its motion, its multipliers."""
+"""Another run as the guess: its variables, resampled onto the problem's knots, its motion, its multipliers."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class GuessOrigin:
 
     @property
     def word(self) -> str:
-        """The part of a folder's name that tells guesses apart; empty without one."""
+        """The part of a folder's name that distinguishes guesses; empty without one."""
         return f"guess={self.digest[:DIGEST_DIGITS]}" if self.digest else ""
 
 

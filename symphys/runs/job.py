@@ -1,4 +1,4 @@
-"""Jobs: runs that are asked for, with problem, solver, seed and folder."""
+"""Jobs: requested runs, with problem, solver, seed and folder."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from symphys.solvers import SOLVERS, recorded_options, solver
 
 @dataclass(frozen=True)
 class Job:
-    """A run that is asked for, with everything it needs; may be sent to another process.
+    """A requested run with everything that it needs; may be sent to another process.
 
     Attributes:
         problem: what to solve.
@@ -65,7 +65,7 @@ class Job:
 
     @property
     def smooth(self) -> bool:
-        """Whether the solver will ask for rollouts at a smoothing above 0."""
+        """Whether the solver will use a smoothing above 0."""
         return self.problem.simulation.smoothing[0] > 0
 
 
@@ -115,7 +115,7 @@ def solver_options(problem: Problem, name: str) -> Any:
 
 
 def check_tables(problem: Problem) -> None:
-    """ProblemError if a [solver.NAME] table is of no solver, or sets what that solver does not take."""
+    """Raise ProblemError for a [solver.NAME] table of an unknown solver, or with an unknown option."""
     require_solvers(problem.solver_tables, problem.solvers or (), SOLVERS, problem.file)
     for name in problem.solver_tables:
         solver_options(problem, name)

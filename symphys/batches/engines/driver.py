@@ -1,4 +1,4 @@
-"""A driver: a process that an engine has started, on any machine, and that does runs of a batch until none is left.
+"""A driver: a process, started by an engine on any machine, that does runs of a batch until none is left.
 
 Drivers do not know each other: each run is claimed in its folder by one of them, as by any other command. They report
 to the command that started them through a ``Board``, a folder of small files.

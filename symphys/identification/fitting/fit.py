@@ -1,4 +1,4 @@
-"""The fit of all recordings, with noise that is not given estimated beside it."""
+"""The fit of all recordings, alternating with estimates of unknown noise."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from symphys.identification.interface import RecordedResiduals, Rows
 from symphys.types import Array, Ints
 
 MAX_ROUNDS = 20
-"""Turns of fit and noise at most."""
+"""Largest number of alternations between fit and noise."""
 MIN_NOISE_CHANGE = 1e-3
-"""The noise stands where its deviations change by less than this share."""
+"""Relative change of the noise below which it has converged."""
 EARLY_TOLERANCE = 0.1
-"""Standard errors that a fit may leave of a share of the recordings that is the start of another."""
+"""Standard errors that may remain in a fit to a first share of the time, which starts another fit."""
 COARSE_TOLERANCE = 1e-2
-"""Standard errors that a fit may leave while the noise still changes."""
+"""Standard errors that may remain in a fit while the noise still changes."""
 
 Monitor = Callable[[FitStep, FitState], None]
 
 
 @dataclass(frozen=True, eq=False)
 class FittedRecordings:
-    """A fit with the noise that goes with it.
+    """A fit together with its noise.
 
     Attributes:
         problem: residuals divided by the noise, as given or estimated.
@@ -86,7 +86,7 @@ def fit_part(
     monitor: Monitor | None,
     stop: Callable[[], bool] | None,
 ) -> FittedRecordings:
-    """Fit one share of the recordings; fit and noise take turns."""
+    """Fit one share of the recordings, alternating between fit and noise."""
     known = bool(problem.noise_known.all())
     if known:
         outcome = RecordingFit(problem, options, which).run(start, monitor, stop)
@@ -113,7 +113,7 @@ def fit_part(
 def own_numbers(
     problem: RecordedResiduals, shared: Array, own: Array, which: Ints, options: FitOptions, early: bool
 ) -> Array:
-    """Fit (K, o) own numbers to the recordings in ``which``; ``early``: to what is before their first impact.
+    """Fit own numbers (K, o) to the recordings in ``which``; ``early``: only before their first impact.
 
     Shared numbers stay. A recording whose simulation is not finite there keeps its own numbers.
     """
@@ -126,7 +126,7 @@ def own_numbers(
 
 
 def described(problem: RecordedResiduals, outcome: FitOutcome, which: Ints, loss: RobustLoss) -> FittedRecordings:
-    """Add the uncertainty where a fit ended."""
+    """Add the uncertainty at the end of a fit."""
     shared, own = outcome.state.shared, outcome.state.own
     evaluated = problem.jacobian(shared, own, which)
     if not outcome.system.finite:

@@ -1,4 +1,4 @@
-"""Recordings of which only a part counts: a first share of their time, or what is before the first impact.
+"""Recordings restricted to a first share of their time, or to the time before the first impact.
 
 After an impact a motion depends on its start more and more steeply, and where it leads to other impacts the merit has a
 minimum for each. A fit of the first third of each recording has few of them. It is the start of a fit of the first
@@ -16,7 +16,7 @@ from symphys.identification.interface import DerivedResiduals, RecordedResiduals
 from symphys.types import Array, Bools, Ints
 
 Selection = Callable[[ResidualRows], Bools]
-"""Of the m rows of a recording: (m,) which count."""
+"""The m rows of a recording -> (m,) which of them count."""
 
 
 def first_share(share: float) -> Selection:
@@ -31,10 +31,10 @@ def before_impact(rows: ResidualRows) -> Bools:
 
 
 class PartialRecordings(DerivedResiduals):
-    """A problem of which only some rows of each recording count."""
+    """A problem with some rows of each recording only."""
 
     def __init__(self, problem: RecordedResiduals, selection: Selection) -> None:
-        """Take the rows that ``selection`` chooses, which is called once for each recording."""
+        """Take the rows chosen by ``selection``, which is called once for each recording."""
         super().__init__(problem)
         self.selection = selection
         self._kept: dict[int, Bools] = {}

@@ -1,4 +1,4 @@
-"""Steps at a kink of the merit, from the Jacobians of both of its sides.
+"""Steps at a kink of the merit, from the Jacobians on both sides.
 
 An impact that falls on a sample gives the merit a kink: one side has the velocity before the impact, the other that
 after it. The Jacobian of one side then promises a fall across the kink that is not there. A bundle method (Lemaréchal
@@ -22,15 +22,15 @@ from symphys.identification.fitting.remaining import DeterminedArrow
 from symphys.types import Array, Bools, Ints
 
 MAX_WEIGHTED_SIDES = 200
-"""Sides of single recordings that have a part in a step: those that differ most."""
+"""Largest number of sides of single recordings in a step; the most different ones are taken."""
 SUM_WEIGHT = 1e4
-"""Weight of the equations that the shares of a recording add up to 1."""
+"""Weight of the equations that make the shares of a recording sum to 1."""
 RELATIVE_RIDGE = 1e-12
 """Share of its largest diagonal that is added to the quadratic program."""
 
 
 class KinkedModel:
-    """The merit about a point with the sides that are known.
+    """The model of the merit about a point with the known sides.
 
     Attributes:
         system: the arrow at the point.
@@ -40,17 +40,17 @@ class KinkedModel:
     """
 
     def __init__(self, system: ArrowSystem, unit: float) -> None:
-        """Begin with the side of the arrow."""
+        """Start with the side of the arrow."""
         self.system, self.unit = system, unit
         self.gradients, self.gaps = system.gradients[None], np.zeros((1, len(system.costs)))
 
     @property
     def sides(self) -> int:
-        """Return how many sides are known."""
+        """Return the number of known sides."""
         return len(self.gaps)
 
     def add(self, there: ArrowSystem, shared: Array, own: Array) -> None:
-        """Add the side of a point at the step (s,), (K, o) from here."""
+        """Add the side of a point at the step (s,), (K, o)."""
         step = np.concatenate([np.broadcast_to(shared, (len(own), len(shared))), own], axis=1)
         bent = np.einsum("kij,kj->ki", there.blocks, step)
         costs = there.costs - 2 * np.sum(there.gradients * step, axis=1) + np.sum(bent * step, axis=1)
@@ -58,13 +58,13 @@ class KinkedModel:
         self.gaps = np.concatenate([self.gaps, np.abs(self.system.costs - costs)[None]])
 
     def expected_fall(self, shared: Array, own: Array) -> float:
-        """Return by how much the model lowers the merit with a step (s,), (K, o)."""
+        """Return the decrease of the merit predicted for a step (s,), (K, o)."""
         step = np.concatenate([np.broadcast_to(shared, (len(own), len(shared))), own], axis=1)
         more = 2 * np.sum((self.gradients - self.gradients[0]) * step, axis=2) - self.gaps
         return self.system.expected_fall(shared, own) - float(np.sum(np.max(more, axis=0)))
 
     def step(self, arrow: DeterminedArrow) -> tuple[Array, Array, float]:
-        """Compute the step (s,), (K, o) in scales, and the fall that it promises."""
+        """Compute the step (s,), (K, o) in scales, and the predicted decrease."""
         s, base = self.system.s, self.system.gradients
         taken, sides = self._taken(arrow)
         prior = self.system.prior_gradient * arrow.units[0, :s]
@@ -83,7 +83,7 @@ class KinkedModel:
         return *arrow.step(combined), fall + gap
 
     def _taken(self, arrow: DeterminedArrow) -> tuple[Ints, Array]:
-        """Return (N, 2) recordings and sides that have a part, and (P, K, s) the right sides of all."""
+        """Return (N, 2) recordings and sides in the step, and (P, K, s) the right sides of all."""
         s, sides = self.system.s, arrow.sides(self.gradients)
         off, own = sides - sides[0], (self.gradients - self.gradients[0])[..., s:] * arrow.units[:, s:]
         apart = np.einsum("pks,st,pkt->pk", off, arrow.shared_inverse, off)
@@ -95,7 +95,7 @@ class KinkedModel:
         return np.stack([k, p], axis=1), sides
 
     def _shares(self, arrow: DeterminedArrow, taken: Ints, sides: Array, own: Array, prior: Array) -> Array:
-        """Return (N,) shares of the sides ``taken``, at least 0, that add up to 1 for each recording."""
+        """Return (N,) shares of the sides ``taken``, at least 0, that sum to 1 for each recording."""
         k, p = taken.T
         mine, same = sides[p, k], k[:, None] == k
         alone = np.setdiff1d(np.arange(len(self.system.costs)), k)

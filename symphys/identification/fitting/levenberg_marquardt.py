@@ -1,4 +1,4 @@
-"""The fit of all recordings at once, by Levenberg-Marquardt on the arrow of shared and own numbers.
+"""The fit of all recordings by Levenberg-Marquardt on the arrow matrix of shared and own numbers.
 
 The merit is sum rho(r) over all residuals and priors, in scaled numbers. The loop, the damping and the active set are
 those of ``solvers.core.levenberg_marquardt``; the linear system is solved by a Schur complement over recordings
@@ -38,26 +38,28 @@ from symphys.solvers.core.levenberg_marquardt import (
 from symphys.types import Array, Bools, Ints
 
 EXACT_MERIT = 1e-16
-"""Merit per residual below which recordings are met exactly: residuals of 1e-8 of the noise."""
+"""Merit per residual below which the fit is exact: residuals of 1e-8 of the noise."""
 RELATIVE_ROUNDING = 1e-14
-"""A fall of the merit by this share of itself cannot be told from rounding."""
+"""Relative decrease of the merit that cannot be distinguished from rounding."""
 MIN_PROGRESS = 1e-2
-"""A fall of the merit by this share of itself per residual is progress: that of a tenth of a standard error."""
+"""Relative decrease of the merit per residual that is progress: a tenth of a standard error."""
 MIN_SHARE_OF_MODEL = 1e-2
-"""Of the fall that the model promises: where so many steps as patience lasts bring less, it is another merit."""
+"""Share of the predicted decrease below which, over ``patience`` steps, the model is wrong."""
 MIN_GAIN_AT_KINK = 0.1
-"""``MIN_GAIN_RATIO`` where the sides of a kink are collected: a step that gains less shows one more side."""
+"""``MIN_GAIN_RATIO`` while the sides of a kink are collected: a step with less gain adds one more side."""
 KINK_ERRORS = 1e-2
-"""Standard errors: sides are collected where more are left, and a kink is a minimum where they promise no more. At most
-as many are left as noise makes, the root of how many numbers there are: more is another minimum, or chaos."""
+"""Standard errors to the minimum above which sides of a kink are collected; below it the kink counts as a minimum.
+
+Noise explains at most the square root of the number of numbers: a larger distance is another minimum, or chaos.
+"""
 NEARLY_CONVERGED_ERRORS = 0.1
-"""Standard errors that may be left where the merit does not fall any more: intervals are no narrower than that."""
+"""Standard errors that may remain at a stalled fit: intervals are no narrower than that."""
 RETRY_DAMPINGS = (1e-4, 1e-2, 1.0, 1e2, 1e6)
 """Damping of own numbers, by the largest diagonal of a recording, where the whole step makes that recording worse."""
 MAX_MODEL_EXCESS = 0.05
-"""Share of its cost by which a recording may end above its model."""
+"""Relative excess of a recording's cost over its model that needs no retry."""
 MAX_SIDES = 8
-"""Points whose Jacobians are collected in an iteration."""
+"""Largest number of points whose Jacobians are collected in an iteration."""
 EXACTLY = "the recordings are met exactly"
 BUDGET = "the iterations are used up: raise `iterations`"
 STOPPED = "interrupted: the state goes on from here"
@@ -81,11 +83,11 @@ TRIALS = "the simulation of {names} is not finite at any step from the best poin
 
 
 Step = tuple[Array, Array]
-"""Of the shared (s,) and the own (k, o) numbers, in scales."""
+"""Step of the shared (s,) and the own (k, o) numbers, in scales."""
 
 
 class Moved(NamedTuple):
-    """Numbers after a step within the bounds.
+    """The numbers after a step within the bounds.
 
     Attributes:
         shared, own: (s,) and (K, o).
@@ -110,7 +112,7 @@ class RecordingFit:
         weights: Array | None = None,
         hold_shared: bool = False,
     ) -> None:
-        """``which`` are fitted, those not held back by default; their costs count ``weights`` (K,) times."""
+        """Fit ``which``, by default all that are not held back; their costs have the weights (K,)."""
         self.problem, self.options, self.loss = problem, options, options.loss
         self.which = np.flatnonzero(~problem.held_back) if which is None else which
         if not self.which.size:
@@ -125,7 +127,7 @@ class RecordingFit:
         monitor: Callable[[FitStep, FitState], None] | None = None,
         stop: Callable[[], bool] | None = None,
     ) -> FitOutcome:
-        """Fit from the guess, or go on from ``start``; ``stop`` is asked and ``monitor`` told after each iteration."""
+        """Fit from the guess, or resume from ``start``; call ``stop`` and ``monitor`` after each iteration."""
         began = time.perf_counter()
         state = start or begin(self.problem.shared.guess, self.problem.own.guess)
         system = self.system(state.shared, state.own)
@@ -150,20 +152,20 @@ class RecordingFit:
                 monitor(state.history[-1], state)
 
     def system(self, shared: Array, own: Array) -> ArrowSystem:
-        """The arrow at shared (s,) and own (K, o) numbers, of the recordings that are fitted."""
+        """Return the arrow at shared (s,) and own (K, o) numbers, for the fitted recordings."""
         self.jacobians += len(self.which)
         evaluated = self.problem.jacobian(shared, own, self.which)
         return assemble(self.problem, evaluated, shared, own, self.which, self.loss, self.weights)
 
     def _first(self, begun: FitState, system: ArrowSystem, began: float) -> FitState:
-        """The first iteration sets lambda."""
+        """Return the first state, which sets lambda."""
         diagonals = np.diagonal(system.blocks, axis1=1, axis2=2)
         size = float(np.max(diagonals, initial=0.0))
         state = replace(begun, mark=system.cost, first=len(begun.history), **first_damping(self.options.damping, size))
         return self.recorded(state, system, 0.0, began)
 
     def recorded(self, state: FitState, system: ArrowSystem, step: float, began: float) -> FitState:
-        """The state with a row of its history."""
+        """Return the state with a row of its history."""
         row = FitStep(
             iteration=len(state.history),
             merit=system.cost,
@@ -177,13 +179,13 @@ class RecordingFit:
         return replace(state, history=(*state.history, row))
 
     def free(self, state: FitState, system: ArrowSystem) -> tuple[Bools, Bools]:
-        """(s,) and (k, o) of the recordings that are fitted: False where a bound holds a number."""
+        """Return (s,) and (k, o) of the fitted recordings: False where a bound holds a number."""
         shared = movable_numbers(self.problem.shared, state.shared, system.shared_gradient)
         own = movable_numbers(self.problem.own, state.own, system.own_gradient, self.which)
         return shared & (not self.hold_shared), own
 
     def left(self, state: FitState, system: ArrowSystem) -> float:
-        """Standard errors between the state and where its quadratic model has the minimum."""
+        """Return the standard errors between the state and the minimum of its quadratic model."""
         return self.errors(system.expected_fall(*system.step(0.0, *self.free(state, system))), system)
 
     def _ended(self, state: FitState, system: ArrowSystem) -> tuple[FitStatus, str] | None:
@@ -207,25 +209,25 @@ class RecordingFit:
         return None
 
     def _hopeless(self, state: FitState, left: float) -> bool:
-        """Whether the last steps have brought next to nothing of the fall that goes with so many standard errors."""
+        """Whether the last steps have achieved almost nothing of the predicted decrease."""
         patience, last = self.options.patience, state.history[-1]
         if not patience or last.iteration - state.first < patience:
             return False
         return state.history[-1 - patience].merit - last.merit < MIN_SHARE_OF_MODEL * left**2 * last.merit / self.size
 
     def determined(self, state: FitState, system: ArrowSystem, damping: float = 0.0) -> DeterminedArrow:
-        """Without what is vague at the state."""
+        """Return the system at the state without directions that are not determined."""
         numbers = (self.problem.shared, self.problem.own), (state.shared, state.own)
         return DeterminedArrow(system, number_units(*numbers, self.free(state, system), self.which), damping)
 
     def errors(self, fall: float, system: ArrowSystem) -> float:
-        """A fall of the merit in standard errors."""
+        """Convert a decrease of the merit to standard errors."""
         return math.sqrt(max(0.0, fall) * self.size / system.cost) if system.cost > 0 else 0.0
 
     def _step(
         self, state: FitState, system: ArrowSystem, began: float
     ) -> tuple[FitState, ArrowSystem] | tuple[FitStatus, str] | tuple[FitStatus, str, Array]:
-        """One step that lowers the merit, and the system there; lambda grows until there is one.
+        """Take a step that lowers the merit, with the system there; lambda grows until there is one.
 
         Else how the fit ended, and at a kink how far from the shared numbers (s,) one side has its minimum.
         """
@@ -247,13 +249,13 @@ class RecordingFit:
 
     @staticmethod
     def _stalled(reason: str, left: float) -> tuple[FitStatus, str]:
-        """Near the minimum of the model that is as good as there."""
+        """Return the end of a stalled fit, which counts as converged near the minimum of the model."""
         if left <= NEARLY_CONVERGED_ERRORS:
             return FitStatus.CONVERGED, NEARLY.format(left=left)
         return FitStatus.STALLED, reason.format(left=left)
 
     def moved(self, state: FitState, d_shared: Array, d_own: Array) -> Moved:
-        """After a step (s,), (k, o) in scales, within the bounds."""
+        """Return the numbers after a step (s,), (k, o) in scales, within the bounds."""
         shared_of, own_of, which = self.problem.shared, self.problem.own, self.which
         shared = np.clip(state.shared + shared_of.scale * d_shared, shared_of.lower, shared_of.upper)
         own = state.own.copy()
@@ -264,23 +266,23 @@ class RecordingFit:
         return Moved(shared, own, taken, length)
 
     def step_of(self, state: FitState, own: Array) -> Array:
-        """(k, o): the step to own numbers (K, o), in scales."""
+        """Return (k, o) the step to own numbers (K, o), in scales."""
         return np.asarray(((own - state.own) / self.problem.own.scale)[self.which])
 
     def costs(self, shared: Array, own: Array, some: Ints | None = None) -> tuple[Array, float]:
-        """(k,) costs of the recordings ``which[some]``, by default all, and that of the shared priors."""
+        """Return (k,) costs of the recordings ``which[some]``, by default all, and that of the shared priors."""
         which, weights = (self.which, self.weights) if some is None else (self.which[some], self.weights[some])
         self.simulations += len(which)
         return costs(self.problem, shared, own, which, self.loss, weights)
 
     def _vague(self, arrow: DeterminedArrow) -> str:
-        """Numbers that take part in a direction that is not determined."""
+        """Return the numbers in directions that are not determined."""
         shared = [name for name, vague in zip(self.problem.shared.names, arrow.vague_shared, strict=True) if vague]
         counts = zip(self.problem.own.names, arrow.vague_own.sum(axis=0), strict=True)
         return ", ".join([*shared, *(f"{name} of {count} recordings" for name, count in counts if count)])
 
     def names(self, recordings: Array) -> str:
-        """Of those whose costs are not finite."""
+        """Return the names of recordings whose costs are not finite."""
         bad = [
             self.problem.recordings[k] for k, cost in zip(self.which, recordings, strict=True) if not np.isfinite(cost)
         ]
@@ -288,7 +290,7 @@ class RecordingFit:
 
 
 Taken = tuple[Moved, ArrowSystem] | tuple[FitStatus, str] | tuple[FitStatus, str, Array]
-"""Where a step leads and the system there, or how the fit ended."""
+"""The state after a step and the system there, or how the fit ended."""
 
 
 class RecordedModel(LocalModel[Moved, Taken]):
@@ -304,7 +306,7 @@ class RecordedModel(LocalModel[Moved, Taken]):
     """
 
     def __init__(self, fit: RecordingFit, state: FitState, system: ArrowSystem) -> None:
-        """Before the first trial."""
+        """Start without trials."""
         self.fit, self.state, self.system = fit, state, system
         self.merit, self.left, self.refused = system.cost, state.history[-1].left, ""
         self._free = fit.free(state, system)
@@ -324,7 +326,7 @@ class RecordedModel(LocalModel[Moved, Taken]):
         return Trial(moved, merit, self._sides.expected_fall(*moved.taken))
 
     def judge(self, moved: Moved, gain: float) -> Taken | Refusal:
-        """Take a step that lowers the merit enough; at a kink one that does not shows one more side."""
+        """Accept a step that lowers the merit enough; at a kink a refused one adds one more side."""
         better = gain > (MIN_GAIN_AT_KINK if self._kinked else MIN_GAIN_RATIO)
         if better or (self._kinked and not self.refused):
             there = self.fit.system(moved.shared, moved.own)
@@ -338,7 +340,7 @@ class RecordedModel(LocalModel[Moved, Taken]):
         return Refusal.STIFFER
 
     def _with_side(self, there: ArrowSystem, taken: Step) -> Taken | Refusal | None:
-        """Add the side of a refused step: whether a minimum is shown, or a step by one more side; None: too many."""
+        """Add the side of a refused step; return the end of the fit, a new step, or None for too many sides."""
         fit, model = self.fit, self._sides
         model.add(there, *taken)
         arrow = fit.determined(self.state, self.system)
@@ -352,7 +354,7 @@ class RecordedModel(LocalModel[Moved, Taken]):
         return None
 
     def _direction(self, damping: float) -> Step:
-        """The next step: by the sides of a kink, without what is vague, or damped."""
+        """Return the next step: by the sides of a kink, in determined directions, or damped."""
         fit, state, system = self.fit, self.state, self.system
         if self._kinked:
             return self._sides.step(fit.determined(state, system, damping))[:2]
@@ -361,7 +363,7 @@ class RecordedModel(LocalModel[Moved, Taken]):
         return system.step(damping, *self._free)
 
     def _retried(self, moved: Moved, reached: Array, damping: float) -> tuple[Moved, Array]:
-        """The same and its costs (k,), with shorter steps of recordings that the whole step made worse.
+        """Return the step and its costs (k,), with shorter steps of recordings that became worse.
 
         Own numbers of a recording have no effect on others, so that one that leaves its model need not hold up all.
         """
@@ -388,6 +390,6 @@ class RecordedModel(LocalModel[Moved, Taken]):
 
 
 def movable_numbers(parameters: FitParameters, values: Array, gradient: Array, which: Ints | None = None) -> Bools:
-    """``movable`` of shared numbers (s,), or of the own numbers (K, o) of the recordings in ``which`` (k, o)."""
+    """Apply ``movable`` to shared numbers (s,), or to own numbers (K, o) of the recordings ``which``."""
     some = slice(None) if which is None else which
     return movable(values[some], parameters.lower[some], parameters.upper[some], gradient)

@@ -1,4 +1,4 @@
-"""Noise that is not given: its standard deviation from what is left, quantity by quantity.
+"""Unknown noise: its standard deviation, estimated from the residuals, quantity by quantity.
 
 sigma^2 = sum psi(r / sigma)^2 / (beta (m - h)), with m residuals of the quantity, h their leverage (how many numbers
 they determine), and beta the mean of psi^2 under normal noise (Huber's proposal 2). In least squares that is the
@@ -17,18 +17,18 @@ from symphys.identification.interface import DerivedResiduals, RecordedResiduals
 from symphys.types import Array, Ints
 
 MIN_NOISE_FACTOR = 1e-12
-"""A factor on the guess of a noise is at least so large: recordings that are met exactly have none."""
+"""Least factor on the guess of a noise: residuals of exact recordings have none."""
 MIN_DEGREES_OF_FREEDOM = 0.5
-"""Residuals less their leverage that an estimate needs."""
+"""Least number of residuals less their leverage for an estimate."""
 MAX_ITERATIONS, MIN_CHANGE = 50, 1e-4
-"""Turns of Huber's proposal 2 on the same residuals, at most, and the change at which they end."""
+"""Iterations of Huber's proposal 2 on the same residuals, at most, and the change at which they end."""
 
 
 class RescaledResiduals(DerivedResiduals):
-    """A problem whose residuals of each quantity are divided by a factor more."""
+    """A problem whose residuals of each quantity are divided by an additional factor."""
 
     def __init__(self, problem: RecordedResiduals, factors: Array) -> None:
-        """Multiply the noise that the problem divides by with ``factors`` (q,) by quantity."""
+        """Multiply the noise of the problem by ``factors`` (q,) by quantity."""
         super().__init__(problem)
         self.factors = factors
         self._divisors: dict[int, Array] = {}
@@ -60,7 +60,7 @@ class RescaledResiduals(DerivedResiduals):
 def noise_factors(
     problem: RecordedResiduals, evaluated: Rows, which: Ints, loss: RobustLoss, information: Information
 ) -> Array:
-    """Estimate (q,) the noise of each quantity by what its residuals are divided by; 1 where it is given."""
+    """Estimate (q,) the factor on the noise of each quantity; 1 where it is given."""
     count = len(problem.quantities)
     quantities, leverages = [], []
     for at, (k, (_, by_shared, by_own)) in enumerate(zip(which, evaluated, strict=True)):

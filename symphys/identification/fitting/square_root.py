@@ -1,4 +1,4 @@
-"""Least squares by square roots: singular values of rows in place of eigenvalues of their squares.
+"""Least squares by square roots: singular values of rows instead of eigenvalues of their squares.
 
 J'J has the square of the condition of J, and squares lose half of the digits: a J of condition 1e8 leaves a J'J that is
 singular to rounding. Everything here works on rows F with F'F = J' C J, whose singular values are right to rounding of
@@ -17,13 +17,13 @@ from symphys.types import Array, Bools
 
 EPS = float(np.finfo(float).eps)
 ROUNDING = 1e-13
-"""Singular values of columns of length 1 below this share of the largest are rounding, whatever the derivatives are."""
+"""Singular values of columns of length 1, relative to the largest, that always count as rounding."""
 NO_EFFECT = 1e-14
-"""A column shorter than this share of the longest, in scaled numbers, is rounding."""
+"""Relative length below which a column, in scaled numbers, counts as rounding."""
 NOISE_FACTOR = 5.0
-"""Singular values up to so many times the measured noise of the derivatives are rounding."""
+"""Factor on the measured noise of the derivatives below which singular values are rounding."""
 MIN_TOUCHED_COMPONENT = 1e-3
-"""A number takes part in a direction without information if its component is larger."""
+"""Least component with which a number takes part in a direction without information."""
 
 
 def triangle(rows: Array) -> Array:
@@ -38,7 +38,7 @@ def triangle(rows: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Root:
-    """The pseudo-inverse P of rows F (..., m, n), so that P P' = (F'F)^-1 without what has no information.
+    """The pseudo-inverse P of rows F (..., m, n), so that P P' = (F'F)^-1 in directions with information.
 
     Attributes:
         inverse: (..., n, m) P.
@@ -89,7 +89,7 @@ def pseudo_root(rows: Array, noise: Array | float = 0.0) -> Root:
 
 @dataclass(frozen=True, eq=False)
 class Eliminated:
-    """Rows of K recordings without their own numbers.
+    """Rows of K recordings with the own numbers eliminated.
 
     Attributes:
         own: the pseudo-inverses of the own columns.

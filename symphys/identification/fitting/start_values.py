@@ -1,4 +1,4 @@
-"""Where shared numbers begin that have no effect at their guess.
+"""Other start values of shared numbers that have no effect at their guess.
 
 Friction so high that balls stick has no effect: the merit has no slope there, and a fit stays. Such a number is tried
 at several values, each the start of a few steps of all numbers; the fit begins at the best.
@@ -18,19 +18,19 @@ from symphys.identification.interface import FitParameters, RecordedResiduals
 from symphys.types import Array, Ints
 
 GUESS_FACTORS = (0.01, 0.03, 0.1, 0.3, 0.5, 2.0, 4.0, 10.0)
-"""Of a guess other than 0."""
+"""Factors on a guess other than 0."""
 RANGE_SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Of the range between two bounds; of a number at 0 with an open bound, of ten scales to both sides."""
+"""Shares of the range between two bounds; of ten scales to both sides for a number at 0 with an open bound."""
 TRIAL_STEPS = 4
-"""Of all numbers, from each value."""
+"""Steps of all numbers from each value."""
 MIN_GAIN = 4.0
-"""Another start is taken where it lowers the merit by so many times the merit per residual: two standard errors."""
+"""Least decrease, in merits per residual, for another start: two standard errors."""
 
 
 def begin_with_effect(
     problem: RecordedResiduals, options: FitOptions, which: Ints, stop: Callable[[], bool] | None = None
 ) -> FitState:
-    """Return the guess, with other values of shared numbers without an effect there; ``notes`` say which."""
+    """Return the guess, with other values of shared numbers without effect, which ``notes`` list."""
     shared, own, notes = problem.shared.guess.copy(), problem.own.guess, list[str]()
     for j in without_effect(problem, options, which) if options.start_values else ():
         name, guess = problem.shared.names[j], float(shared[j])
@@ -53,7 +53,7 @@ def begin_with_effect(
 
 
 def without_effect(problem: RecordedResiduals, options: FitOptions, which: Ints) -> Ints:
-    """Shared numbers whose standard error at the guess, all others known, is ``VAGUE_ERROR`` times their size."""
+    """Return shared numbers whose standard error at the guess is ``VAGUE_ERROR`` times their size."""
     parameters = problem.shared
     system = RecordingFit(problem, options, which).system(parameters.guess, problem.own.guess)
     if not system.finite:
@@ -64,7 +64,7 @@ def without_effect(problem: RecordedResiduals, options: FitOptions, which: Ints)
 
 
 def values_to_try(parameters: FitParameters, j: int) -> list[float]:
-    """Other values of a number, rising: multiples of its guess, and shares of the range between its bounds."""
+    """Return other values of a number, rising: multiples of its guess, shares of the range between its bounds."""
     guess, lower, upper = (float(each[j]) for each in (parameters.guess, parameters.lower, parameters.upper))
     found = {guess * factor for factor in GUESS_FACTORS}
     if np.isfinite(lower) and np.isfinite(upper):

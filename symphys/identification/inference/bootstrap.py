@@ -1,4 +1,4 @@
-"""Intervals from a bootstrap over recordings: each draw has as many recordings as there are, with replacement.
+"""Bootstrap intervals over recordings: each draw has as many recordings as there are, with replacement.
 
 A draw is one Gauss-Newton step from the estimate with the Jacobians kept, own numbers eliminated: a linear solve of the
 size of the shared numbers, so that thousands of draws take milliseconds. It is exact where the model is linear within
@@ -25,13 +25,13 @@ from symphys.identification.interface import IdentificationError, RecordedResidu
 from symphys.types import Array, Ints
 
 MIN_RECORDINGS = 5
-"""Recordings that a bootstrap needs."""
+"""Least number of recordings for a bootstrap."""
 MIN_DRAWS = 100
-"""Draws that an interval needs."""
+"""Least number of draws for an interval."""
 MIN_INFORMATION_SHARE = 1e-10
-"""A draw with less than this share of the information of all recordings along a direction has none there."""
+"""Share of the information of all recordings below which a draw has none along a direction."""
 DRAWS_PER_BATCH = 256
-"""Draws that are solved at once, so that memory does not grow with them."""
+"""Draws that are solved at once, which bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def bootstrap(
     draws: int = 2000,
     seed: int = 0,
 ) -> Bootstrap:
-    """About the estimate (s,), whose arrow is ``system``; the same draws for the same seed.
+    """Bootstrap about the estimate (s,), whose arrow is ``system``; equal seeds give equal draws.
 
     Raises:
         IdentificationError: too few draws for an interval.
@@ -88,7 +88,7 @@ def no_bootstrap(s: int, note: str) -> Bootstrap:
 
 
 def resampling_weights(recordings: int, draws: int, seed: int) -> Array:
-    """Draw (draws, K) how often each recording is in each draw."""
+    """Draw (draws, K) the number of occurrences of each recording in each draw."""
     stream = np.random.default_rng(seed)
     return stream.multinomial(recordings, np.full(recordings, 1 / recordings), size=draws).astype(float)
 
@@ -96,7 +96,7 @@ def resampling_weights(recordings: int, draws: int, seed: int) -> Array:
 def steps(
     problem: RecordedResiduals, shared: Array, system: ArrowSystem, information: Information, weights: Array
 ) -> Array:
-    """Compute (b, s) where one Gauss-Newton step with the weights (b, K) leads, within the bounds."""
+    """Compute (b, s) the estimates after one Gauss-Newton step with the weights (b, K), within the bounds."""
     s, whitener = len(shared), information.shared.whitener
     sides = system.gradients[:, :s] + np.einsum("kos,ko->ks", information.gain, system.own_gradient)
     rows = information.left @ whitener

@@ -1,4 +1,4 @@
-"""Is what the fit leaves noise, or an effect that the model misses?
+"""Residual analysis: whether residuals are noise, or show an effect that the model lacks.
 
 Noise has no memory and no course. Of each quantity this measures the correlation from one sample to the next with the
 test of Ljung and Box (1978), pooled over recordings and components, and the share of squares that means explain: over
@@ -21,14 +21,13 @@ from symphys.types import Array, Bools, Ints
 
 COLUMNS = ("quantity", "component", "time", "noise", "impact")
 MAX_LAGS = 10
-"""ResidualSamples over which the test looks."""
+"""Largest lag of the test."""
 MIN_RESIDUALS = 20
-"""Residuals that a verdict needs."""
+"""Least number of residuals for a verdict."""
 TIME_BINS = 8
-"""Means over a time."""
+"""Number of means over a time."""
 MAX_AUTOCORRELATION, MAX_PROBABILITY, MAX_EXPLAINED_SHARE = 0.2, 1e-3, 0.1
-"""An effect is missing where the correlation is above the first, or where means explain more than the third, and the
-probability of that under noise is below the second."""
+"""Bounds of a missing effect: correlation or explained share above, and its probability under noise below."""
 COURSE_NAMES = {
     "by_time": "the time in the recording",
     "by_impact": "the time since the impact",
@@ -74,7 +73,7 @@ def samples(problem: RecordedResiduals, shared: Array, own: Array, which: Ints) 
 
 
 def study(problem: RecordedResiduals, found: ResidualSamples) -> tuple[QuantityResiduals, ...]:
-    """Each quantity that has residuals."""
+    """Study each quantity that has residuals."""
     entries = []
     for index, name in enumerate(problem.quantities):
         part = found.of(index)
@@ -117,7 +116,7 @@ def quantity_residuals(name: str, unit: str, known: bool, part: ResidualSamples)
 
 
 def judged(found: QuantityResiduals, courses: Sequence[str]) -> QuantityResiduals:
-    """Add the verdict, in words; ``courses``: the shares that count."""
+    """Add the verdict in words; ``courses``: the significant shares."""
     if found.count < MIN_RESIDUALS:
         return replace(found, verdict="too few", text=f"{found.count} residuals are too few for a verdict")
     reasons = [f"{getattr(found, name):.0%} depends on {COURSE_NAMES[name]}" for name in courses]
@@ -158,7 +157,7 @@ def ljung_box(runs: Sequence[Array]) -> tuple[float, float, int]:
 
 
 def binned(time: Array, component: Ints) -> Ints:
-    """Return (m,) the group of each sample: one of ``TIME_BINS`` parts in the order of time, by component."""
+    """Return (m,) the group of each sample: one of ``TIME_BINS`` parts in order of time, by component."""
     if not time.size:
         return np.zeros(0, np.int64)
     edges = np.unique(np.quantile(time, np.linspace(0, 1, TIME_BINS + 1)[1:-1]))
@@ -166,7 +165,7 @@ def binned(time: Array, component: Ints) -> Ints:
 
 
 def explained(r: Array, group: Ints) -> tuple[float, float]:
-    """Share of the squares that the means of groups explain, adjusted for their number; its probability under noise.
+    """Return the share of the squares that group means explain, adjusted, and its probability under noise.
 
     The share is 0 at least, and nan where there are too few; the probability is that of the F test.
     """
@@ -184,7 +183,7 @@ def explained(r: Array, group: Ints) -> tuple[float, float]:
 
 
 def rms(values: Array) -> float:
-    """Root mean square; nan of none."""
+    """Return the root mean square; nan without values."""
     return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
 
 
@@ -217,17 +216,17 @@ def recording_errors(problem: RecordedResiduals, found: ResidualSamples) -> Arra
 
 @runtime_checkable
 class SimulatedImpacts(Protocol):
-    """A problem of identification that simulates when impacts are."""
+    """A problem of identification that also simulates the times of impacts."""
 
     def simulated_impacts(self, shared: Array, own: Array, which: Ints) -> list[Array]:
-        """Return (i,) [s] the instants of impacts, rising, of each recording in ``which``."""
+        """Return the times (i,) [s] of impacts, rising, of each recording in ``which``."""
 
 
 class TimedRecordings(DerivedResiduals):
-    """A problem whose rows have the time since the last impact, from instants of all recordings."""
+    """A problem whose rows have the time since the last impact."""
 
     def __init__(self, problem: RecordedResiduals, impacts: Sequence[Array]) -> None:
-        """Take the instants of impacts (i,) [s] of each of the K recordings, rising."""
+        """Take the times of impacts (i,) [s] of each of the K recordings, rising."""
         super().__init__(problem)
         self.impacts = impacts
 
@@ -240,7 +239,7 @@ class TimedRecordings(DerivedResiduals):
 
 
 def timed(problem: RecordedResiduals, source: RecordedResiduals, shared: Array, own: Array) -> RecordedResiduals:
-    """Return ``problem`` with the impacts that ``source`` simulates at shared (s,), own (K, o), if it simulates any."""
+    """Return ``problem`` with the impacts that ``source`` simulates at shared (s,), own (K, o), if it does."""
     if not isinstance(source, SimulatedImpacts):
         return problem
     return TimedRecordings(problem, source.simulated_impacts(shared, own, np.arange(len(own))))

@@ -1,4 +1,4 @@
-"""Standard errors, 95 % intervals and correlations of what was estimated, from the Jacobian at the estimate.
+"""Standard errors, 95 % intervals and correlations of the estimates, from the Jacobian there.
 
 With H the arrow of second derivatives and M that of the squares of the scores, the covariance is H^-1 M H^-1. In least
 squares M is H, and the covariance its inverse, which is the Cramer-Rao bound under normal noise. Under Huber's loss M
@@ -40,16 +40,16 @@ from symphys.types import Array, Bools, Ints
 
 CONFIDENCE_LEVEL = 0.95
 SUSPICIOUS = 1e-8
-"""Singular values below this share of the largest are compared with the rounding of the derivatives."""
+"""Relative singular values below which the rounding of the derivatives is measured."""
 RELATIVE_NUDGE = 8 * EPS
-"""Relative change of all numbers at which the Jacobian is evaluated once more, to see its rounding."""
+"""Relative change of all numbers with which the Jacobian is evaluated again, to measure its rounding."""
 MAX_DERIVATIVE_NOISE = 1e-9
-"""Largest rounding, as a share of the longest column; a larger change comes from a kink."""
+"""Largest rounding, relative to the longest column; a larger change comes from a kink."""
 
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """The arrow at an estimate with the own numbers eliminated, in scaled numbers; k recordings that were fitted.
+    """The arrow at an estimate with own numbers eliminated, in scaled numbers; k fitted recordings.
 
     Attributes:
         shared: the root of the Schur complement S, priors included.
@@ -112,7 +112,7 @@ class Uncertainty:
 def make_information(
     system: ArrowSystem, free_shared: Bools, free_own: Bools, noise: tuple[Array, Array] | None = None
 ) -> Information:
-    """Eliminate the own numbers from an arrow, (s,) and (k, o) of whose numbers are free.
+    """Eliminate the own numbers of an arrow, of whose numbers (s,) and (k, o) are free.
 
     ``noise``: (k, n, n) rows of the rounding of the roots, and (k, o) the lengths of its own columns.
     """
@@ -129,7 +129,7 @@ def make_information(
 
 
 def covariances(bread: Information, meat: ArrowSystem) -> tuple[Array, Array, Bools]:
-    """Scaled covariances H^-1 M H^-1: (s, s), and (k, o) variances of own numbers; (s,) shared ones left open."""
+    """Return scaled covariances H^-1 M H^-1: (s, s), (k, o) variances of own numbers, (s,) open shared ones."""
     s, inverse = meat.s, bread.shared.square
     ahead = meat.roots[:, :, :s] + meat.roots[:, :, s:] @ bread.gain
     moves = ahead @ bread.shared.whitener @ bread.shared.whitener.T
@@ -145,7 +145,7 @@ def covariances(bread: Information, meat: ArrowSystem) -> tuple[Array, Array, Bo
 def derivative_noise(
     problem: RecordedResiduals, evaluated: Rows, shared: Array, own: Array, which: Ints, loss: RobustLoss
 ) -> tuple[Array, Array]:
-    """Rounding of the Jacobian: how it changes where all numbers change by units of their last digit.
+    """Measure the rounding of the Jacobian: its change when all numbers change in their last digits.
 
     Returns:
         (k, n, n) roots of the changes of each recording, and (k, o) lengths of those of its own columns, in scales.
@@ -223,5 +223,5 @@ def uncertainty(
 
 
 def at_bound(parameters: FitParameters, values: Array, free: Bools) -> Ints:
-    """-1 for numbers that the lower bound holds, 1 for the upper one, else 0."""
+    """Return -1 for numbers at the lower bound, 1 at the upper one, else 0."""
     return np.where(free, 0, np.where(values <= parameters.lower, -1, 1))

@@ -1,4 +1,4 @@
-"""identification.json and identification.npz of a run folder: one definition for who writes and who reads.
+"""identification.json and identification.npz of a run folder: one definition for writer and reader.
 
 | file | holds |
 |---|---|
@@ -24,7 +24,7 @@ from symphys.types import Array
 
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """A shared number; nan is what is not known.
+    """The estimate of a shared number; nan where unknown.
 
     Attributes:
         name, unit: as reports show them.
@@ -56,7 +56,7 @@ class ParameterEstimate:
 
 @dataclass(frozen=True)
 class OpenDirection:
-    """Numbers that the recordings do not determine.
+    """A direction of numbers that the recordings do not determine.
 
     Attributes:
         names: of the shared numbers that take part.
@@ -77,7 +77,7 @@ class OpenDirection:
 
 @dataclass(frozen=True)
 class QuantityResiduals:
-    """The residuals that the fit leaves of a measured quantity; nan is what is not known.
+    """The residuals of a measured quantity after the fit; nan where unknown.
 
     Attributes:
         name, unit: of the quantity.
@@ -158,7 +158,7 @@ class GlobalSearch:
 IDENTIFICATION, ARRAYS = "identification.json", "identification.npz"
 FORMAT = 1
 HISTORY = ("iteration", "merit", "left", "damping", "step", "simulations", "jacobians", "seconds")
-"""Columns of the iterations: ``left`` are standard errors to where the Jacobian puts the minimum."""
+"""Columns of the iterations: ``left`` are standard errors to the minimum of the quadratic model."""
 ARRAY = {"array": True}
 """Metadata of fields in the archive."""
 
@@ -242,7 +242,7 @@ class Identification:
         return found[name]
 
     def own_numbers(self, recording: str) -> dict[str, tuple[float, float]]:
-        """Own numbers of a recording by name, each with its standard error; KeyError without such a recording."""
+        """Return own numbers of a recording by name, each with its standard error; KeyError if unknown."""
         if recording not in self.recordings:
             raise KeyError(
                 f"no recording {recording}: there are {len(self.recordings)}, the first {self.recordings[:1]}"

@@ -1,4 +1,4 @@
-"""What a folder of an identification holds of single recordings: what was measured, and what is simulated instead.
+"""Recordings in an identification folder: the measured and the simulated motion.
 
 | file | holds |
 |---|---|

@@ -1,4 +1,4 @@
-"""Rows kept beside the run folders, one JSON line each, to which any number of processes and machines may append.
+"""The journal: rows cached beside the run folders, one JSON line each; any number of processes may append.
 
 A line is written by a single append, and begins with a checksum. So a line that was torn, or written into by another
 machine, is recognised and skipped: its run is read again. Of several lines of one run the last counts. A row counts
@@ -25,19 +25,19 @@ from symphys.results.file_names import RESULT
 from symphys.results.table.columns import FIXED, MAX_EXACT_INTEGER, NUMBERS, numeric
 
 JOURNAL_FILE = ".runs.jsonl"
-"""Of the journal, in the folder that `symphys solve --out` names."""
+"""The name of the journal, in the folder that `symphys solve --out` names."""
 ROW_FORMAT = 1
-"""The format of rows: lines of another are skipped."""
+"""The format of rows; lines of another format are skipped."""
 LINE_PREFIX = b'{"crc":"'
-"""What every line begins with; eight digits follow, then ``",``, then what they are the checksum of."""
+"""The beginning of every line; eight digits follow, then ``",``, then the text of their checksum."""
 BODY_START = len(LINE_PREFIX) + 10
-"""Where that begins."""
+"""The offset of the checksummed text."""
 TEXTS = frozenset(FIXED) - NUMBERS - {"solved"}
 """Columns that hold texts."""
 REQUIRED = ("problem", "case", "solver", "verdict")
-"""Those that every row has, beside "solved"."""
+"""Columns that every row has, besides "solved"."""
 INFINITE = ("inf", "-inf")
-"""Numbers that JSON has no other way to write; what is nan has no entry."""
+"""Texts for numbers that JSON cannot write; nan has no entry."""
 Stamp = tuple[int, int]
 """Time of change [ns] and size [bytes] of a result.json."""
 
@@ -82,7 +82,7 @@ class Journal:
             self.append({place: Kept(stamp, row)})
 
     def append(self, found: Mapping[str, Kept]) -> bool:
-        """Add lines by one write; whether that could be done. What could not be added is read from the folders."""
+        """Add lines by one write; return whether that succeeded. Lost rows are read from the folders."""
         text = b"".join(line(place, kept) for place, kept in found.items())
         try:
             handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
@@ -135,7 +135,7 @@ def line(place: str, kept: Kept) -> bytes:
 
 
 def entry(text: bytes) -> Iterable[tuple[str, Kept]]:
-    """Return the run and its row in a line; nothing for one that is damaged. What a torn line was glued to is found."""
+    """Return the run and its row in a line; nothing for a damaged one. A line after a torn one is found."""
     text = text[max(text.rfind(LINE_PREFIX), 0) :].rstrip(b"\n")
     body = text[BODY_START:]
     if not text.startswith(LINE_PREFIX) or text[len(LINE_PREFIX) : BODY_START] != b'%08x",' % zlib.crc32(body):
@@ -150,7 +150,7 @@ def entry(text: bytes) -> Iterable[tuple[str, Kept]]:
 
 
 def sound(row: Mapping[str, Any]) -> bool:
-    """Whether a row has what every row has, and the types that its columns have."""
+    """Whether a row has the required columns with their types."""
     for column, value in row.items():
         kind = type(value)
         if kind is str:

@@ -1,4 +1,4 @@
-"""The rows of all runs below a folder: those that are kept and still right, and the others from their folders."""
+"""The rows of all runs below a folder: cached ones that are valid, and the others from their folders."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from symphys.results.table.journal import JOURNAL_FILE, Journal, Kept, Stamp, st
 Progress = Callable[[int, int], None]
 """A function of the number of folders that are read, and of those that must be read."""
 MAX_ANCESTORS = 2
-"""How far above a folder its journal may lie: that of a run is two above."""
+"""Levels above a folder that may hold its journal: that of a run is two above."""
 MIN_UNKEPT = 100
-"""A journal is begun where so many folders had to be read: fewer take no time."""
+"""Number of uncached folders from which a journal is begun: fewer take no time."""
 ROWS_PER_WRITE = 500
-"""Rows that are kept by one write, so that an interruption loses few."""
+"""Rows that one write adds, so that an interruption loses few."""
 MAX_LINE_RATIO = 2
-"""A journal with so many times as many lines as runs is written anew."""
+"""Ratio of lines to runs from which a journal is rewritten."""
 
 
 @dataclass
@@ -152,7 +152,7 @@ def is_right(kept: Kept | None, now: Stamp) -> bool:
 
 @dataclass
 class Keeper:
-    """Appends to a journal what was read, many rows at once; where it is worth it, and as long as that can be done."""
+    """Appends rows to a journal in blocks, where it pays and as long as it can be written."""
 
     journal: Journal
     prefix: str
