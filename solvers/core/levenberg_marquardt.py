@@ -46,11 +46,11 @@ class Damped:
     growth: float
     stiffest: float
 
-    def stiffer(self) -> Self:
+    def more_damped(self) -> Self:
         """Return the state with more damping, after a refused step."""
         return replace(self, damping=self.damping * self.growth, growth=2 * self.growth)
 
-    def softer(self, gain: float) -> Self:
+    def less_damped(self, gain: float) -> Self:
         """Return the state with the damping after a step with this gain ratio."""
         share = min(max(gain, 0.0), 1.0)
         return replace(self, damping=self.damping * max(MIN_DAMPING_FACTOR, 1 - (2 * share - 1) ** 3), growth=2.0)
@@ -123,7 +123,7 @@ def descend(model: LocalModel[StepT, EndT], state: DampedT) -> tuple[EndT | None
         gain = (model.merit - trial.merit) / trial.expected if modelled else -math.inf
         found = model.judge(trial.step, gain)
         if not isinstance(found, Refusal):
-            return found, state.softer(gain)
+            return found, state.less_damped(gain)
         if found is Refusal.STIFFER:
-            state = state.stiffer()
+            state = state.more_damped()
     return None, state

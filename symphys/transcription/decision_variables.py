@@ -35,9 +35,9 @@ def blocks(problem: Problem) -> tuple[VariableBlock, ...]:
 
 
 def start_of(
-    problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr, beside: Sequence[str] = ()
+    problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr, excluded: Sequence[str] = ()
 ) -> RolloutStart:
-    """Return the start of a rollout of z, without the inputs of the variables ``beside``, which are added elsewhere."""
+    """Return the start of a rollout of z, without the inputs of the variables ``excluded``, added elsewhere."""
     starts = problem.parametric.starts()
     winding = [joint.name for joint in problem.parametric.joints if joint.kind.winds]
     near = {f"{name}.{UNWRAPPED}": starts[f"{name}.start"] for name in winding}
@@ -51,7 +51,7 @@ def start_of(
     for variable, part in sorted(parts, key=lambda each: each[0].each):
         if variable.each and measured is initial:
             initial = dict(measured)
-        if variable.kind == "recording" or variable.name in beside:  # the first is how a motion was measured
+        if variable.kind == "recording" or variable.name in excluded:  # the first is how a motion was measured
             continue
         if variable.kind == "control":
             u = u + _spread_inputs(problem, variable, input_columns(world, inputs), part)

@@ -132,7 +132,7 @@ class RecordingFit:
         state = start or begin(self.problem.shared.guess, self.problem.own.guess)
         system = self.system(state.shared, state.own)
         if not system.finite:
-            return FitOutcome(FitStatus.NOT_FINITE, START.format(names=self.names(system.costs)), state, system)
+            return FitOutcome(FitStatus.NOT_FINITE, START.format(names=self.failed_names(system.costs)), state, system)
         if state.history:  # the work of the start is in its history
             last = state.history[-1]
             self.simulations, self.jacobians, began = last.simulations, last.jacobians, began - last.seconds
@@ -169,7 +169,7 @@ class RecordingFit:
         row = FitStep(
             iteration=len(state.history),
             merit=system.cost,
-            left=self.left(state, system),
+            left=self.errors_left(state, system),
             damping=state.damping,
             step=step,
             simulations=self.simulations,
@@ -184,7 +184,7 @@ class RecordingFit:
         own = movable_numbers(self.problem.own, state.own, system.own_gradient, self.which)
         return shared & (not self.hold_shared), own
 
-    def left(self, state: FitState, system: ArrowSystem) -> float:
+    def errors_left(self, state: FitState, system: ArrowSystem) -> float:
         """Return the standard errors between the state and the minimum of its quadratic model."""
         return self.errors(system.expected_fall(*system.step(0.0, *self.free(state, system))), system)
 
@@ -197,18 +197,20 @@ class RecordingFit:
         if state.quiet and not (arrow := self.determined(state, system)).whole:
             left = self.errors(system.expected_fall(*arrow.step()), system)
             if left <= self.options.tolerance:
-                return FitStatus.CONVERGED, VAGUELY.format(left=left, names=self._vague(arrow), far=last.left)
+                return FitStatus.CONVERGED, VAGUELY.format(
+                    left=left, names=self._undetermined_names(arrow), far=last.left
+                )
         if last.iteration - state.first >= self.options.iterations:
             return FitStatus.BUDGET, BUDGET
         if state.quiet >= (self.options.patience or math.inf):
             return self._stalled(SLOW, last.left)
-        if self._hopeless(state, last.left):
+        if self._model_fails(state, last.left):
             left = self.errors(system.expected_fall(*self.determined(state, system).step()), system)
-            if self._hopeless(state, left):
+            if self._model_fails(state, left):
                 return self._stalled(SLOW, left)
         return None
 
-    def _hopeless(self, state: FitState, left: float) -> bool:
+    def _model_fails(self, state: FitState, left: float) -> bool:
         """Whether the last steps have achieved almost nothing of the predicted decrease."""
         patience, last = self.options.patience, state.history[-1]
         if not patience or last.iteration - state.first < patience:
@@ -275,13 +277,13 @@ class RecordingFit:
         self.simulations += len(which)
         return costs(self.problem, shared, own, which, self.loss, weights)
 
-    def _vague(self, arrow: DeterminedArrow) -> str:
+    def _undetermined_names(self, arrow: DeterminedArrow) -> str:
         """Return the numbers in directions that are not determined."""
         shared = [name for name, vague in zip(self.problem.shared.names, arrow.vague_shared, strict=True) if vague]
         counts = zip(self.problem.own.names, arrow.vague_own.sum(axis=0), strict=True)
         return ", ".join([*shared, *(f"{name} of {count} recordings" for name, count in counts if count)])
 
-    def names(self, recordings: Array) -> str:
+    def failed_names(self, recordings: Array) -> str:
         """Return the names of recordings whose costs are not finite."""
         bad = [
             self.problem.recordings[k] for k, cost in zip(self.which, recordings, strict=True) if not np.isfinite(cost)
@@ -320,9 +322,9 @@ class RecordedModel(LocalModel[Moved, Taken]):
         moved = fit.moved(self.state, *self._direction(damping))
         recordings, priors = fit.costs(moved.shared, moved.own)
         if not self._near:
-            moved, recordings = self._retried(moved, recordings, damping)
+            moved, recordings = self._with_shorter_steps(moved, recordings, damping)
         merit = float(recordings.sum()) + priors
-        self.refused = "" if math.isfinite(merit) else fit.names(recordings)
+        self.refused = "" if math.isfinite(merit) else fit.failed_names(recordings)
         return Trial(moved, merit, self._sides.expected_fall(*moved.taken))
 
     def judge(self, moved: Moved, gain: float) -> Taken | Refusal:
@@ -331,15 +333,15 @@ class RecordedModel(LocalModel[Moved, Taken]):
         if better or (self._kinked and not self.refused):
             there = self.fit.system(moved.shared, moved.own)
             if not there.finite:
-                self.refused = self.fit.names(there.costs)
+                self.refused = self.fit.failed_names(there.costs)
             elif better:
                 return moved, there
-            elif (found := self._with_side(there, moved.taken)) is not None:
+            elif (found := self._add_side(there, moved.taken)) is not None:
                 return found
         self._kinked = self._kink
         return Refusal.STIFFER
 
-    def _with_side(self, there: ArrowSystem, taken: Step) -> Taken | Refusal | None:
+    def _add_side(self, there: ArrowSystem, taken: Step) -> Taken | Refusal | None:
         """Add the side of a refused step; return the end of the fit, a new step, or None for too many sides."""
         fit, model = self.fit, self._sides
         model.add(there, *taken)
@@ -362,7 +364,7 @@ class RecordedModel(LocalModel[Moved, Taken]):
             return arrow.step()
         return system.step(damping, *self._free)
 
-    def _retried(self, moved: Moved, reached: Array, damping: float) -> tuple[Moved, Array]:
+    def _with_shorter_steps(self, moved: Moved, reached: Array, damping: float) -> tuple[Moved, Array]:
         """Return the step and its costs (k,), with shorter steps of recordings that became worse.
 
         Own numbers of a recording have no effect on others, so that one that leaves its model need not hold up all.

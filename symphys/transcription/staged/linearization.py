@@ -74,7 +74,7 @@ class Linearization:
             c = by_p[:, :, varied] @ parameters[varied]
             end -= len(a)
             if not end and len(c) and left.any():
-                c[0] += self.step.beside(motion.x[0], motion.u[0], p, motion.smoothing) @ left
+                c[0] += self.step.full_state_slopes(motion.x[0], motion.u[0], p, motion.smoothing) @ left
             yield Linearized(a, b, c, start)
 
     def start_slopes(self, motion: StagedMotion) -> tuple[Array, Array, Array]:

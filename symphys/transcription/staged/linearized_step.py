@@ -135,7 +135,7 @@ class LinearizedStep:
         c[:, :, self.arguments.varied] = varied
         return a, b, c
 
-    def beside(self, x: Array, u: Array, p: Array, smoothing: float) -> Array:
+    def full_state_slopes(self, x: Array, u: Array, p: Array, smoothing: float) -> Array:
         """Return (n, nx) derivatives of step 0 by each number of a state (nx,), also off its tangent."""
         after = self.step(0, x[None], u[None], p, smoothing)
         varying, given = self.rows(0, x[None], after, u[None], p, smoothing)

@@ -270,7 +270,7 @@ class RolloutStages:
         """Return the augmented objective to second order."""
         sizes = self.steps, self.tangent_size, self.input_size, len(self.statics)
         sums, first = ExpansionSums(sizes, self._of_constants(motion), self._knots), 0
-        stacked = not len(self._knots[0]) and not self._beside(motion).any()
+        stacked = not len(self._knots[0]) and not self._off_tangent_slopes(motion).any()
         if stacked:
             constants, u = self._constants(motion.z[None], motion.u[None]), motion.u[:, : self._given]
             for stack in self._stacks:
@@ -335,7 +335,7 @@ class RolloutStages:
 
         return np.concatenate(values), by_state, by_input, csr_array(np.concatenate(by_s))
 
-    def _beside(self, motion: StagedMotion) -> Array:
+    def _off_tangent_slopes(self, motion: StagedMotion) -> Array:
         """Return (nx, s) the derivatives of the first state by static entries, off its tangent."""
         return self._linearization.start_slopes(self._plain(motion))[1] if len(self.statics) else np.zeros((0, 0))
 
@@ -346,13 +346,13 @@ class RolloutStages:
         constants = self._constants(motion.z[None], motion.u[None])
         u, ticks = motion.u[:, : self._given], np.arange(self.steps)
         rows = StepRows(motion.x[:-1], after, u, constants, ticks, self._groups.clock)
-        of_constants, left = self._of_constants(motion), self._beside(motion)
+        of_constants, left = self._of_constants(motion), self._off_tangent_slopes(motion)
         result = []
         for term, slopes, found in self._groups.slopes(rows, kinds):
             value, blocks = slopes.values(found)
             by_s = blocks.constants.slopes @ of_constants[blocks.constants.columns]
             if left.any() and term.steps[0] == 0:
-                by_s[0] += self._groups.beside(term, rows) @ left
+                by_s[0] += self._groups.full_state_slopes(term, rows) @ left
             result.append(SlopedTerm(term, value, blocks, by_s, slopes, found))
         return result
 

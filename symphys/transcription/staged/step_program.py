@@ -70,7 +70,7 @@ class StepArguments:
         slope = self.tangent.shift(x, p)
         return ca.mtimes(slope[:, self.varied.tolist()], varied - p[self.varied.tolist()]) if len(self.varied) else 0
 
-    def replaced(self, p: Expr, varied: Expr) -> Expr:
+    def with_varied(self, p: Expr, varied: Expr) -> Expr:
         """Return p with its varying entries replaced."""
         if not len(self.varied):
             return p
@@ -127,7 +127,7 @@ def _begun(arguments: StepArguments, tangent: bool) -> ca.Function:
     x, _, tick, p, smoothing = parts(given, [*arguments.given, 1])
     moved = ca.mtimes(arguments.tangent.basis(x, p), d) + e + arguments.shift(x, p, varied)
     start = x + moved if tangent else x
-    taken = arguments.replaced(p, varied)
+    taken = arguments.with_varied(p, varied)
     put = arguments.rollout.with_shares(u, tick)
     results = (start, put, taken, arguments.time(tick, taken), smoothing)
     return ca.Function("begun", [varying, given], [ca.densify(each) for each in results])
@@ -138,8 +138,8 @@ def _off(arguments: StepArguments) -> ca.Function:
     varying, given = ca.SX.sym("varying", sum(arguments.varying)), ca.SX.sym("given", sum(arguments.given) + 1)
     after = ca.SX.sym("after", arguments.sizes[0])
     varied, (_, aim, _, p, _) = parts(varying, arguments.varying)[2], parts(given, [*arguments.given, 1])
-    beside = after - aim - arguments.shift(aim, p, varied)
-    return ca.Function("off", [varying, given, after], [ca.mtimes(arguments.tangent.projection(aim, p), beside)])
+    difference = after - aim - arguments.shift(aim, p, varied)
+    return ca.Function("off", [varying, given, after], [ca.mtimes(arguments.tangent.projection(aim, p), difference)])
 
 
 def difference_program(tangent: Tangent) -> Program:
@@ -157,11 +157,11 @@ def step_functions(arguments: StepArguments) -> tuple[ca.Function, ca.Function]:
     d, u, varied, e = parts(varying, arguments.varying)
     x, aim, tick, p, smoothing = parts(given, [*arguments.given, 1])
     closed, tangent = arguments.rollout.closed, arguments.tangent
-    time = arguments.time(tick, arguments.replaced(p, varied))
+    time = arguments.time(tick, arguments.with_varied(p, varied))
     u = arguments.rollout.with_shares(u, tick)
     put = u if arguments.rollout.feedback is None else ca.vertcat(u, time)
     starts = x, x + ca.mtimes(tangent.basis(x, p), d) + e + arguments.shift(x, p, varied)
-    first, moved = (call(closed, start, put, arguments.replaced(p, varied), smoothing)[0] for start in starts)
+    first, moved = (call(closed, start, put, arguments.with_varied(p, varied), smoothing)[0] for start in starts)
     off = ca.mtimes(tangent.projection(aim, p), moved - aim - arguments.shift(aim, p, varied))
     return ca.Function("step", [varying, given], [first]), ca.Function("off", [varying, given], [off])
 

@@ -67,7 +67,7 @@ class Tangent:
             if chart is None:
                 body = self.rollout.world.bodies[index].name
                 found += [f"{body}.{field}[{k}]" for field in fields for k in range(3)]
-        return (*found, *(f"{name}[{k}]" for name, size in self._carried for k in range(size)))
+        return (*found, *(f"{name}[{k}]" for name, size in self._other_entries for k in range(size)))
 
     @cached_property
     def retraction(self) -> ca.Function:
@@ -100,7 +100,7 @@ class Tangent:
         """(x, p) -> (nx, np) the derivative of a state by p at a fixed tangent, where p moves joints."""
         x, p = ca.SX.sym("x", self._layout_size), self._p
         old = self._parts(x)
-        kept, rebuilt = self._rebuilt(old)
+        kept, rebuilt = self._at_fixed_errors(old)
         slope = ca.jacobian(rebuilt, p) if p.numel() else ca.SX(self._layout.size, 0)
         if slope.nnz():
             known = ca.vertcat(ca.SX(0, 1), *(value for _, value in kept))
@@ -166,7 +166,7 @@ class Tangent:
         return (*((tree.root, JointCoordinateChart(tree, world.joints)) for tree in trees), *free)
 
     @cached_property
-    def _raw(self) -> tuple[tuple[str, int], ...]:
+    def _plain_parts(self) -> tuple[tuple[str, int], ...]:
         """Return the parts of the world's state that are their own tangent, and their sizes."""
         world, scheme = self.rollout.world, self.rollout.problem.simulation.scheme()
         of_bodies = {f"{body.name}.{field}" for body in world.bodies for field, _ in BODY_FIELDS}
@@ -183,7 +183,7 @@ class Tangent:
         joints = self.rollout.world.joints
         return tuple(joints[k] for k in sorted(tree_joints(joints)))
 
-    def _turned(self, old: Parts, new: Parts) -> dict[str, Expr]:
+    def _angle_changes(self, old: Parts, new: Parts) -> dict[str, Expr]:
         """Return changes of angle of the other joints between two poses, by half a turn at most."""
         found, world = dict[str, Expr](), self.rollout.world
         for joint in world.joints:
@@ -198,7 +198,7 @@ class Tangent:
         return found
 
     @cached_property
-    def _acted(self) -> tuple[str, ...]:
+    def _independent_reactions(self) -> tuple[str, ...]:
         """Return the independent reactions: torques of contacts; without warm start all reactions."""
         world = self.rollout.world
         touching = {i for pair in world.pairs for i in bodies_of(pair)}
@@ -208,11 +208,11 @@ class Tangent:
         return tuple(f"{world.bodies[i].name}.{field}" for i in acted for field, _ in REACTIONS)
 
     @cached_property
-    def _carried(self) -> tuple[tuple[str, int], ...]:
+    def _other_entries(self) -> tuple[tuple[str, int], ...]:
         """Return all entries after coordinates and rates, by name, with sizes."""
-        torques = tuple((name, 3) for name in self._acted)
+        torques = tuple((name, 3) for name in self._independent_reactions)
         memory = self._layout_size - self._layout.size
-        return (*self._raw, *torques, *((("memory", memory),) if memory else ()))
+        return (*self._plain_parts, *torques, *((("memory", memory),) if memory else ()))
 
     def _retracted(self, x: Expr, d: Expr) -> Expr:
         old, cursor = self._parts(x), _Cursor(d)
@@ -227,17 +227,19 @@ class Tangent:
                 after = {index: (velocity + more[2], spin + more[3])}
             else:
                 along = cursor.take(chart.tree.size)
-                moved = chart.moved(poses, along)
-                new |= chart.turned(old, along)
-                after = _carried_on(chart, poses, moving, moved, cursor.take(chart.tree.size))
+                moved = chart.displaced(poses, along)
+                new |= chart.displaced_angles(old, along)
+                after = _transport_velocities(chart, poses, moving, moved, cursor.take(chart.tree.size))
             for i in bodies:
-                self._put(new, i, POSES, moved[i])
-                self._put(new, i, VELOCITIES, after[i])
-        turned = self._turned(old, new)
-        for name, size in self._raw:
+                self._set_pair(new, i, POSES, moved[i])
+                self._set_pair(new, i, VELOCITIES, after[i])
+        turned = self._angle_changes(old, new)
+        for name, size in self._plain_parts:
             new[name] = old[name] + cursor.take(size) + turned.get(name, 0)
-        others = {name: cursor.take(3) for name in self._acted}
-        for body, first, second in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
+        others = {name: cursor.take(3) for name in self._independent_reactions}
+        for body, first, second in zip(
+            self.rollout.world.bodies, self._constraint_loads(old), self._constraint_loads(new), strict=True
+        ):
             for (field, _), a, b in zip(REACTIONS, first, second, strict=True):
                 new[f"{body.name}.{field}"] = old[f"{body.name}.{field}"] + (b - a)
         for name, each in others.items():
@@ -257,16 +259,18 @@ class Tangent:
                 found += [b - a for a, b in zip(moving[0][index], moving[1][index], strict=True)]
             else:
                 rates = [chart.rates(*each) for each in zip(places, moving, strict=True)]
-                found += [chart.apart(places[0], places[1], (old, new)), rates[1] - rates[0]]
-        turned = self._turned(old, new)
-        found += [new[name] - old[name] - turned.get(name, 0) for name, _ in self._raw]
-        for body, first, second in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
+                found += [chart.difference(places[0], places[1], (old, new)), rates[1] - rates[0]]
+        turned = self._angle_changes(old, new)
+        found += [new[name] - old[name] - turned.get(name, 0) for name, _ in self._plain_parts]
+        for body, first, second in zip(
+            self.rollout.world.bodies, self._constraint_loads(old), self._constraint_loads(new), strict=True
+        ):
             for k, (field, _) in enumerate(REACTIONS):
-                if (name := f"{body.name}.{field}") in self._acted:
+                if (name := f"{body.name}.{field}") in self._independent_reactions:
                     found.append(new[name] - old[name] - (second[k] - first[k]))
         return ca.vertcat(ca.SX(0, 1), *found, y[self._layout.size :] - x[self._layout.size :])
 
-    def _rebuilt(self, old: Parts) -> tuple[list[tuple[Expr, Expr]], Expr]:
+    def _at_fixed_errors(self, old: Parts) -> tuple[list[tuple[Expr, Expr]], Expr]:
         """Return the state as a function of joint errors, rates and reactions: symbols with values, and the state."""
         kept, new = list[tuple[Expr, Expr]](), dict(old)
 
@@ -280,19 +284,24 @@ class Tangent:
             bodies = chart.tree.bodies
             poses, moving = ({i: self._pair(old, i, fields) for i in bodies} for fields in (POSES, VELOCITIES))
             rates = chart.rates(poses, moving)
-            fit, moved = chart.velocities(poses, rates), chart.rebuilt(poses, known(chart.held(poses, old)))
+            fit, moved = (
+                chart.velocities(poses, rates),
+                chart.poses_with_errors(poses, known(chart.joint_errors(poses, old))),
+            )
             after = chart.velocities(moved, known(rates))
             for i in bodies:
                 off = (known(now - then) for now, then in zip(moving[i], fit[i], strict=True))
-                self._put(new, i, POSES, moved[i])
+                self._set_pair(new, i, POSES, moved[i])
                 both = [value + more for value, more in zip(after[i], off, strict=True)]
-                self._put(new, i, VELOCITIES, (both[0], both[1]))
-        for body, first, second in zip(self.rollout.world.bodies, self._given(old), self._given(new), strict=True):
+                self._set_pair(new, i, VELOCITIES, (both[0], both[1]))
+        for body, first, second in zip(
+            self.rollout.world.bodies, self._constraint_loads(old), self._constraint_loads(new), strict=True
+        ):
             for (field, _), a, b in zip(REACTIONS, first, second, strict=True):
                 new[f"{body.name}.{field}"] = known(old[f"{body.name}.{field}"] - a) + b
         return kept, self._layout.pack(new)
 
-    def _given(self, state: Parts) -> list[tuple[Expr, Expr]]:
+    def _constraint_loads(self, state: Parts) -> list[tuple[Expr, Expr]]:
         """Return force and torque on each body from the forces of pairs and joints in the state."""
         world = self.rollout.world
         total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in world.bodies]
@@ -312,7 +321,7 @@ class Tangent:
         name = self.rollout.world.bodies[index].name
         return state[f"{name}.{fields[0][0]}"], state[f"{name}.{fields[1][0]}"]
 
-    def _put(
+    def _set_pair(
         self, state: dict[str, Expr], index: int, fields: tuple[tuple[str, int], ...], both: Pose | Moving
     ) -> None:
         name = self.rollout.world.bodies[index].name
@@ -332,7 +341,7 @@ class _Cursor:
         return self.column[self.at - count : self.at]
 
 
-def _carried_on(
+def _transport_velocities(
     chart: JointCoordinateChart,
     poses: Mapping[int, Pose],
     moving: Mapping[int, Moving],

@@ -275,17 +275,17 @@ class TermGroups:
             found.update(zip(numbers, functions(here), strict=True))
         return ((self.terms[number], self._slopes[number], found[number]) for number in sorted(found))
 
-    def beside(self, term: StageTerm, rows: StepRows) -> Array:
+    def full_state_slopes(self, term: StageTerm, rows: StepRows) -> Array:
         """Return (r, nx) slopes of a term in step 0 by all numbers of the state before it."""
         key = id(term)
-        if key not in self._beside:
-            self._beside[key] = StageFunctions([raw_slopes(self.symbols, term)], 1, "casadi", 1)
-        ((x, first),) = self._beside[key](_rows(rows, np.array([0])))
+        if key not in self._full_slope_functions:
+            self._full_slope_functions[key] = StageFunctions([raw_slopes(self.symbols, term)], 1, "casadi", 1)
+        ((x, first),) = self._full_slope_functions[key](_rows(rows, np.array([0])))
         found = first if term.after else x
         return found.reshape(term.size, -1)[:, : self.symbols.state_size]
 
     @cached_property
-    def _beside(self) -> dict[int, StageFunctions]:
+    def _full_slope_functions(self) -> dict[int, StageFunctions]:
         return {}
 
     @cached_property

@@ -34,7 +34,7 @@ class JointCoordinateChart:
     tree: KinematicTree
     joints: Sequence[Joint]
 
-    def moved(self, poses: Mapping[int, Pose], along: Expr) -> dict[int, Pose]:
+    def displaced(self, poses: Mapping[int, Pose], along: Expr) -> dict[int, Pose]:
         """Return the poses after the coordinates changed by ``along`` (size,)."""
         own = tuple(None if link.joint is None else self.joints[link.joint] for link in self.tree.links)
         starts = [None if joint is None else self._start(link, joint, poses) for link, joint in self._links()]
@@ -46,7 +46,7 @@ class JointCoordinateChart:
             for link, each in zip(self.tree.links, arrived, strict=True)
         }
 
-    def apart(
+    def difference(
         self,
         before: Mapping[int, Pose],
         after: Mapping[int, Pose],
@@ -69,7 +69,7 @@ class JointCoordinateChart:
                 found.append(ca.mtimes(placed.b[:, : link.count].T, self._turned(link, before, after)))
         return ca.vertcat(ca.SX(0, 1), *found)
 
-    def turned(self, angles: Mapping[str, Expr], along: Expr) -> dict[str, Expr]:
+    def displaced_angles(self, angles: Mapping[str, Expr], along: Expr) -> dict[str, Expr]:
         """Return ``Joint.unwrapped`` by name, after coordinates changed by ``along`` (size,)."""
         return {
             joint.unwrapped: angles[joint.unwrapped] + along[list(link.coordinates)]
@@ -120,7 +120,7 @@ class JointCoordinateChart:
             found[link.body] = at - ca.cross(after, mine), after
         return found
 
-    def held(self, poses: Mapping[int, Pose], angles: Mapping[str, Expr]) -> Expr:
+    def joint_errors(self, poses: Mapping[int, Pose], angles: Mapping[str, Expr]) -> Expr:
         """Return the errors of joints (7 each): rotation (4), offset in the second frame (3) [m].
 
         For a screw its coordinate follows, and the place is that at coordinate 0. ``angles``: see ``coordinates``.
@@ -135,7 +135,7 @@ class JointCoordinateChart:
                     found[-2] = found[-2] - _along(joint, found[-1])
         return ca.vertcat(ca.SX(0, 1), *found)
 
-    def rebuilt(self, poses: Mapping[int, Pose], held: Expr) -> dict[int, Pose]:
+    def poses_with_errors(self, poses: Mapping[int, Pose], held: Expr) -> dict[int, Pose]:
         """Return the poses with joint errors ``held``; a floating root keeps its pose."""
         found, row = dict[int, Pose](), 0
         for link, joint in self._links():
