@@ -14,8 +14,8 @@ from symphys.problem.loading import Source, load
 from symphys.solvers.ddp.gains import Gains
 from symphys.solvers.ddp.gains import follow as gains_motion
 from symphys.trajectory import Trajectory
-from symphys.transcription.feedback.state_reader import StateReader
 from symphys.transcription.staged.tangent import Tangent
+from symphys.transcription.state_reader import StateReader
 
 
 def simulate(

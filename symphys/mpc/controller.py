@@ -13,7 +13,7 @@ from symphys.model.state_layout import input_columns
 from symphys.mpc.planner import Planner, RecedingPlan
 from symphys.problem import Problem, RecedingHorizon
 from symphys.problem.loading import Source, load
-from symphys.transcription.feedback.state_reader import StateReader
+from symphys.transcription.state_reader import StateReader
 from symphys.types import Array
 
 State = ArrayLike | Mapping[str, ArrayLike]

@@ -22,7 +22,7 @@ from symphys.model.state_layout import input_columns, input_sizes, input_symbols
 from symphys.model.world import Scheme, World
 from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable, placing
 from symphys.problem.references import reference_values
-from symphys.transcription.feedback.sensor_memory import SensorMemory
+from symphys.transcription.sensor_memory import SensorMemory
 from symphys.types import Array, Expr
 
 STEP_MARGIN = 0.25

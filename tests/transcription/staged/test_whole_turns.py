@@ -11,9 +11,9 @@ from tools.repeats import few
 
 import symphys
 from symphys.dynamics.observation import reading_function
-from symphys.transcription.feedback.state_reader import StateReader
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.staged.linearization import Linearization
+from symphys.transcription.state_reader import StateReader
 
 FAR = 20.0
 """[rad]: more than three turns."""
