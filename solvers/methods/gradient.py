@@ -3,7 +3,7 @@
 A direction (``core.directions``) is projected into the bounds, then shortened until the merit is below the largest of
 the last few (``backtracking``; Grippo, Lampariello, Lucidi 1986; with bounds and the spectral step this is the SPG2 of
 Birgin, Martinez, Raydan 2000). A direction that does not descend is replaced by that of an empty memory.
-A step onto a plateau is refused and shortened, see ``vanishing_gradient``.
+A step onto a plateau is refused and shortened, see ``core.convergence``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,14 @@ from typing import Any, Literal
 import numpy as np
 
 from symphys.solvers.core.checkpoint import revive
-from symphys.solvers.core.convergence import Progress, not_finite, stationary
+from symphys.solvers.core.convergence import (
+    MAX_SHORTENINGS,
+    SHORTENING_FACTOR,
+    Progress,
+    ends_on_plateau,
+    not_finite,
+    stationary,
+)
 from symphys.solvers.core.directions import DIRECTIONS, DirectionMemory, MomentumWeights, learn_length
 from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.evaluator import CountingEvaluator
@@ -24,7 +31,6 @@ from symphys.solvers.core.line_search import RELATIVE_ROUNDING, backtrack
 from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.core.vanishing_gradient import MAX_SHORTENINGS, SHORTENING_FACTOR, ends_on_plateau
 from symphys.types import Array
 
 RATES: dict[str, tuple[float, ...]] = {

@@ -15,9 +15,11 @@ A solve goes on from its last iterate with a fresh barrier, so its end may diffe
 
 from __future__ import annotations
 
+import contextlib
+import io
 import math
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -32,11 +34,62 @@ from symphys.solvers.core.convergence import converged, not_finite
 from symphys.solvers.core.driver import make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, IterationRecorder, StageContext
-from symphys.solvers.core.options import SolverOptions, at_least, require
+from symphys.solvers.core.options import SolverOptions, at_least, refuse, require
 from symphys.solvers.core.outcome import Counts, Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.methods.ipopt_options import SILENT, check
 from symphys.types import Array
+
+LIBRARY = "a problem file loads no library: install it where IPOPT looks by itself"
+RESERVED = {
+    "max_iter": "use iterations",
+    "tol": "use tolerance",
+    "hessian_approximation": "use hessian",
+    "print_level": "the text goes to the log: use file_print_level",
+    "output_file": "the text goes to the log",
+    "option_file_name": "no option file is read",
+    "sb": "the text goes to the log",
+    "hsllib": LIBRARY,
+    "pardisolib": LIBRARY,
+}
+"""Options that are not passed on, each with the reason."""
+SILENT: dict[str, Any] = {"print_level": 0, "sb": "yes", "option_file_name": ""}
+"""Options with which IPOPT neither prints nor reads ipopt.opt from the current folder."""
+
+
+def check(options: Mapping[str, Any]) -> None:
+    """Raise SymphysError for the first option that IPOPT refuses, or that cannot be passed on."""
+    for name, value in options.items():
+        if name in RESERVED:
+            raise refuse("ipopt", name, f"cannot be set: {RESERVED[name]}")
+        reason = refusal(name, value)
+        if reason:
+            raise refuse("ipopt", name, f"IPOPT does not take {value!r}: {reason}")
+
+
+def refusal(name: str, value: Any) -> str:
+    """Return why IPOPT refuses an option; empty if it does not."""
+    x = ca.MX.sym("x")
+    problem: dict[str, Any] = {"x": x, "f": x**2}
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        try:
+            solver = ca.nlpsol("trial", "ipopt", problem, {"ipopt": {**SILENT, name: value}, "print_time": False})
+            solver(x0=1)
+        except (RuntimeError, NotImplementedError) as error:
+            return explain(printed.getvalue(), str(error))
+    return "it is not available here" if solver.stats()["return_status"] == "Invalid_Option" else ""
+
+
+def explain(printed: str, error: str) -> str:
+    """Return the relevant part of what IPOPT printed or casadi raised."""
+    lines = [" ".join(line.split()) for line in printed.splitlines() if line.strip()]
+    if lines:
+        start = next((i for i, line in enumerate(lines) if line.startswith(("Valid", "Allowed"))), 0)
+        return "; ".join(lines[start : start + 6])
+    if "No such IPOPT option" in error:
+        return "there is no such option"
+    return "it is of the wrong type" if "type mismatch" in error else error.strip().splitlines()[-1]
+
 
 BUDGET = "the iterations are used up: raise `iterations`, or try the other `hessian`"
 ENDINGS: dict[str, tuple[Status, str]] = {

@@ -1,7 +1,7 @@
 """The solver ``least_squares``: Levenberg-Marquardt on residuals r with merit = r . r, in x = z / scale.
 
 The loop is that of ``core.levenberg_marquardt``, on the dense Jacobian of all residuals. A step onto a plateau is
-refused like one that raises the merit, see ``vanishing_gradient``.
+refused like one that raises the merit, see ``core.convergence``.
 
 Why not scipy.optimize.least_squares: it can be stopped between iterations but not at the first point that meets the
 targets, and its trust region cannot be set when a solve goes on, so an interrupted solve would end elsewhere.
@@ -18,7 +18,7 @@ import scipy.linalg
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import revive
-from symphys.solvers.core.convergence import Progress, not_finite, stationary
+from symphys.solvers.core.convergence import MAX_SHORTENINGS, Progress, ends_on_plateau, not_finite, stationary
 from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
@@ -36,7 +36,6 @@ from symphys.solvers.core.line_search import RELATIVE_ROUNDING
 from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.core.vanishing_gradient import MAX_SHORTENINGS, ends_on_plateau
 from symphys.types import Array
 
 NO_SQUARES = (

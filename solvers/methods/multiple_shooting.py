@@ -27,9 +27,8 @@ from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, IterationRecorder, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, refuse, require
 from symphys.solvers.core.outcome import Status, StopReason
-from symphys.solvers.methods.ipopt import ENDINGS, SUCCESS_STATUSES, worse
-from symphys.solvers.methods.ipopt_options import RESERVED
-from symphys.solvers.methods.ipopt_options import refusal as refused_by_ipopt
+from symphys.solvers.methods.ipopt import ENDINGS, RESERVED, SUCCESS_STATUSES, worse
+from symphys.solvers.methods.ipopt import refusal as refused_by_ipopt
 from symphys.solvers.multiple_shooting.by_fatrop import (
     NO_STEP,
     RESERVED_OF_FATROP,
@@ -40,9 +39,14 @@ from symphys.solvers.multiple_shooting.by_fatrop import (
 from symphys.solvers.multiple_shooting.by_ipopt import solve_by_ipopt
 from symphys.solvers.multiple_shooting.grid import make_grid
 from symphys.solvers.multiple_shooting.library import ITERATIONS_USED, LibraryRequest, LibraryResult
-from symphys.solvers.multiple_shooting.multipliers import NlpMultipliers, at_nodes, barrier_at, fitted
-from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
-from symphys.solvers.multiple_shooting.programs import Programs
+from symphys.solvers.multiple_shooting.nlp import (
+    MultipleShootingNlp,
+    NlpMultipliers,
+    Programs,
+    at_nodes,
+    barrier_at,
+    fitted,
+)
 from symphys.types import Array
 
 DEFECT = "largest defect"

@@ -12,7 +12,7 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.solvers.methods.ipopt_options import SILENT
+from symphys.solvers.methods.ipopt import SILENT
 from symphys.solvers.multiple_shooting.library import (
     SCALAR,
     IterateWatch,

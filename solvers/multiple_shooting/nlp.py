@@ -1,4 +1,4 @@
-"""The nonlinear program of multiple shooting: w, its bounds, objective, constraints, and their sparse derivatives.
+"""The nonlinear program of multiple shooting: w, its bounds, objective, constraints, sparse derivatives, multipliers.
 
 w holds z / scale and the tangents of the nodes, in the order of a ``NlpLayout``. Derivatives are dense blocks, a stage
 each, that are scattered into fixed sparsity patterns, column by column as casadi has them.
@@ -6,14 +6,19 @@ each, that are scattered into fixed sparsity patterns, column by column as casad
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
+from symphys.shooting import StagedMotion, StagedProblem
+from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.outcome import Counts
-from symphys.solvers.multiple_shooting.layout import NlpLayout
-from symphys.solvers.multiple_shooting.shots import ShootingPlan, Shots
+from symphys.solvers.multiple_shooting.chart import curved_columns, interpolated
+from symphys.solvers.multiple_shooting.grid import IntervalGrid
+from symphys.solvers.multiple_shooting.layout import NlpLayout, shared, staged
+from symphys.solvers.multiple_shooting.shots import IntervalSteps, ShootingPlan, Shots
 from symphys.types import Array, Ints
 
 DIFFERENCE_STEP = 1e-6
@@ -238,3 +243,137 @@ class MultipleShootingNlp:
         for gradient, slopes, rows in zip(lagrangians, shots.slopes, self.layout.defects, strict=False):
             gradient -= multipliers[rows] @ slopes.reached
         return lagrangians
+
+
+STARTS, DEFECTS, LIMITS, BOUNDS, BARRIER = "starts", "defects", "limits", "bounds", "barrier"
+"""Names of the arrays: (M + 1,), (M, n), (c,), (len(z),) and ()."""
+
+
+@dataclass(frozen=True)
+class NlpMultipliers:
+    """Multipliers in the layout of a program, by which another solve, by either library, starts.
+
+    By name they are those of the defects, each in the tangent of its own node, of the limits, and of the bounds of z,
+    unscaled. In the layout in stages the rows of copies have multipliers too, which follow from these.
+
+    Attributes:
+        bounds: (size,) of w's bounds; empty: there are none, as for the rows.
+        rows: (rows,), those of defects for tangents that begin at the nodes.
+        barrier: mu there.
+    """
+
+    bounds: Array
+    rows: Array
+    barrier: float
+
+    def by_name(self, nlp: MultipleShootingNlp) -> dict[str, Array]:
+        """Return the multipliers as named arrays; empty if there are none."""
+        if not self.rows.size:
+            return {}
+        layout = nlp.layout
+        return {
+            STARTS: np.asarray(nlp.plan.grid.starts, float),
+            DEFECTS: self.rows[layout.defects],
+            LIMITS: self.rows[layout.limits],
+            BOUNDS: self.bounds[layout.home] / nlp.scale,
+            BARRIER: np.asarray(self.barrier),
+        }
+
+
+def fitted(nlp: MultipleShootingNlp, saved: Mapping[str, Array]) -> NlpMultipliers | None:
+    """Arrange named multipliers in the layout of a program; None if nodes or limits differ.
+
+    Steps may be shorter or longer: nodes are compared as shares of the duration.
+    """
+    layout, starts = nlp.layout, nlp.plan.grid.starts
+    shapes = {
+        STARTS: starts.shape,
+        DEFECTS: layout.defects.shape,
+        LIMITS: layout.limits.shape,
+        BOUNDS: nlp.scale.shape,
+        BARRIER: (),
+    }
+    if any(name not in saved or np.shape(saved[name]) != shape for name, shape in shapes.items()):
+        return None
+    if not all(np.isfinite(saved[name]).all() for name in shapes):
+        return None
+    if not np.allclose(saved[STARTS] * starts[-1], starts * saved[STARTS][-1]):
+        return None
+    bounds, rows = np.zeros(layout.size), np.zeros(layout.rows)
+    bounds[layout.home] = saved[BOUNDS] * nlp.scale
+    rows[layout.defects], rows[layout.limits] = saved[DEFECTS], saved[LIMITS]
+    return NlpMultipliers(bounds, rows, float(saved[BARRIER]))
+
+
+def at_nodes(nlp: MultipleShootingNlp, w: Array, rows: Array) -> Array:
+    """Transform the rows (rows,) of the defects from tangents at w's references to tangents at its nodes."""
+    moved = rows.copy()
+    if rows.size:
+        turns, defects = nlp.shots(w).turns, nlp.layout.defects
+        moved[defects] = np.linalg.solve(turns.transpose(0, 2, 1), rows[defects][:, :, None])[:, :, 0]
+    return moved
+
+
+def barrier_at(nlp: MultipleShootingNlp, lower: Array, upper: Array, w: Array, bounds: Array, rows: Array) -> float:
+    """Return the mean product of multipliers and distances from their bounds, clipped for IPOPT's start.
+
+    Bounds (len(z),) are those of z; w (size,) is the iterate, ``bounds`` (size,) and ``rows`` its multipliers.
+    """
+    products = []
+    limits = (nlp.bounds(lower, upper), nlp.row_bounds())
+    for at, duals, (low, high) in zip((w, nlp.constraints(w)), (bounds, rows), limits, strict=True):
+        bounded = (low < high) & (np.isfinite(low) | np.isfinite(high))
+        if duals.size and bounded.any():
+            distance = np.minimum((at - low)[bounded], (high - at)[bounded])
+            products.append(np.abs(duals[bounded]) * distance.clip(min=0))
+    return float(np.clip(np.mean(np.concatenate(products)), 1e-9, 0.1)) if products else 1e-2
+
+
+class Programs:
+    """Makes the program of a stage of smoothing at any references, with the same grid and layout."""
+
+    def __init__(
+        self,
+        problem: StagedProblem,
+        grid: IntervalGrid,
+        evaluator: CountingEvaluator,
+        z: Array,
+        nodes: Array,
+        in_stages: bool,
+        exact: bool,
+    ) -> None:
+        """Find the stages that limits depend on, and what all steps share, at lines between the nodes.
+
+        Args:
+            problem: what is solved.
+            grid: its intervals.
+            evaluator: has the scale of z, and the smoothing.
+            z: (n,) of the guess.
+            nodes: (M, nx) of the guess.
+            in_stages: whether the layout is in stages, for FATROP.
+            exact: whether Hessians are exact.
+        """
+        self.problem, self.grid, self.evaluator, self.exact = problem, grid, evaluator, exact
+        corners = np.concatenate([problem.start(z[None]), nodes])
+        x = interpolated(problem, corners, np.linspace(0, 1, problem.steps + 1))
+        u = np.asarray(problem.weights @ z).reshape(problem.steps, problem.input_size)
+        motion = StagedMotion(z, x, u, evaluator.smoothing)
+        self.steps, self.curved = IntervalSteps(problem, motion), curved_columns(problem, nodes)
+        stages: list[set[int]] = [set() for _ in problem.lower]
+        if stages:
+            _, by_state, by_input, _ = problem.limit_slopes(motion)
+            owner = self.grid.stage_of_state
+            for slopes, size in ((by_state, problem.tangent_size), (by_input, problem.input_size)):
+                rows, columns = slopes.tocoo().coords
+                for row, of in zip(rows.tolist(), owner[columns // size].tolist(), strict=True):
+                    stages[row].add(of)
+        found = [sorted(each) or [0] for each in stages]
+        count = self.grid.intervals + 1
+        self.limit_rows = [np.array([r for r, of in enumerate(found) if j in of], np.int64) for j in range(count)]
+        variables = evaluator.problem.n
+        self.layout = staged(self.grid, variables, found) if in_stages else shared(self.grid, variables, len(stages))
+
+    def at(self, reference: Array) -> MultipleShootingNlp:
+        """Return the program with tangents at these states (M, nx)."""
+        plan = ShootingPlan(self.problem, self.grid, self.steps, reference, self.evaluator.smoothing, self.curved)
+        return MultipleShootingNlp(plan, self.layout, self.limit_rows, self.evaluator.scale, self.exact)

@@ -11,7 +11,7 @@ from worlds.toys import PLAIN, counted, solve, stop_at, through_json, toy
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers import Status
-from symphys.solvers.core.vanishing_gradient import MAX_SHORTENINGS, PLATEAU_ADVICE
+from symphys.solvers.core.convergence import MAX_SHORTENINGS, PLATEAU_ADVICE
 
 every_solver = pytest.mark.parametrize("name", PLAIN)
 descents = pytest.mark.parametrize("name", ["gradient", "least_squares"])
