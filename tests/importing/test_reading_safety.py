@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from tools.waiting import FOREVER
 
-from symphys.importing import source as reading_process
+from symphys.importing import robot as reading_process
 from symphys.importing.reading.checking import check_model
 from symphys.importing.reading.folders import Folders
 from symphys.importing.records import ImportOptions, ImportProblem
-from symphys.importing.source import read_source
+from symphys.importing.robot import read_source
 
 mujoco = pytest.importorskip("mujoco")
 

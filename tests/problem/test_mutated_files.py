@@ -37,7 +37,7 @@ import symphys.problems
 from symphys.cli.best import best
 from symphys.cli.ls import ls
 from symphys.errors import SymphysError
-from symphys.importing import source as model_source
+from symphys.importing import robot as model_source
 from symphys.importing.reading.child import main as read_in_this_process
 from symphys.problem import load, load_problem
 from symphys.report.pages.run import write_light_report
