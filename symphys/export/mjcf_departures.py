@@ -8,10 +8,8 @@ from typing import Literal
 
 from symphys.export.folder import ExportError
 from symphys.export.mjcf_bodies import MAX_JOINT_GAP, StartState, loose_frames, nesting_joints
-from symphys.export.mjcf_equality import expressible_loop
-from symphys.export.mjcf_joints import joint_equalities
-from symphys.export.mjcf_surfaces import normal_of
-from symphys.export.mjcf_terrain import deviation, window
+from symphys.export.mjcf_joints import expressible_loop, joint_equalities
+from symphys.export.mjcf_surfaces import deviation, normal_of, window
 from symphys.model.heightfield import Heightfield
 from symphys.model.joints import Servo, VelocityMotor
 from symphys.model.scalar import is_zero

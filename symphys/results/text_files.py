@@ -1,4 +1,4 @@
-"""Files of a run folder that somebody else may have written: their text, or the table in them."""
+"""Files of a run folder that somebody else may have written: texts, tables, archives of arrays."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import errno
 import json
 import os
 import stat
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from symphys import json_values as values
+from symphys.archives import ArchiveError, TooLarge, read_arrays
 from symphys.errors import SymphysError
 from symphys.files import check_regular, emptied
 from symphys.json_values import name, table, words
@@ -79,3 +82,21 @@ def _read_regular(path: Path | str) -> bytes:
 def reason(error: OSError) -> str:
     """Say why a file could not be read, without its path."""
     return "there is no such file" if isinstance(error, FileNotFoundError) else (error.strerror or "cannot be read")
+
+
+def read_archive(path: Path, only: Sequence[str] = ()) -> dict[str, Any]:
+    """Read every array of an archive, or ``only`` those of these names that it has.
+
+    Raises:
+        ReportError: no such file, not an archive of plain arrays, or arrays of more than MOST_BYTES.
+    """
+    try:
+        check_regular(path)
+        with path.open("rb") as file:
+            return read_arrays(file, only or None)[1]
+    except TooLarge as error:
+        raise ReportError(f"{path.name}: {values.name(str(error))}") from error
+    except ArchiveError as error:
+        raise ReportError(f"{path.name}: not an archive of plain arrays ({values.name(str(error))})") from error
+    except OSError as error:
+        raise ReportError(f"{path.name}: {reason(error)}") from error

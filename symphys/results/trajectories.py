@@ -12,9 +12,8 @@ import numpy as np
 
 from symphys import json_values as values
 from symphys.archives import MOST_BYTES, NUMBER
-from symphys.results.archives import read_archive
 from symphys.results.drawable import largest, oversized
-from symphys.results.text_files import ReportError
+from symphys.results.text_files import ReportError, read_archive
 from symphys.trajectory import Trajectory, shapes
 from symphys.types import Array
 

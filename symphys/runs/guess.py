@@ -13,11 +13,11 @@ from symphys.errors import SymphysError
 from symphys.problem import Problem, Variable, load_problem
 from symphys.problem.guess.motion import GuessedMotion
 from symphys.problem.guess.recorded import recorded_guess
-from symphys.results.archives import read_archive
 from symphys.results.config import read_config
 from symphys.results.discovery import is_run, run_folders
 from symphys.results.file_names import CONFIG, MULTIPLIERS, PROBLEM, TRAJECTORY
 from symphys.results.run import read_run
+from symphys.results.text_files import read_archive
 from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory
 from symphys.types import Array

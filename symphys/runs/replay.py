@@ -18,11 +18,10 @@ from symphys import json_values as values
 from symphys.errors import SymphysError
 from symphys.files import FileError
 from symphys.problem import Problem, load_problem
-from symphys.results.archives import read_archive
 from symphys.results.config import Config
 from symphys.results.file_names import CONFIG, PROBLEM, RESULT, TRAJECTORY
 from symphys.results.result import Result
-from symphys.results.text_files import ReportError, read_table
+from symphys.results.text_files import ReportError, read_archive, read_table
 from symphys.results.trajectories import make_trajectory
 from symphys.runs.execute import no_callback
 from symphys.runs.provenance import machine, versions

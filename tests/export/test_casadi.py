@@ -14,8 +14,7 @@ from tools.repeats import few
 
 from symphys.export import casadi_files, write_folders
 from symphys.export.casadi_files import RESULTS
-from symphys.export.slopes import slopes_function
-from symphys.export.sources import tangent_of
+from symphys.export.sources import slopes_function, tangent_of
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import Transcription, transcribe

@@ -17,8 +17,7 @@ import numpy as np
 
 from symphys import files
 from symphys import json_values as values
-from symphys.results.archives import read_archive
-from symphys.results.text_files import ReportError, read_table
+from symphys.results.text_files import ReportError, read_archive, read_table
 from symphys.types import Array
 
 

@@ -18,10 +18,9 @@ import numpy as np
 
 from symphys import files
 from symphys import json_values as values
-from symphys.results.archives import read_archive
 from symphys.results.file_names import SCENE
 from symphys.results.scene import Scene
-from symphys.results.text_files import ReportError, read_table
+from symphys.results.text_files import ReportError, read_archive, read_table
 from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory
 from symphys.types import Array
