@@ -47,6 +47,7 @@ def ends_on_plateau(evaluator: CountingEvaluator, point: Point, derivatives: Arr
 def is_plateau(evaluator: CountingEvaluator, z: Array) -> bool:
     """Whether some unmet error is constant around z; without errors, whether the merit is."""
     step = PROBE_STEP * evaluator.scale * probe_direction(z.size)
+    # Two points within the bounds at one and two steps.
     step = np.where(evaluator.clip(z + 2 * step) == z + 2 * step, step, -step)
     near, far = (evaluator.value(evaluator.clip(z + length * step)) for length in (1, 2))
     if not (near.finite and far.finite):

@@ -76,11 +76,13 @@ def backward_pass(
     optimization, IROS 2012. Theirs has one slope of the cost to go; here it is a costate and what decisions add to
     that. Numbers of the state on which nothing later depends are left out of the recursion.
     """
+    # Eliminate all knots, backwards over the steps.
     costate = gradient or knots.aligned is None or bool(len(statics))
     made = _Steps(costs, knots, statics, bounds, damping, costate)
     found = riccati_recursion(made.from_end(slopes), made.last())
     if found is None:
         return None
+    # The static entries remain: minimise over them, then close the loop.
     slope, curve = made.at_start(found.cost)
     chosen = _static_step(slope, curve, bounds, statics, damping)
     if chosen is None:
@@ -178,16 +180,19 @@ class _Steps:
     def _run(self, first: int, end: int, run: Linearized, knots: AlignedKnots) -> Iterator[LinearStep]:
         """Yield a run of steps with knots of their own and no static entries, as arrays; the last step first."""
         steps, n = slice(first, end), run.a.shape[1]
+        # Slopes of the next state by (state, knots), and costs of the steps by the same.
         after = np.concatenate([run.a, run.b if knots.plain else run.b @ knots.weights[steps]], axis=2)
         slopes, curves = self._own_slopes[steps], self._own_curves[steps]
         if self._with_costate:
             slopes = self._by_costate(first, run, knots.weights[steps])
             self.gradient[knots.new[steps]] = slopes[:, n:]
+        # Mixed second derivatives of costs by inputs and the next state.
         if self._mixed[1]:
             crossed = (knots.weights[steps].transpose(0, 2, 1) @ self.costs.uy[steps]) @ after
             curves = curves.copy()
             curves[:, n:] += crossed
             curves[:, :, n:] += crossed.transpose(0, 2, 1)
+        # Restrict the states to the tangent entries on which later costs depend.
         live, later = self._lives[first], self._lives[end]
         through: Array | list[Array] = after
         if not _is_whole(live, n):
@@ -225,11 +230,13 @@ class _Steps:
     def _step(self, k: int, a: Array, b: Array, c: Array) -> LinearStep:
         """Return the step and the costs of the state and inputs before it; columns: (state, old, statics, new)."""
         costs, knot, costate, live = self.costs, self.knots[k], self._costate, self._lives[k]
+        # Adjoint step: gradient of the objective by the knots and the static entries.
         self._costate = costs.x[k] + costate @ a
         by_inputs, by_statics = costs.u[k] + costate @ b, costate @ c
         by_knots = knot.weights.T @ by_inputs
         self.gradient[knot.acting] += by_knots
         self.gradient[self.statics] += by_statics
+        # Slopes of the next state by the columns (state, old knots, statics, new knots).
         rows = self._lives[k + 1]
         a, b, c = a[rows][:, live], b[rows] @ knot.weights, c[rows]
         n, o, s, new = a.shape[1], len(knot.old), len(self.statics), knot.new
@@ -237,6 +244,7 @@ class _Steps:
         acting, statics = _places(n, o, s, len(new)), slice(n + o, n + o + s)
         slope = np.zeros(after.shape[1])
         slope[acting], slope[statics] = by_knots, by_statics
+        # Costs by the same columns; knots that act again and statics are carried on unchanged.
         curve = self._curve(k, after, acting)
         through = after
         if s or len(knot.kept):

@@ -48,6 +48,7 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
     size = 1.0 + float(np.abs(gradient).max(initial=0.0))
     for _ in range(MAX_ITERATIONS):
         slope = gradient + hessian @ x
+        # Free set: entries at no bound that the gradient pushes against.
         now = ~(((x <= lower) & (slope > 0)) | ((x >= upper) & (slope < 0)))
         if factor is None or not np.array_equal(now, free):
             free = now
@@ -58,6 +59,7 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
                 return None
         if np.abs(slope[free]).max() <= GRADIENT_TOLERANCE * size:
             break
+        # Newton step in the free entries, then an Armijo search along its projection.
         ahead = np.zeros(len(x))
         ahead[free] = -lapack.dpotrs(factor, slope[free], lower=1)[0]
         found = _projected(hessian, gradient, (lower, upper), x, slope, ahead)

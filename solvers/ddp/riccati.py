@@ -79,6 +79,7 @@ def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSol
     found: list[Feedback | None] = []
     first = second = 0.0
     for through, own_slope, own_curve, lower, upper, damping in steps:
+        # Q = cost of the step + cost to go of the next state: slope and curvature by (state, decisions).
         total = own_slope + slope @ through
         whole = own_curve + through.T @ (curve @ through)
         if not len(damping):
@@ -101,12 +102,14 @@ def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSol
             curve = 0.5 * (curve + curve.T)
             found.append(Feedback(np.array([step]), back[None]))
             continue
+        # Minimise Q over the decisions within bounds; feedback of those at no bound.
         by_decisions, hessian, cross = total[rest:], whole[rest:, rest:], whole[rest:, :rest]
         made = _decided(hessian, damping, by_decisions, cross, lower, upper)
         if made is None:
             return None
         ahead, back = made
         found.append(made)
+        # Expected change for a step length t: first t + second t^2; then the cost to go of the state.
         along = hessian @ ahead
         first, second = first + float(by_decisions @ ahead), second + float(ahead @ along) / 2
         slope = total[:rest] + (along + by_decisions) @ back + ahead @ cross

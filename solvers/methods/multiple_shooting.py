@@ -133,6 +133,7 @@ def stage(
     recorder: IterationRecorder,
 ) -> StopReason:
     """Call IPOPT or FATROP repeatedly, each time with references at the nodes of the previous call."""
+    # Start: nodes and multipliers of the guess, or of the checkpoint.
     evaluator = context.evaluator
     assert evaluator.problem.staged is not None, "refused otherwise"
     problem = evaluator.problem.staged()
@@ -149,6 +150,7 @@ def stage(
         state = warm_started(context, programs.at(state.nodes), state)
         recorder.commit(Iteration(state, point, outputs={DEFECT: programs.at(state.nodes).largest_defect(state.z)}))
     while True:
+        # One call of the library with references at the present nodes.
         spent = recorder.spent()
         if spent is not None:
             return spent
@@ -164,6 +166,7 @@ def stage(
             raise watch.error
         if watch.spent is not None:
             return watch.spent
+        # Again with new references after large rotations, or with exact Hessians where FATROP stalls.
         state = watch.state
         if watch.turned:
             context.log("nodes have turned far: new references")

@@ -62,6 +62,7 @@ class IpoptIterates(ca.Callback):
 
 def solve_by_ipopt(request: LibraryRequest, watch: IterateWatch) -> tuple[str, LibraryResult]:
     """Return IPOPT's return status and its results."""
+    # The functions of the program as callbacks.
     nlp, size, rows = request.nlp, request.nlp.layout.size, request.nlp.layout.rows
     w, g = ca.Sparsity.dense(size, 1), ca.Sparsity.dense(rows, 1)
     value, constraints = values(nlp, watch)
@@ -85,6 +86,7 @@ def solve_by_ipopt(request: LibraryRequest, watch: IterateWatch) -> tuple[str, L
             lambda x, p, factor, duals: [nlp.hessian(x, float(factor[0]), duals, True)],
             watch,
         )
+    # Options of a start with multipliers.
     warm = {
         "warm_start_init_point": "yes",
         "warm_start_bound_push": 1e-9,

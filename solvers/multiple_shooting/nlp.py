@@ -339,12 +339,14 @@ class MultipleShootingNlp:
         before = self._lagrangian(base, factor, multipliers)
         blocks = [np.zeros((len(each), len(each))) for each in before]
         statics, knots = len(grid.statics), max(len(each) for each in grid.knots)
+        # Columns of the node tangents, all nodes at once.
         for column in range(grid.tangent_size):
             d = base.d.copy()
             d[:, column] += DIFFERENCE_STEP
             after = self._lagrangian(self._moved(base.motion.z, base.motion.u, d), factor, multipliers)
             for stage in range(1, grid.intervals + 1):
                 blocks[stage][:, column] = (after[stage] - before[stage]) / DIFFERENCE_STEP
+        # Columns of the knots: each stage moves its own knot.
         for column in range(knots):
             u, moving = base.motion.u.copy(), [stage for stage, own in enumerate(grid.knots) if column < len(own)]
             steps = {stage: DIFFERENCE_STEP * self.scale[grid.knots[stage][column]] for stage in moving}
@@ -353,6 +355,7 @@ class MultipleShootingNlp:
             after = self._lagrangian(self._moved(base.motion.z, u, base.d), factor, multipliers)
             for stage, step in steps.items():
                 blocks[stage][:, grid.node_size(stage) + column] = (after[stage] - before[stage]) / step
+        # Columns of the static entries, which all stages share.
         for column in range(statics):
             z = base.motion.z.copy()
             step = DIFFERENCE_STEP * self.scale[grid.statics[column]]

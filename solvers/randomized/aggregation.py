@@ -42,6 +42,7 @@ def average(values: Values, scale: Array, clip: float, fallen: float) -> Gradien
     g = values.gradient * scale
     finite = np.isfinite(values.merit) & np.isfinite(g).all(axis=1)
     g = g[finite]
+    # Normalise by the largest entry first: norms of huge gradients would overflow.
     largest = np.maximum(np.abs(g).max(axis=1, initial=0.0), MIN_LENGTH)
     directions = g / largest[:, None]
     lengths = np.maximum(np.linalg.norm(directions, axis=1), MIN_LENGTH)
@@ -49,6 +50,7 @@ def average(values: Values, scale: Array, clip: float, fallen: float) -> Gradien
         directions / lengths[:, None],
         largest * np.minimum(lengths, MAX_LENGTH / np.maximum(largest, 1)),
     )
+    # Weighted mean of the clipped gradients.
     lasted = np.ones(len(finite)) if values.alive is None else values.alive
     weights = np.where(lasted[finite] > 0, 1.0, fallen)
     short = directions * np.minimum(norms, clip)[:, None]

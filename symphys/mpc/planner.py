@@ -134,6 +134,7 @@ class Planner:
 
         ``lengths``, ``shares``: (B,) of the steps and of the feedback.
         """
+        # Simulate the policy from the measured state, then evaluate the objective.
         self.stages.begin(x, time)
         knots, z = self._knots, np.repeat(self._z[None], len(lengths), axis=0)
         none, bounds = np.zeros(knots.old.shape), knots.bounds
@@ -160,6 +161,7 @@ class Planner:
 
     def _iterate(self, plan: RecedingPlan) -> RecedingPlan:
         """Make one iteration of iLQR; without a gain, keep the plan with gains about it and more damping."""
+        # Expand about the plan, compute the policy, and search along it.
         about = LocalExpansion(self.stages, self._motion(plan), self._limits, self._knots, self._scale)
         policy = about.policy(self.damping, gradient=False)
         if policy is not None and all(np.isfinite(each).all() for each in policy.aligned):

@@ -16,8 +16,8 @@ from symphys.prediction.rotations import turned
 from symphys.problem import Problem, RecordedInput, Recording, Variable, VariableSlot
 from symphys.trajectory import Trajectory
 from symphys.transcription.quantity_slopes import QuantitySlopes
-from symphys.transcription.randomization.sampler import hidden
 from symphys.transcription.rollout import symbolic_rollout
+from symphys.transcription.sampler import hidden
 from symphys.transcription.simulation import recorder, simulate
 from symphys.types import Array
 
@@ -179,12 +179,14 @@ class Predictor:
 
     def _set(self, shared: Array, own: Array, k: int) -> _Set:
         """Return the simulation's inputs for a recording, with derivatives."""
+        # Nominal inputs; offset, scale and delays of the recording.
         recording, width = self.recordings[k], len(shared)
         z, along = self.starts[k].copy(), np.zeros((self.starts.shape[1], width + len(own)))
         offset, scale = f"{recording.table}.offset", f"{recording.table}.scale"
         measured = {offset: 0.0, scale: 1.0, **delays(recording)}
         by = {key: np.zeros(width + len(own)) for key in measured}
         both = [(block, shared, 0) for block in self.shared] + [(block, own, width) for block in self.own]
+        # Numbers take their places in z, rotation vectors by the exponential map.
         for block, numbers, first in both:
             columns = first + np.arange(block.part.start, block.part.stop)
             if block.variable.kind == "recording":
@@ -196,6 +198,7 @@ class Predictor:
             else:
                 z[block.where], along[block.where, columns] = numbers[block.part], 1
                 z[block.where] -= self._recorded[k, block.where]
+        # Recorded inputs are resampled with their delay; recorded lengths are scaled.
         for variable, part in zip(self._given, self._parts, strict=True):
             name = variable.slots[0].name
             if name in recording.inputs:

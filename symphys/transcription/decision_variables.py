@@ -38,6 +38,7 @@ def start_of(
     problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr, excluded: Sequence[str] = ()
 ) -> RolloutStart:
     """Return the start of a rollout of z, without the inputs of the variables ``excluded``, added elsewhere."""
+    # Nominal initial state, parameters and inputs.
     starts = problem.parametric.starts()
     winding = [joint.name for joint in problem.parametric.joints if joint.kind.winds]
     near = {f"{name}.{UNWRAPPED}": starts[f"{name}.start"] for name in winding}
@@ -45,6 +46,7 @@ def start_of(
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
     steps, scheduled = problem.simulation.steps, parameters.phases.at(ca.DM(np.arange(problem.simulation.steps)).T)
     u = ca.vertcat(ca.MX.zeros(inputs_size(world, inputs) - scheduled.shape[0], steps), scheduled)
+    # Values of z take their places; those of single recordings come last.
     places = zip(problem.variables, spans(problem.variables), strict=True)
     parts = [(variable, z[first:last]) for variable, (first, last) in places]
     measured = initial
@@ -59,6 +61,7 @@ def start_of(
         values = initial if variable.kind == "initial" else physical
         for slot in variable.slots:
             values[slot.name] = _replace(values[slot.name], slot.components, part)
+    # Unit quaternions, then bodies carried along by joints and moved parameters.
     varied = {slot.name for variable in problem.variables for slot in variable.slots}
     initial |= {name: _unit(initial[name]) for name in varied if name.endswith(".orientation")}
     if measured is not initial:

@@ -140,9 +140,11 @@ def rollout_terms(rollout: Rollout) -> Terms:
 def terms(samples: FormulaSamples) -> Terms:
     """Return the terms of a problem as expressions of the symbols of its samples."""
     problem = samples.problem
+    # Evaluate all formulas.
     costs = [_cost(samples, cost) for cost in problem.costs]
     targets = [(target, samples.at(target.formula, target.at)) for target in problem.targets]
     limits = [_Limit(samples, constraint) for constraint in problem.constraints]
+    # Objective = costs + squared residuals of targets; penalties are squared violations.
     residuals = [np.sqrt(target.weight) * value for target, value in targets]
     objective = sum((cost.value for cost in costs), ca.MX(0)) + sum(
         (ca.sumsqr(residual) for residual in residuals), ca.MX(0)

@@ -24,8 +24,8 @@ from symphys.problem import ALIVE, Cost, FeedbackController, Problem, Target, Va
 from symphys.suggest import hint, quote
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.formula_names import input_names
-from symphys.transcription.randomization.sampler import Sampler
 from symphys.transcription.rollout import Rollout, symbolic_rollout
+from symphys.transcription.sampler import Sampler
 from symphys.transcription.stage import BatchStep, Stage, Value, sense_function
 from symphys.types import Array, Expr
 

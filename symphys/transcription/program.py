@@ -287,6 +287,7 @@ def rollout_program(
 def _rollout_program(
     rollout: Rollout, exact: bool, recorded: Mapping[str, Formula], shift: int, by_step: Sequence[str]
 ) -> Program:
+    # Formulas are sampled in every step; the epilogue combines the samples.
     places = RolloutPlaces(rollout, by_step)
     samples = FormulaSamples(rollout, separate=True)
     asked = terms(samples)

@@ -52,10 +52,12 @@ def force_function(
     ahead = half_step_function(world, scheme, inputs, parameters.symbols)
     plain = Layout(world).size
 
+    # Law at the half step as a function of the forces that it adds.
     given = ca.SX.sym("given", at.u.size1())
     half = ca.vertcat(ahead(at.x[:plain], at.u + given, at.p), at.x[plain:])
     moment = Instant(half, at.u, at.p, at.time + scheme.dt / 2, at.z)
     law = _added(problem, world, inputs, parameters, memory, problem.forces, moment)
+    # Two Newton steps from zero with one slope.
     first, slope = ca.substitute([law, ca.jacobian(law, given)], [given], [ca.SX.zeros(given.size1())])
     found = _with_slope(first, slope)
     again = ca.substitute(law, given, found)
@@ -67,6 +69,7 @@ def _with_slope(first: Expr, slope: Expr) -> Expr:
     """Solve f = first + slope f for f (nu,), by elimination among the entries that the slope (nu, nu) has."""
     slope = ca.sparsify(slope)
     own = sorted(set(slope.sparsity().get_triplet()[1]))
+    # Sparse Gaussian elimination of (I - slope) f = first, with pivots bounded from below.
     rows = [{j: float(i == j) - slope[i, j] for j in own if i == j or slope.has_nz(i, j)} for i in own]
     right = {i: first[i] for i in own}
     for k, i in enumerate(own):
@@ -79,6 +82,7 @@ def _with_slope(first: Expr, slope: Expr) -> Expr:
                 if j in rows[k]:
                     rows[below][j] = rows[below].get(j, 0) - share / pivot * rows[k][j]
             right[own[below]] -= share / pivot * right[i]
+    # Back substitution.
     found: dict[int, Expr] = {}
     for k, i in reversed(list(enumerate(own))):
         known = sum((rows[k][j] * found[j] for j in own[k + 1 :] if j in rows[k]), ca.SX(0))

@@ -14,7 +14,7 @@ from fakes.thread_engine import Threads
 
 import symphys
 from symphys.cli.app import app
-from symphys.cli.check import Examined
+from symphys.cli.examined import Examined
 
 NAME_OF_COMMAND = {
     "list": "problems",

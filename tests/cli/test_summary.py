@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from symphys.cli.solve import advice, fitting_table, missed, table
+from symphys.cli.summary import advice, fitting_table, missed, table
 from symphys.cli.watching.observers import Live, Notes, Plain
 from symphys.results.result import CheckRecord
 from symphys.runs import Result

@@ -12,7 +12,7 @@ from rich.console import Console
 
 import symphys
 from symphys.cli.arguments import points_of, read_problems, read_sweeps
-from symphys.cli.solve import MAX_ROWS, advice_together, best_and_worst, fitting_table
+from symphys.cli.summary import MAX_ROWS, advice_together, best_and_worst, fitting_table
 from symphys.problem.sweeps.points import LazyProblem
 from symphys.results.result import CheckRecord
 from symphys.runs import Result, read_result

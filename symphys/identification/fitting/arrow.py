@@ -78,16 +78,19 @@ class ArrowSystem:
 
     def step(self, damping: float, free_shared: Bools, free_own: Bools) -> tuple[Array, Array]:
         """Return -(H + damping I)^-1 g over the free numbers: (s,) and (K, o), zero where not free."""
+        # Rows of each recording with its damping; a floor keeps the own blocks invertible.
         s, count = self.s, self.roots.shape[2]
         rows = self.roots * np.concatenate([np.ones((len(free_own), s)), free_own], axis=1)[:, None]
         floor = (EPS * count) ** 2 * np.sum(rows[:, :, s:] ** 2, axis=(1, 2))
         added = np.sqrt(np.maximum(damping, floor)[:, None] * free_own)
         damper = np.zeros((len(rows), count - s, count))
         damper[:, :, s:] = added[:, :, None] * np.eye(count - s)
+        # Eliminate the own numbers: Schur complement by orthogonal factors.
         found = eliminate(np.concatenate([rows, damper], axis=1), s)
         own_side = self.own_gradient * free_own
         side = self.shared_gradient + np.einsum("kos,ko->s", found.gain, own_side)
         shared = np.zeros(s)
+        # Shared step from the stacked remainders, priors and damping; then own steps by substitution.
         whole = np.concatenate([stacked(found.left), np.diag(np.sqrt(self.prior_block)), damping**0.5 * np.eye(s)])
         root = pseudo_root(triangle(whole[:, free_shared]))
         shared[free_shared] = -root.square @ side[free_shared]
@@ -141,6 +144,7 @@ def assemble(
         scale = np.concatenate([problem.shared.scale, problem.own.scale[which[k]]])
         rows = np.concatenate([by_shared, by_own], axis=1) * scale
         costs[k] = weights[k] * loss.value(r)
+        # Triangular factor of the weighted rows and the own priors, and the gradient.
         weighted = rows if plain else rows * np.sqrt(weighting(r))[:, None]
         prior[:, s:] = np.diag(np.sqrt(square[which[k]]))
         roots[k] = triangle(np.concatenate([np.sqrt(weights[k]) * weighted, prior]))

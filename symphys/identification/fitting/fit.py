@@ -136,6 +136,7 @@ def noise_factors(
     numbers they determine), and beta the mean of psi^2 under normal noise (Huber's proposal 2). In least squares that
     is the unbiased variance.
     """
+    # Leverages: diagonal of J (J'J)^-1 J' by shared and own numbers.
     count = len(problem.quantities)
     quantities, leverages = [], []
     for at, (k, (_, by_shared, by_own)) in enumerate(zip(which, evaluated, strict=True)):
@@ -145,6 +146,7 @@ def noise_factors(
         alone = own_rows @ information.own.whitener[at]
         leverages.append(np.sum((ahead @ information.shared.whitener) ** 2, axis=1) + np.sum(alone**2, axis=1))
     r, quantity, leverage = (np.concatenate(each) for each in ([r for r, _, _ in evaluated], quantities, leverages))
+    # Fixed-point iteration of Huber's proposal 2.
     factors = np.ones(count)
     for _ in range(MAX_ITERATIONS):
         scaled = r / factors[quantity]

@@ -478,6 +478,7 @@ class RecordedModel(LocalModel[Moved, Taken]):
         (d_shared, _), own, best = moved.taken, moved.own.copy(), reached.copy()
         stiff = np.einsum("kii->ki", system.blocks[:, system.s :, system.s :]).max(axis=1, initial=0.0)
         for share in RETRY_DAMPINGS:
+            # Recordings whose cost exceeds their model, or grew against it.
             excess = best - system.costs + system.expected_falls(d_shared, fit.step_of(state, own))
             off = ~(excess <= MAX_MODEL_EXCESS * np.maximum(system.costs, best)) | (
                 (best > system.costs) & (excess > 0)
@@ -485,6 +486,7 @@ class RecordedModel(LocalModel[Moved, Taken]):
             some = np.flatnonzero(off)
             if not some.size or not system.blocks.shape[1] > system.s:
                 break
+            # Own steps with more damping; keep those that lower the cost.
             steps = system.own_step(d_shared, damping + share * stiff, self._free[1])
             tried = fit.moved(state, d_shared, steps).own
             trial = own.copy()

@@ -68,16 +68,19 @@ def pseudo_root(rows: Array, noise: Array | float = 0.0) -> Root:
         rows: (..., m, n).
         noise: (..., n) lengths of what rounding adds to the columns.
     """
+    # Columns at length 1; those that are rounding become zero.
     lengths = np.linalg.norm(rows, axis=-2)
     longest = np.max(lengths, axis=-1, initial=0.0, keepdims=True)
     rounding = lengths <= np.maximum(NO_EFFECT * longest, NOISE_FACTOR * np.asarray(noise))
     unit = np.where(rounding, 1.0, lengths)
     scaled = np.where(rounding[..., None, :], 0.0, rows / unit[..., None, :])
+    # Singular values at the level of rounding or of the noise of the derivatives carry no information.
     left, sizes, right = np.linalg.svd(scaled, full_matrices=False)
     vectors = np.swapaxes(right, -1, -2)
     along = np.sqrt(np.einsum("...ji,...j->...i", vectors**2, (np.where(rounding, 0.0, noise) / unit) ** 2))
     largest = np.max(sizes, axis=-1, initial=0.0, keepdims=True)
     none = sizes <= np.maximum(ROUNDING * largest, NOISE_FACTOR * along)
+    # Pseudo-inverse without these directions, and the numbers that take part in them.
     share = np.where(none, 0.0, 1 / np.where(none, 1.0, sizes))
     whitener = vectors * share[..., None, :] / unit[..., :, None]
     inverse = whitener @ np.swapaxes(left, -1, -2)

@@ -115,11 +115,14 @@ def steps(
 
 def bca(draws: Array, estimate: Array, left_out: Array, tails: Array) -> Array:
     """Compute (s, 2) bias-corrected and accelerated quantiles of draws (b, s); left_out (K, s): one recording less."""
+    # Bias correction z0: quantile of the estimate among the draws.
     below = np.mean(draws < estimate, axis=0) + np.mean(draws == estimate, axis=0) / 2
     shift = scipy.stats.norm.ppf(np.clip(below, 1 / len(draws), 1 - 1 / len(draws)))
+    # Acceleration a from the jackknife.
     away = left_out.mean(axis=0) - left_out
     spread = np.sum(away**2, axis=0)
     skew = np.where(spread > 0, np.sum(away**3, axis=0) / (6 * np.where(spread > 0, spread, 1.0) ** 1.5), 0.0)
+    # Levels Phi(z0 + (z0 + z) / (1 - a (z0 + z))) (Efron 1987).
     ends = scipy.stats.norm.ppf(tails)[:, None] + shift
     levels = scipy.stats.norm.cdf(shift + ends / (1 - skew * ends))
     return np.array([np.quantile(draws[:, j], levels[:, j]) for j in range(draws.shape[1])]).reshape(-1, 2)

@@ -146,6 +146,7 @@ def ljung_box(runs: Sequence[Array]) -> tuple[float, float, int]:
     count = sum(len(run) for run in runs)
     if lags < 1 or not power > 0:
         return np.nan, np.nan, 0
+    # Autocorrelations pooled over the series, and the sum of their weighted squares.
     statistic, first = 0.0, np.nan
     for lag in range(1, lags + 1):
         pairs = [(run[:-lag], run[lag:]) for run in runs if len(run) > lag]

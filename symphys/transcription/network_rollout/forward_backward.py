@@ -76,6 +76,7 @@ def forward(
         kept: the numbers of the states that are wanted, after which there is no pass backwards; None: all.
         skipped: steps at the end that are not computed: the state stays, and what is summed over them is 0.
     """
+    # Arrays of all steps, or of one step where only the states ``kept`` are stored.
     steps = context.rollout.steps
     x0, flat, p, sensed0, interval = row_by_row(context.start, Z)
     nx, nu, whole = x0.shape[1], context.rollout.given.shape[0], kept is None
@@ -96,6 +97,7 @@ def forward(
         values=values_of(nets, len(Z), steps, room),
     )
     x[0], motion.sensed[0], parts[2][:], parts[4][:] = x0, sensed0, p, Z
+    # Each step: nets on the readings, then the compiled step.
     beside = list(zip(nets, motion.values, context.columns, context.partition.places, strict=True))
     for k, (now, then) in enumerate(pairwise(at[: motion.last + 1])):
         given[now], times[now] = flat[:, k * nu : (k + 1) * nu], interval * (k, k + 1)
@@ -110,6 +112,7 @@ def forward(
             motion.x[k + 1] = found["after"]
         if "asked" in found:
             motion.asked[k] = found["asked"]
+    # Steps that are left out repeat the last state.
     for k in range(motion.last + 1, steps + 1):
         if kept is None or k in kept:
             motion.x[k] = x[at[motion.last]]

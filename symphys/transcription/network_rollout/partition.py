@@ -13,8 +13,8 @@ from symphys.errors import Issue, ProblemError
 from symphys.model.controllers import Net
 from symphys.problem import Constraint, Cost, FeedbackController, Output, Problem, Target
 from symphys.transcription.formula_names import input_names, spans
-from symphys.transcription.randomization.sampler import swept_inputs
 from symphys.transcription.rollout import Rollout, symbolic_rollout
+from symphys.transcription.sampler import swept_inputs
 from symphys.types import Array
 
 Indices = NDArray[np.intp]

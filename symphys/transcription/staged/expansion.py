@@ -199,6 +199,7 @@ class SquareStack:
             multipliers: (c,) of all limits.
             penalties: (c,) likewise.
         """
+        # Values r and slopes S of all terms, one row each, at states or at steps.
         steps, at_steps = len(u), self._at_steps
         before, after = (x[:-1], x[1:]) if at_steps else (x, x)
         u = u if at_steps else np.concatenate([u, u[-1:]])
@@ -208,13 +209,16 @@ class SquareStack:
             r[self._unused[0]], packed[self._unused[1]] = 0.0, 0.0
         slopes = np.zeros(self._shape)
         slopes[:, self._places[0], self._places[1]] = packed
+        # Limits: shifted violations and the weights of the augmented Lagrangian.
         weights = self._weights
         if len(self._limited):
             r, weights = self._violations(r, multipliers, penalties)
         sums.value += float(np.vdot(weights * r, r))
+        # Columns of constants become those of the static entries of z.
         by_statics = slopes.shape[2] > self._wide
         if by_statics:
             slopes = np.concatenate([slopes[:, :, : self._wide], sums.by_constants(slopes[:, :, self._wide :])], axis=2)
+        # Gauss-Newton: slope 2 S' w r and curvature 2 S' w S, added to the blocks of the expansion.
         bent = (2 * weights)[:, :, None] * slopes
         slope, curve = (r[:, None] @ bent)[:, 0], slopes.transpose(0, 2, 1) @ bent
         by_x, first, by_u = self._cuts

@@ -211,6 +211,7 @@ def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts
     places = PolicyPlaces(step, sizes)
     steps, tangent, policy = step.rollout.steps, step.tangent, places.policy
     decided = (places.length, places.share, places.statics, places.off, places.held)
+    # Each step: deviation from the plan, decision of the policy, controllers and physics.
     body = [
         FunctionCall(tangent.distance, (policy["x"], places.x, places.nominal), (places.off,)),
         FunctionCall(
@@ -221,6 +222,7 @@ def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts
         *step_calls(places, step.exact),
     ]
     epilogue: tuple[FunctionCall, ...] = ()
+    # Costs of the states before and after each step, and of the last state.
     if costs is not None:
         here = (places.x, places.x, places.given, places.p, places.tick)
         there = (places.x.later(), places.x, places.given, places.p, places.tick.later())
@@ -273,12 +275,14 @@ def decide(sizes: PolicySizes, n: int) -> ca.Function:
 
     Matrices are row by row.
     """
+    # Symbols; matrices are given row by row.
     old, new, inputs, s = sizes
     acting, beside = old + new, n + old + s
     length, share = ca.SX.sym("length"), ca.SX.sym("share")
     statics, off, held = ca.SX.sym("statics", s), ca.SX.sym("off", n), ca.SX.sym("held", old)
     about, v, ahead, lower, upper = (ca.SX.sym("a", size) for size in (old, new, new, new, new))
     back, weights, keep = (ca.SX.sym("m", size) for size in (new * beside, inputs * acting, old * acting))
+    # New knots = clip(v + length ahead + share back (deviation)); inputs are weighted knots.
     answer = _product(back, new, ca.vertcat(off, held - about, statics))
     chosen = ca.fmin(ca.fmax(v + length * ahead + share * answer, lower), upper)
     both = ca.vertcat(held, chosen)

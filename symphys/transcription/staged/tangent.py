@@ -409,6 +409,7 @@ class Tangent:
     def _retracted(self, x: Expr, d: Expr) -> Expr:
         old, cursor = self._parts(x), _Cursor(d)
         new = dict(old)
+        # Poses and velocities: free bodies directly, trees in joint coordinates.
         for index, chart in self._charts:
             bodies = (index,) if chart is None else chart.tree.bodies
             poses, moving = ({i: self._pair(old, i, fields) for i in bodies} for fields in (POSES, VELOCITIES))
@@ -425,9 +426,11 @@ class Tangent:
             for i in bodies:
                 self._set_pair(new, i, POSES, moved[i])
                 self._set_pair(new, i, VELOCITIES, after[i])
+        # Entries that are their own tangent; whole turns follow the poses.
         turned = self._angle_changes(old, new)
         for name, size in self._plain_parts:
             new[name] = old[name] + cursor.take(size) + turned.get(name, 0)
+        # Reactions: the loads of pairs and joints at the new state, plus the independent part.
         others = {name: cursor.take(3) for name in self._independent_reactions}
         for body, first, second in zip(
             self.rollout.world.bodies, self._constraint_loads(old), self._constraint_loads(new), strict=True
@@ -441,6 +444,7 @@ class Tangent:
     def _difference(self, x: Expr, y: Expr) -> Expr:
         old, new = self._parts(x), self._parts(y)
         found: list[Expr] = []
+        # Poses and velocities: free bodies directly, trees in joint coordinates.
         for index, chart in self._charts:
             bodies = (index,) if chart is None else chart.tree.bodies
             places = [{i: self._pair(state, i, POSES) for i in bodies} for state in (old, new)]
@@ -452,8 +456,10 @@ class Tangent:
             else:
                 rates = [chart.rates(*each) for each in zip(places, moving, strict=True)]
                 found += [chart.difference(places[0], places[1], (old, new)), rates[1] - rates[0]]
+        # Entries that are their own tangent; whole turns follow the poses.
         turned = self._angle_changes(old, new)
         found += [new[name] - old[name] - turned.get(name, 0) for name, _ in self._plain_parts]
+        # Independent reactions: changes that the loads of pairs and joints do not explain.
         for body, first, second in zip(
             self.rollout.world.bodies, self._constraint_loads(old), self._constraint_loads(new), strict=True
         ):
@@ -470,6 +476,7 @@ class Tangent:
             kept.append((ca.SX.sym("kept", value.numel()), value))
             return kept[-1][0]
 
+        # Poses of trees by their joint errors; velocities by rates and their deviation from the joints.
         for _, chart in self._charts:
             if chart is None:
                 continue
@@ -486,6 +493,7 @@ class Tangent:
                 self._set_pair(new, i, POSES, moved[i])
                 both = [value + more for value, more in zip(after[i], off, strict=True)]
                 self._set_pair(new, i, VELOCITIES, (both[0], both[1]))
+        # Reactions by their deviation from the loads of pairs and joints.
         for body, first, second in zip(
             self.rollout.world.bodies, self._constraint_loads(old), self._constraint_loads(new), strict=True
         ):

@@ -110,10 +110,12 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
         shared = known[term.key]
         function = ReadingFunction(shared.function.function, shared.function.reads, term.after)
         return TermSlopes(function, shared.slopes, shared.curved, shared.parts, shared.bases, shared.acting)
+    # First derivatives in tangents; the second one where the term is no square.
     value, arguments = term.value, symbols.arguments[:4]
     slopes = tangent_slopes(symbols, value)
     second, acting = _second(value, arguments) if term.kind in ("cost", "sum") else (None, ())
     bases = [symbols.bases[i][acting[i].tolist(), :] if len(acting[i]) else ca.SX(0, 0) for i in (0, 1) if acting]
+    # All nonzeros as results of one function.
     results = [value, *(nonzeros(each) for each in slopes)]
     parts: tuple[slice, ...] = ()
     if second is not None:
