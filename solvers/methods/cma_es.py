@@ -10,7 +10,7 @@ Where the problem has a scenario, each candidate of a generation is rated by its
 the next generation draws anew. The start and the means of the search are validated, since what is best in a few
 samples was lucky.
 
-A solve goes on by replay: the strategy asks again from the same random stream and is told the recorded merits, so that
+A solve goes on by replay: the strategy draws again from the same random stream and takes the recorded merits, so that
 mean, step size, covariance and paths are the same to the last bit under any options, at the cost of no rollout.
 """
 

@@ -62,7 +62,7 @@ def finite(nonzeros: Array) -> Array:
 def solve_by_fatrop(request: LibraryRequest, watch: IterateWatch) -> tuple[str, LibraryResult]:
     """Return FATROP's status in IPOPT's terms, and its results."""
     parts = FatropParts(request, watch)
-    most = max(request.iterations - 1, 0)  # it makes one more than it is told
+    most = max(request.iterations - 1, 0)  # it makes one iteration more
     warm = (
         {"mu_init": request.barrier, "bound_push": BOUND_PUSH, "bound_frac": BOUND_PUSH}
         if request.row_duals.size

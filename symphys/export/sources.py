@@ -114,8 +114,8 @@ def _sizes(rollout: Rollout, step: ca.Function) -> dict[str, object]:
 def _linearized(arguments: StepArguments, slope: ca.Function) -> dict[str, object]:
     tangent, closed = arguments.tangent, arguments.rollout.feedback is not None
     sizes = {"nt": tangent.size, "given": slope.numel_in("u"), "varied": slope.numel_in("du")}
-    told = "as variables give it, then the time [s]" if closed else "that of step"
-    return {**sizes, "linearized": told, "tangent": words.indented(words.tangent_lines(tangent))}
+    meaning = "as variables give it, then the time [s]" if closed else "that of step"
+    return {**sizes, "linearized": meaning, "tangent": words.indented(words.tangent_lines(tangent))}
 
 
 def _documented(transcription: Transcription, program: Program, version: str) -> dict[str, object]:

@@ -232,7 +232,7 @@ def refuse_formulas(problem: Problem, taken: Mapping[str, str]) -> None:
         raise ProblemError(problem.file, issues)
 
 
-def looks_at_variables(problem: Problem) -> bool:
+def reads_variables(problem: Problem) -> bool:
     """Whether the formula of a cost or target reads a variable."""
     names = {variable.name for variable in problem.variables}
     return any(not names.isdisjoint(each.formula.names) for each in asked(problem))
@@ -283,7 +283,7 @@ def open_stage(rollout: Rollout, sensors: Sequence[str]) -> Stage:
     def ask(value: Value) -> dict[str, Expr]:
         return dict(zip(("running", "moments"), costs(rollout, value), strict=True))
 
-    return Stage(rollout, observe_function(rollout, sensors), ask, looks_at_variables(rollout.problem))
+    return Stage(rollout, observe_function(rollout, sensors), ask, reads_variables(rollout.problem))
 
 
 def observe_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
@@ -401,7 +401,8 @@ class CompiledStep:
         else:
             drawn = self._sampler.draw(np.random.default_rng(seed), count, 1.0)
             rows = [np.concatenate([guess, row]) for row in drawn]
-        return self.start_at(rows) if len(rows) == count else StepStart(*(tiled(p, count) for p in self.start_at(rows)))
+        start = self.start_at(rows)
+        return start if len(rows) == count else StepStart(*(np.repeat(part, count, axis=0) for part in start))
 
     def start_at(self, rows: Sequence[Array]) -> StepStart:
         """Return the initial states for values of all variables, one row each."""
@@ -530,7 +531,7 @@ class CompiledStep:
     def _sizes(self) -> tuple[int, int, int, int]:
         """Return the columns of x, p, time and z in a state."""
         rollout = self._rollout
-        n = int(rollout.z.shape[0]) if looks_at_variables(self.problem) else 0
+        n = int(rollout.z.shape[0]) if reads_variables(self.problem) else 0
         return int(rollout.x0.shape[0]), int(rollout.p.shape[0]), 1, n
 
     @property
@@ -606,8 +607,3 @@ def matrix(name: str, value: ArrayLike, columns: int) -> Array:
     if array.ndim != 2 or array.shape[1] != columns:
         raise ValueError(f"{name} must be (batch, {columns}), not {array.shape}")
     return array
-
-
-def tiled(row: Array, count: int) -> Array:
-    """Return ``count`` copies of a row."""
-    return np.repeat(row, count, axis=0)

@@ -63,8 +63,8 @@ class Stage:
         rollout: Rollout,
         sense: ca.Function,
         ask: Callable[[Value], Mapping[str, Expr]],
-        looks_at_z: bool = True,
-        shows_inputs: bool = False,
+        reads_z: bool = True,
+        with_inputs: bool = False,
     ) -> None:
         """Describe one step of a rollout.
 
@@ -72,12 +72,12 @@ class Stage:
             rollout: of the problem.
             sense: (x, p, time) -> what is sensed, see ``sense_function``.
             ask: makes expressions (SX) of the values of formulas, by name.
-            looks_at_z: whether a row has z.
-            shows_inputs: whether ``inputs`` are among the results.
+            reads_z: whether a row has z.
+            with_inputs: whether ``inputs`` are among the results.
         """
-        self.rollout, self._sense, self._shows_inputs = rollout, sense, shows_inputs
+        self.rollout, self._sense, self._with_inputs = rollout, sense, with_inputs
         parts = rollout.x0, rollout.given, rollout.p
-        self.sizes = [*(int(part.shape[0]) for part in parts), 1, 1, int(rollout.z.shape[0]) * looks_at_z]
+        self.sizes = [*(int(part.shape[0]) for part in parts), 1, 1, int(rollout.z.shape[0]) * reads_z]
         self._values: dict[tuple[Formula, int], Expr] = {}
         asked = {name: part for name, part in ask(self._value).items() if part.shape[0]}
         self._names = tuple(asked)
@@ -109,9 +109,9 @@ class Stage:
             outputs[name] = places.layout.take(int(self._asked.size1_out(k)))
         if self._names:
             last.append(FunctionCall(self._asked, tuple(found), tuple(outputs[name] for name in self._names)))
-        if self._shows_inputs:
+        if self._with_inputs:
             outputs["inputs"] = places.u.still()
-        looks_at_z = self.sizes[-1] > 0
+        reads_z = self.sizes[-1] > 0
         written = (places.x.still(), places.given, places.p, places.time.still(), places.time.later().still())
         return Program(
             size=places.layout.size,
@@ -119,10 +119,10 @@ class Stage:
             parameters=places.smoothing,
             steps=1,
             outputs={name: place for name, place in outputs.items() if place.size},
-            prologue=(FunctionCall(self._parts(), (places.row,), (*written, *[places.z] * looks_at_z)),),
+            prologue=(FunctionCall(self._parts(), (places.row,), (*written, *[places.z] * reads_z)),),
             body=tuple(body),
             epilogue=tuple(call for call in last if any(place.size for place in call.outputs)),
-            zeroed=() if looks_at_z else (places.z,),
+            zeroed=() if reads_z else (places.z,),
         )
 
     def _parts(self) -> ca.Function:
@@ -144,7 +144,7 @@ class Stage:
         ]
         found = {"after": after, "sensed": self._sense(after, p, later)}
         found |= dict(zip(self._names, self._asked.call(values), strict=True)) if self._names else {}
-        found |= {"inputs": u} if self._shows_inputs else {}
+        found |= {"inputs": u} if self._with_inputs else {}
         kept = {name: ca.densify(ca.MX(part)) for name, part in found.items() if part.shape[0]}
         return VirtualMachineStep(ca.Function("stage", [row, smoothing], list(kept.values()), ["row", "s"], list(kept)))
 

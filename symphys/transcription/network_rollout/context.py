@@ -45,7 +45,7 @@ class RolloutObjectives:
         def ask(value: Value) -> dict[str, Expr]:
             return {"asked": ca.vertcat(ca.SX(0, 1), *(value(*each) for each in self.samples.series))}
 
-        return Stage(rollout, sense_function(rollout, sensors), ask, shows_inputs=True)
+        return Stage(rollout, sense_function(rollout, sensors), ask, with_inputs=True)
 
     def _slopes(self, number: Expr) -> ca.Function:
         slopes = [ca.densify(ca.gradient(number, symbol)) for symbol in self.arguments]

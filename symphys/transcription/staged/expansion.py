@@ -204,7 +204,7 @@ class SquareStack:
         before, after = (x[:-1], x[1:]) if at_steps else (x, x)
         u = u if at_steps else np.concatenate([u, u[-1:]])
         ((r, packed),) = self._functions(StepRows(before, after, u, constants, np.arange(len(u)), clock))
-        if self._unused is not None:  # what nobody asks for may not be finite
+        if self._unused is not None:  # unused entries may be not finite
             r, packed = r.copy(), packed.copy()
             r[self._unused[0]], packed[self._unused[1]] = 0.0, 0.0
         slopes = np.zeros(self._shape)
