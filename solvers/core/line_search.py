@@ -15,6 +15,7 @@ ARMIJO_SHARE = 1e-4
 MIN_SHRINK, MAX_SHRINK = 0.1, 0.5
 """Bounds of the factor on a rejected step, which quadratic interpolation gives."""
 MAX_CANDIDATES = 30
+"""Largest number of step lengths that are tried."""
 RELATIVE_ROUNDING = 64 * float(np.finfo(float).eps)
 """Relative change of a merit that counts as rounding."""
 

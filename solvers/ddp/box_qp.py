@@ -10,9 +10,13 @@ from scipy.linalg import lapack
 from symphys.types import Array, Bools
 
 MAX_ITERATIONS = 100
+"""Largest number of projected Newton steps."""
 ARMIJO_SHARE = 0.1
+"""Least share of the decrease that the slope predicts."""
 SHRINK = 0.6
+"""Factor on a refused step."""
 MIN_STEP_FACTOR = 1e-10
+"""Least factor on a step."""
 GRADIENT_TOLERANCE = 1e-10
 """Projected gradient, relative to the first one, that counts as zero."""
 

@@ -30,6 +30,7 @@ from symphys.types import Array
 SUCCEEDED, NO_STEP = "Solve_Succeeded", "Fatrop_No_Step"
 """FATROP's return status, besides a used budget."""
 REFUSED_VALUE = 1e20
+"""Value and violation of a point that is not finite, too large to be accepted."""
 BOUND_PUSH = 1e-9
 """Distance by which a warm start is moved from its bounds, in FATROP's measure."""
 RESERVED_OF_FATROP = {"tolerance": "use tolerance beside backend"}

@@ -11,6 +11,7 @@ from symphys.shooting import ScenarioSamples, Values
 from symphys.types import Array
 
 MIN_LENGTH, MAX_LENGTH = 1e-300, 1e300
+"""Bounds of lengths in divisions and products, against overflow."""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from symphys.report.making.batch import MadePages
 
 MAX_JOBS = 256
+"""Largest number of processes."""
 MAX_PRINTED = 50
 """Number of pages up to which each is printed."""
 UNDRAWN = 3

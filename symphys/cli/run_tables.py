@@ -22,11 +22,14 @@ F = TypeVar("F", bound=Callable[..., Any])
 SHOWN = ("run", "verdict", "objective", "worst", "OUTPUTS", "equivalents", "solve_seconds", "why")
 """Columns of a table on the terminal; OUTPUTS stands for outputs, if there are few."""
 MAX_OUTPUTS = 3
+"""Largest number of outputs that are columns."""
 GAP = "  "
 MAX_TEXT = 100
 """Characters of the last column where the output is no terminal."""
 MIN_TEXT = 20
+"""Least characters of the last column."""
 MAX_FAULTS = 10
+"""Largest number of printed faults."""
 STYLES = {"solved": "green", "best_found": "yellow", "doubted": "red", "not_solved": "red", "unreadable": "red"}
 """Colours of verdicts on a terminal."""
 QUIET_TIME, LINE_INTERVAL = 1.0, 10.0

@@ -145,6 +145,7 @@ KINDS: tuple[Kind, ...] = ("taken", "approximated", "left out", "recovered")
 MAX_CACHED = 32
 """Robots that a process keeps, since reading one takes a second."""
 GRAVITY = (0.0, 0.0, -9.81)
+"""[m/s^2] The gravity of a world without [world]."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from symphys.importing.records import Finding, counted
 from symphys.importing.robot import KINDS, Imported
 
 LINE_WIDTH = 116
+"""Largest number of characters in a line."""
 BARE = re.compile(r"[A-Za-z0-9_-]+")
 HEADINGS = {
     "taken": "Taken over",

@@ -137,6 +137,7 @@ def written_sets(problem: dict[str, object], variable: str) -> tuple[str, ...]:
 
 CHECK = ("kind", "name", "error", "tolerance", "ratio", "met", "unit")
 MAX_INTERNED = 1000
+"""Largest number of values that are kept to be shared by equal ones."""
 
 
 class BriefReader:

@@ -20,6 +20,7 @@ LARGE_FIELDS = ("z", "trust")
 """The largest objects of result.json, which no table shows."""
 READ_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 MAX_READ_BYTES = 2**20
+"""Largest number of bytes of one read."""
 
 
 class ReportError(SymphysError):

@@ -134,6 +134,7 @@ Columns = Sequence[str]
 """A name for each element of a vector."""
 
 MAX_NAMES = 4
+"""Largest number of names in a clause."""
 
 
 def first_non_finite(rollout: Rollout, arrays: RolloutArrays) -> str:
@@ -221,7 +222,7 @@ def _cause(found: NonFiniteOperation | None, names: Sequence[Columns], results: 
 
 
 def _instants(rollout: Rollout) -> Iterator[tuple[str, Objective, Formula, int, int]]:
-    """(kind, objective, formula, number of the state, number of the inputs) of every evaluation of a formula."""
+    """Yield (kind, objective, formula, number of the state, number of the inputs) of all evaluations of formulas."""
     problem, steps = rollout.problem, rollout.steps
     groups = (
         ("cost", problem.costs),

@@ -39,6 +39,7 @@ from symphys.identification.interface import FitParameters, RecordedResiduals, R
 from symphys.types import Array, Bools, Ints
 
 CONFIDENCE_LEVEL = 0.95
+"""Probability of the intervals."""
 SUSPICIOUS = 1e-8
 """Relative singular values below which the rounding of the derivatives is measured."""
 RELATIVE_NUDGE = 8 * EPS

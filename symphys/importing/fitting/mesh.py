@@ -27,6 +27,7 @@ MIN_WITNESSES = 4
 GAP_NEIGHBOURS = 5
 """Number of nearer neighbours, of eight, from which a pixel counts as a gap between samples."""
 GOLDEN = (1 + 5**0.5) / 2
+"""The golden ratio."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Mesh:
 
     @cached_property
     def samples(self) -> Array:
-        """Points (k, 3) spread over all triangles by area, the same each time, and all vertices."""
+        """The samples (k, 3): points spread over all triangles by area, reproducibly, and all vertices."""
         corners = self.vertices[self.faces]
         areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         rng = np.random.default_rng(0)
@@ -116,7 +117,7 @@ class Mesh:
 
     @cached_property
     def filling(self) -> Array:
-        """Points (k, 3) of a regular grid inside."""
+        """The points (k, 3) of a regular grid inside."""
         low, high = self.outer.min(axis=0), self.outer.max(axis=0)
         step = self.size / 40
         sides = [np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True)]

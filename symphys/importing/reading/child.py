@@ -37,6 +37,7 @@ MODEL, ANSWER, REQUEST = "model.mjb", "answer.json", "request.json"
 MAX_MEMORY = 8 << 30
 """[bytes] Memory of the process."""
 MAX_BODIES = 2000
+"""Largest number of bodies of a model."""
 FINITE_WORDS = (
     "body_pos body_quat body_ipos body_mass body_inertia jnt_pos jnt_axis jnt_stiffness geom_pos geom_size "
     "qpos0 dof_armature dof_damping dof_frictionloss site_pos actuator_gainprm actuator_biasprm "

@@ -17,6 +17,7 @@ from symphys.importing.records import Finding, ImportOptions, JointMotor, Kind
 from symphys.types import Array
 
 MAX_NAME_LENGTH = 64
+"""Largest number of characters of a name."""
 WORDS = (
     "sin cos tan asin acos atan atan2 sinh cosh tanh sqrt exp log abs sign min max clip hypot norm sumsqr sum mean dot "
     "cross rotate world ground gravity time pi alive"

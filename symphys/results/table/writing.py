@@ -111,7 +111,7 @@ def frame(folder: str | Path, where: str | Sequence[str] = (), sort: str = "") -
 
 
 def best_frame(folder: str | Path, by: str = "objective", overall: bool = False) -> Any:
-    """The best runs below a folder as a pandas.DataFrame; see ``symphys.results.table.best``."""
+    """Return the best runs below a folder as a pandas.DataFrame, as ``symphys.results.table.best`` selects them."""
     found = read_rows(Path(folder))
     return framed(best(found.rows, by, overall), found)
 
