@@ -281,7 +281,7 @@ def test_values_and_gradients(both: tuple[Transcription, LargeTranscription], sm
     Z = points(within)
     a = within.shooting.evaluator.gradient(Z, smoothing)
     assert a.gradient is not None
-    for columns, kept in ((1, 1), (4, 150), (layers.SEGMENT_COLUMNS, evaluators.KEPT_NUMBERS)):
+    for columns, kept in ((1, 1), (4, 150), (layers.SEGMENT_COLUMNS, evaluators.MAX_KEPT_NUMBERS)):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(layers, "SEGMENT_COLUMNS", columns)
             patch.setattr(evaluators, "MAX_KEPT_NUMBERS", kept)
