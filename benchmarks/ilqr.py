@@ -86,7 +86,7 @@ def measured(problem: str, calls: dict[str, Call], turns: int) -> Iterator[Row]:
 def jacobians(problem: Problem) -> tuple[str, dict[str, Call]]:
     """Return the size of a problem and calls that take the Jacobians of STEPS steps."""
     made = Linearization(symbolic_rollout(problem), threads=1, exact=True)
-    x0, u, p = made.begun(guess_of(problem))
+    x0, u, p = made.start(guess_of(problem))
     states = [x0]
     for k in range(STEPS):
         states.append(made.step.step(k, states[-1][None], u[None, k], p, 0.0)[0])

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED
-from symphys.results.case_name import settings_words
+from symphys.results.config import settings_words
 from symphys.results.file_names import CONFIG, FIGURES, PROBLEM, RESULT
 from symphys.results.run import Run, read_run
 from symphys.results.text_files import ReportError

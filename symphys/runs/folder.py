@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from symphys import files
-from symphys.results.case_name import case_name
-from symphys.results.config import Config
+from symphys.results.config import Config, case_name
 from symphys.results.file_names import (
     CHECKPOINT,
     CONFIG,

@@ -9,8 +9,7 @@ from typing import Any
 
 from symphys.codegen.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
-from symphys.results.case_name import case_name
-from symphys.results.config import Config, make_config
+from symphys.results.config import Config, case_name, make_config
 from symphys.runs.choice import chosen
 from symphys.runs.folder import RunFolder
 from symphys.runs.guess import OWN_GUESS, GuessOrigin, RunGuess, with_guess

@@ -70,7 +70,7 @@ def test_slopes_of_a_step_are_those_of_linearize(name: str, kick: Transcription)
     linearize = slopes_function(tangent_of(one))
     made = Linearization(one.rollout, backend="casadi")
     z = one.shooting.start(1)
-    motion, p = made.motion(z, 0.0), made.begun(z)[2]
+    motion, p = made.motion(z, 0.0), made.start(z)[2]
     slopes = made.step.slopes(motion.x[:-1], motion.u, p, 0.0)
     for k in (0, len(motion.u) // 2):
         u = np.array(one.rollout.with_shares(casadi.DM(motion.u[k]), casadi.DM(k))).ravel()

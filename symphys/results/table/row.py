@@ -15,7 +15,7 @@ from typing import Any
 from symphys import json_values as values
 from symphys.files import strict
 from symphys.findings.verdict import NOT_SOLVED
-from symphys.results.case_name import case_name
+from symphys.results.config import case_name
 from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.result import CheckRecord, Result
 from symphys.results.run import is_result, read_or_note

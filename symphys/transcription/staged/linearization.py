@@ -40,7 +40,7 @@ class Linearization:
     def motion(self, z: ArrayLike, smoothing: float, start: Array | None = None) -> StagedMotion:
         """Return the motion of z (len(z),), from its own first state or another one (nx,)."""
         given = np.asarray(z, float)
-        x0, u, p = self.begun(given)
+        x0, u, p = self.start(given)
         states = [x0 if start is None else start]
         for k in range(self.rollout.steps):
             states.append(self.step.step(k, states[-1][None], u[None, k], p, smoothing)[0])
@@ -82,7 +82,7 @@ class Linearization:
         if not len(self.statics):
             nx, n, _, np_ = self.step.arguments.sizes
             return np.zeros((n, 0)), np.zeros((nx, 0)), np.zeros((np_, 0))
-        x0, p = motion.x[0], self.begun(motion.z)[2]
+        x0, p = motion.x[0], self.start(motion.z)[2]
         first, parameters = (np.array(ca.DM(part)) for part in self._start_slopes(motion.z))
         first = first - self._sparse(self.tangent.shift, x0, p) @ parameters
         start = self._sparse(self.tangent.projection, x0, p) @ first
@@ -95,13 +95,13 @@ class Linearization:
 
     def parameters(self, z: Array) -> Array:
         """Return p (np,): without static entries the same for all z."""
-        return self.begun(z)[2] if len(self.statics) else self._parameters
+        return self.start(z)[2] if len(self.statics) else self._parameters
 
     @cached_property
     def _parameters(self) -> Array:
-        return self.begun(np.zeros(int(self.rollout.z.shape[0])))[2]
+        return self.start(np.zeros(int(self.rollout.z.shape[0])))[2]
 
-    def begun(self, z: Array) -> tuple[Array, Array, Array]:
+    def start(self, z: Array) -> tuple[Array, Array, Array]:
         """Return first state (nx,), inputs (N, m) without shares of phases, and p (np,)."""
         x0, u, p = (np.array(part) for part in self._start.call([z]))
         return x0.ravel(), np.ascontiguousarray(u[: self.rollout.controls].T), p.ravel()

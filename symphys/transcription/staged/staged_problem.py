@@ -129,7 +129,7 @@ class RolloutStages:
         key = 0 if single else len(Z), Z[:, self.statics].tobytes()
         if self._known is None or self._known[0] != key:
             rows = Z[:1] if single else Z
-            parts = [self._linearization.begun(z) for z in rows]
+            parts = [self._linearization.start(z) for z in rows]
             states = np.array([np.append(x, np.zeros(self._sums)) for x, _, _ in parts])
             starts = np.array([np.array(self._groups.symbols.sums.started(z)).ravel() for z in rows])
             self._known = key, (states, np.array([p for _, _, p in parts]), starts)
