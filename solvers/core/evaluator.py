@@ -41,7 +41,7 @@ class CountingEvaluator:
     scenario are offered to none.
 
     Attributes:
-        problem: what is evaluated.
+        problem: the evaluated problem.
         smoothing: of all evaluations.
         incumbent: the best point of the stage.
         counter: of the work.

@@ -114,7 +114,7 @@ class Solve(Protocol[O_contra]):
     """Minimise the merit from ``start``.
 
     Args of the call:
-        problem: what to minimise, within which bounds.
+        problem: objective, constraints and bounds.
         start: (n,) where to begin; a seed's perturbation of the guess is already in it.
         options: of the solver.
         seed: the random stream is ``numpy.random.default_rng([seed, 1])``, the same for every solver that draws.

@@ -113,7 +113,7 @@ class StageResult:
         status: how it ended; INTERRUPTED for one that is to go on.
         z: (n,) its best point.
         objective, max_violation: of that point at this smoothing; see ``TraceRow``. nan where nothing was evaluated.
-        counts, seconds: what the stage took, those before it left out.
+        counts, seconds: of this stage alone.
     """
 
     smoothing: float
@@ -140,7 +140,7 @@ class Outcome:
         z: (n,) the best point.
         trace: one row per iteration.
         counts: total work.
-        checkpoint: what the solver needs to go on exactly here; JSON-able numbers, strings and lists of numbers.
+        checkpoint: the data from which the solver resumes exactly; JSON-able numbers, strings and lists of numbers.
         stages: those of smoothing that were begun, in their order; of an interrupted solve the last one is halfway.
         gains: feedback about the best point, as named arrays; empty of solvers without, and of interrupted solves.
         multipliers: those of a solve that ended well, by names of the solver's own, from which another may start; empty

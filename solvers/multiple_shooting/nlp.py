@@ -191,7 +191,7 @@ class MultipleShootingNlp:
         """Make the patterns.
 
         Args:
-            plan: what is evaluated.
+            plan: the part that all evaluations share.
             layout: where everything is.
             limit_rows: the limits that depend on each stage.
             scale: (len(z),).
@@ -481,7 +481,7 @@ class Programs:
         """Find the stages that limits depend on, and what all steps share, at lines between the nodes.
 
         Args:
-            problem: what is solved.
+            problem: the staged problem.
             grid: its intervals.
             evaluator: has the scale of z, and the smoothing.
             z: (n,) of the guess.

@@ -118,7 +118,7 @@ def check(problem: Source, at: At = None) -> Checked:
     motions.
 
     Args:
-        problem: what ``load`` takes.
+        problem: any argument of ``load``.
         at: the point to examine. None: the guess; else a solution, the path of its run folder, or values of variables
             by name.
 

@@ -78,7 +78,7 @@ class SensorElements:
 
     Attributes:
         elements: of the sensors.
-        sites: that sensors need beside those of the world.
+        sites: additional ones that sensors need.
         left_out: names of sensors without counterpart.
     """
 

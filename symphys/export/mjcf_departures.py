@@ -28,7 +28,7 @@ class Departure:
         kind: ``approximated`` by the nearest element; ``left out``, which is refused unless approximations are allowed;
             ``refused``; ``measured`` by a trial.
         what: names of joints, contacts, surfaces or sensors.
-        how: what is written instead, or a remedy.
+        how: the replacement, or a remedy.
     """
 
     kind: Kind

@@ -31,7 +31,7 @@ class FitParameters:
         names: (n,) as reports show them.
         guess, lower, upper: where the fit starts, and between which bounds it stays; -inf and inf are none.
         scale: by how much each changes sensibly; above 0.
-        prior_mean, prior_deviation: what is known beforehand, with its standard deviation; a deviation of inf is none.
+        prior_mean, prior_deviation: prior mean and standard deviation; inf: no prior.
         quantities: (n,) what each sets, ``cube.mass``; advice depends on the last word. Empty: the names.
         units: (n,) as reports show them; empty: none.
     """

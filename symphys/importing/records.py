@@ -31,9 +31,9 @@ class ImportFinding:
     """The fate of one part of a model, or of several alike.
 
     Attributes:
-        kind: what was done with it.
+        kind: its fate.
         what: the part, as the file calls it.
-        how: what was done instead, or why it was left out; one sentence.
+        how: the replacement, or why it was left out; one sentence.
         amount: how far off, with its unit; empty where that has no sense.
     """
 
@@ -123,12 +123,12 @@ class CompiledModel:
     """A compiled model.
 
     Attributes:
-        file: that was read.
+        file: the model file.
         kind: "mjcf" or "urdf".
         model: MjModel.
         inertials: by the names of bodies, where the model's numbers are not those of the file.
         motors: by the names of joints, of a URDF.
-        findings: what MuJoCo loses, and what was recovered.
+        findings: losses of MuJoCo, and recovered parts.
         files: all files that were read: the model, included files, meshes and height fields.
     """
 

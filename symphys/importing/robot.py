@@ -153,10 +153,10 @@ class Imported:
     """A robot.
 
     Attributes:
-        file: that was read.
+        file: the model file.
         title: the model's own name, else the name of the file.
         tables: of a problem file, as ``[[include]]`` takes them: bodies, joints, ...
-        findings: what became of the parts of the model, in the order of ``KINDS``.
+        findings: the fate of the parts of the model, in the order of ``KINDS``.
     """
 
     file: Path

@@ -42,8 +42,8 @@ class ClosedLoop:
     """The states, inputs, plans and latencies of a closed loop.
 
     Attributes:
-        plant: that was controlled.
-        controller: that did.
+        plant: the controlled plant.
+        controller: of the plant.
         time: (K + 1,) [s] of the plant's states.
         x: (K + 1, nx) states of the plant.
         u: (K, m) inputs that acted.

@@ -46,7 +46,7 @@ class Controller:
         """Compile the model.
 
         Args:
-            problem: what ``load`` takes.
+            problem: any argument of ``load``.
             threads: number of threads that share the steps of a plan; None: one for each processor.
 
         Raises:

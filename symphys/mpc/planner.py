@@ -82,8 +82,8 @@ class Planner:
         weights: (m, w): inputs of a step are weights @ v.
         lower, upper, scale: (w,) of the decisions.
         damping: of the next iteration.
-        threads: that share the steps of a plan.
-        description: what evaluates, in words.
+        threads: their number for the steps of a plan.
+        description: of the evaluator.
     """
 
     def __init__(self, problem: Problem, threads: int | None = None) -> None:

@@ -49,9 +49,9 @@ def identify(
     """Estimate a problem's variables from its recordings, with uncertainty and residual analysis.
 
     Args:
-        problem: what ``load`` takes, with [[recording]] tables.
+        problem: any argument of ``load``, with [[recording]] tables.
         folder: gets identification.json and identification.npz, and what an interrupted fit goes on from; None: none.
-        threads: that share the simulations; None: one for each processor.
+        threads: their number for the simulations; None: one for each processor.
         monitor: is called with each iteration.
         stop: is called after each iteration; True ends the fit there.
         settings: in place of those in [identify]: ``loss="huber"``, ``bootstrap=200``, ``check="cma"``,

@@ -53,7 +53,7 @@ def step_means(recorded: RecordedInput, steps: int, dt: float, delay: float) -> 
 
     Args:
         recorded: with samples at times (k,) [s].
-        steps: whose inputs are wanted.
+        steps: their number.
         dt: [s] their length.
         delay: [s] by which what was recorded acts later, on the clock of the simulation.
     """
@@ -106,7 +106,7 @@ class Predictor:
     The simulation's z has first what recordings set at the start, then what drives it, then the problem's variables.
 
     Attributes:
-        recordings: that are predicted.
+        recordings: the predicted ones.
         shared, own: blocks of the numbers that are identified.
         sizes: by the text of a formula, how many numbers it has.
         starts: (K, n) z at the guess.

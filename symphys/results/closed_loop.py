@@ -70,12 +70,12 @@ class ClosedLoopRecord:
         horizon, dt, plant_dt, duration: [s] of plans, of the model's and of the plant's steps, and what was simulated.
         iterations: of a tick.
         feedback: whether commands between ticks answered what was measured.
-        plant: what the plant differs in, in words.
-        latency_kind: what counted as latency: "measured", "cpu" or seconds.
+        plant: differences of the plant, in words.
+        latency_kind: the counted latency: "measured", "cpu" or seconds.
         ticks, in_time: how many there were, and how many plans were ready before the next tick.
         median, p99, worst: [s] of the latencies that counted.
         targets: at the end.
-        evaluator: what evaluated, in words.
+        evaluator: description of the evaluator.
         threads: of it.
         stopped: why it ended before its time; empty.
         command_names, value_names: of the columns below.

@@ -23,9 +23,9 @@ class Config:
         problem: the stem of the problem's file.
         solver: a solver's name.
         seed: 0 is the guess as it stands.
-        settings: what the command line changed in the file, by dotted key.
+        settings: changes by the command line in the file, by dotted key.
         options: the solver's options, all of them.
-        backend: what was to evaluate; "auto" is the best that the machine has.
+        backend: the requested evaluator; "auto" is the best that the machine has.
         guess: the "run" folder that it was taken from, and the "digest" of what was taken, which counts; else empty.
         key: of the problem's text and all the above; two runs with one key are the same run.
     """

@@ -175,7 +175,7 @@ class Result:
 
     Attributes:
         problem, title: the file's stem and its title.
-        solver, seed: who solved it, from which guess.
+        solver, seed: solver, and number of the start.
         solved: whether every check is met, or the point is stationary where there is none, by a motion that can be
             relied on; the same as a verdict of "solved".
         status, advice: how the solver ended and what to try.
@@ -200,8 +200,8 @@ class Result:
             "flags", those of the compiler, where something was compiled, "chosen", why the solver was taken where none
             was named, and "guess", the run from which it starts.
         when: UTC time of the end, ISO 8601.
-        command: what was typed.
-        backend: what evaluated the functions.
+        command: the command line.
+        backend: the evaluator of the functions.
         verdict: a word of ``symphys.findings.verdict``.
         doubts: why the motion is not to be relied on, one clause each.
         again: whether what failed was the machine and not the run: the same command tries it again.

@@ -36,11 +36,11 @@ class Run(Result):
         place: the folder's path below the report's folder, with forward slashes.
         readable: whether there is a result; if not, only names and ``faults`` mean anything.
         description: of the problem.
-        settings: what the command line changed in the problem's file, by dotted key.
+        settings: changes by the command line in the problem's file, by dotted key.
         met: whether nothing is missed.
         examination: how far the solution can be trusted.
         trace: the iterations.
-        faults: what could not be read, one sentence each.
+        faults: unreadable parts, one sentence each.
     """
 
     folder: Path = Path()

@@ -21,7 +21,7 @@ class Job:
     """A requested run with everything that it needs; may be sent to another process.
 
     Attributes:
-        problem: what to solve.
+        problem: the problem to solve.
         config: the exact request, as plain values.
         options: of the solver, validated.
         folder: where the run is written.

@@ -48,7 +48,7 @@ class Replay:
         folder: of the run.
         instants: of the recorded motion.
         quantities: how many were compared.
-        differences: those that are not the same to the bit, those of the motion first.
+        differences: quantities that are not bit-for-bit equal, those of the motion first.
         elsewhere: what the run was made with and what is here, by name, where the two differ: versions, processor,
             platform.
         lacking: arrays that trajectory.npz does not have, as in older files; they are not compared.

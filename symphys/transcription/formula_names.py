@@ -128,7 +128,7 @@ class Parameters:
         symbols: SX, one column each.
         nominal: their values in the file.
         physical: how many of them are physical.
-        phases: which of the world's numbers change from step to step, and how.
+        phases: the numbers of the world that change from step to step.
     """
 
     names: tuple[str, ...]

@@ -47,7 +47,7 @@ class ExternalControlProblem:
 
     Attributes:
         problem: without the controllers and variables whose place the actions take.
-        acting: what acts.
+        acting: the actions.
         sensors: names of the sensors that are observed; empty: the states of all bodies are.
     """
 
@@ -329,11 +329,11 @@ class CompiledStep:
     objective of the problem; its constraints are no part of them.
 
     Attributes:
-        problem: that was opened, without the controllers whose place the actions take.
-        actions: what each action adds to, such as ``knee.command``.
+        problem: the opened problem, without the controllers whose place the actions take.
+        actions: the input of each action, such as ``knee.command``.
         lower, upper: (m,) bounds of the actions, which are not enforced; may be infinite.
         smoothing: of the contacts [m/s].
-        backend: what evaluates, in words.
+        backend: description of the evaluator.
     """
 
     problem: Problem

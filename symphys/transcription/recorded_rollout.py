@@ -61,11 +61,11 @@ def record_rollout(
     """Compile a rollout with quantities as outputs.
 
     Args:
-        problem: what is rolled out.
+        problem: the simulated problem.
         quantities: formulas as in problem files: ``ball.position``, ``rotate(torso.orientation, [0, 0, 1])``.
         smoothing: of the contacts [m/s].
         backend: the name of a kernel's.
-        threads: that share a batch; None: one for each processor.
+        threads: their number for a batch; None: one for each processor.
 
     Raises:
         SymphysError: a quantity is no formula, or names what the problem does not have; there can be no kernel.

@@ -206,11 +206,11 @@ class Rollout:
     """A problem's rollout as expressions of z and smoothing (MX).
 
     Attributes:
-        problem: what is rolled out.
+        problem: the simulated problem.
         world: its numbers, with symbols (SX) for the parameters that variables set.
         inputs: names of the inputs that u stacks.
-        parameters: what p stacks.
-        memory: what states x hold after those of the world.
+        parameters: the entries of p.
+        memory: the entries of x after the world's state.
         z: (n,) decision vector.
         smoothing: scalar.
         x0: (nx,) initial state.

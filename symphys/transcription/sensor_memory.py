@@ -21,7 +21,7 @@ class SensorMemory:
     """Columns after those of the world's state (``Layout``).
 
     Attributes:
-        world: what is simulated.
+        world: the simulated world.
         inputs: names of the inputs that are remembered.
         states: names of the parts of the state that are remembered, such as ``torso.velocity``.
         terminates: whether the last column is ``alive``: 1 until the termination, 0 from then on; ``after`` omits it.

@@ -54,7 +54,7 @@ class Stage:
     there (o,), whatever ``ask`` makes of formulas, and ``inputs`` (nu,), with what controllers and force laws add.
 
     Attributes:
-        rollout: whose step it is.
+        rollout: the rollout of the step.
         sizes: of the parts of a row.
     """
 

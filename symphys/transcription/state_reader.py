@@ -25,7 +25,7 @@ class StateReader:
     """Converts measurements to states.
 
     Attributes:
-        sizes: what a state by name must have, and how many numbers each is: ``shoulder.angle`` and ``shoulder.rate``,
+        sizes: the names of a state by name with their numbers of entries: ``shoulder.angle`` and ``shoulder.rate``,
             ``rail.position``; of a body that floats ``torso.position`` [m], ``torso.orientation`` (w, x, y, z),
             ``torso.velocity`` [m/s], ``torso.angular_velocity`` [rad/s], world frame. Angles count whole turns.
         floating: names of the bodies that float.

@@ -59,10 +59,10 @@ def transcribe(
     """Transcribe a problem for solving, judging and recording.
 
     Args:
-        problem: what to solve.
+        problem: the problem to solve.
         exact: whether smoothing 0 is all that will be asked for; kernels then leave the smoothing out.
-        backend: what evaluates it, a name of ``symphys.codegen.backends.NAMES``.
-        threads: that share a batch; None: one for each processor.
+        backend: the evaluator, a name of ``symphys.codegen.backends.NAMES``.
+        threads: their number for a batch; None: one for each processor.
 
     Example:
         >>> import symphys

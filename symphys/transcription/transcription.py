@@ -36,7 +36,7 @@ class Transcription:
     """A problem, its shooting problem, and the exact rollout that judges and records; compared by identity.
 
     Attributes:
-        backend: what evaluates the shooting problem.
+        backend: the evaluator of the shooting problem.
         build_seconds: until there were expressions; ``backend.seconds`` come on top.
         records_contacts: whether ``record`` has the forces and gaps of contacts.
     """

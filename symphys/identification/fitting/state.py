@@ -111,7 +111,7 @@ class FitState(Damped):
         noise: (q,) factors on the noise of each quantity under which the merit is computed; empty: none.
         horizon: share of the recordings that is fitted.
         first: the iteration at which lambda was last set anew.
-        notes: what is to be said of where the fit began, a sentence each.
+        notes: on the start of the fit, a sentence each.
     """
 
     shared: Array
@@ -143,7 +143,7 @@ class FitOutcome:
     """The end of a fit.
 
     Attributes:
-        status, reason: what ended it, and what that means.
+        status, reason: the cause of its end, and an explanation.
         state: there; ``fit`` goes on from it.
         system: the arrow there, of the recordings that were fitted.
         one_sided: (s,) at a kink, how far from the shared numbers the Jacobian of one side has its minimum; else empty.

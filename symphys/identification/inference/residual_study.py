@@ -44,7 +44,7 @@ class ResidualSamples:
     Attributes:
         residual: by noise.
         recording: index among all recordings.
-        rows: what they are of.
+        rows: their description.
     """
 
     residual: Array

@@ -20,7 +20,7 @@ class Folders:
 
     Attributes:
         file: the model.
-        assets: what the caller allows beside the model's folder.
+        assets: other folders that the caller allows.
     """
 
     file: Path
@@ -47,7 +47,7 @@ class Folders:
         Args:
             path: of the file.
             named: as the model writes it.
-            what: which element names it.
+            what: the element that names it.
 
         Raises:
             ImportProblem: it does.

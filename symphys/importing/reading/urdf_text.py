@@ -47,7 +47,7 @@ class JointText:
         child: name of a link.
         effort: [N m] or [N]; None: not said.
         velocity: [rad/s] or [m/s]; None: not said.
-        mimic: what it follows.
+        mimic: the joint that it follows.
     """
 
     name: str

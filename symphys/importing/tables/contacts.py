@@ -284,7 +284,7 @@ def write_contacts(
         classes: of each surface what its contacts follow from.
         surfaces: tables of bodies with shapes.
         still: tables of what stands still.
-        meet: who may touch whom.
+        meet: pairs of surfaces that may touch.
     """
     own = {name: own_law(name, still, meet) for name in surfaces}
     for name, law in own.items():

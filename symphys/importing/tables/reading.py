@@ -102,9 +102,9 @@ class ModelReading:
     Attributes:
         library: the module ``mujoco``.
         model, data: MjModel, and MjData at the reference pose.
-        options: what the caller chose.
-        names: that are given.
-        findings: what became of parts, in order.
+        options: of the caller.
+        names: of all parts.
+        findings: the fate of each part, in order.
         links: by the index of each body, the link that it belongs to; bodies that the world holds have none.
         joint_names: of joints, by index; of a free joint that of its body.
         rigid: number of equality constraints that were taken over.

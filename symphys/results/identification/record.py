@@ -60,8 +60,8 @@ class OpenDirection:
     Attributes:
         names: of the shared numbers that take part.
         own_names: of own numbers that move along.
-        text: what is open, in words.
-        advice: which recording would determine it, in a sentence.
+        text: description of the direction.
+        advice: the recording that would determine it, in a sentence.
         error: standard error of the least determined direction, in units of the numbers; inf: no information.
         by_prior: whether a prior determines it.
     """
@@ -143,7 +143,7 @@ class GlobalSearch:
         lower: whether that is lower by more than one standard error makes.
         values: (s,) where, by name.
         evaluations: of all recordings.
-        text: what that means, in a sentence.
+        text: the interpretation, in a sentence.
     """
 
     merit: float
@@ -175,7 +175,7 @@ class Identification:
         parameters: the shared numbers.
         own_names: of the own numbers.
         open: directions that the recordings do not determine.
-        quantities: what is left of each measured quantity, in the recordings that were fitted to.
+        quantities: residuals of each measured quantity, in the fitted recordings.
         fitted_errors, held_back_errors: how far simulations are from the recordings that were fitted to, and from those
             that were held back.
         recordings: (K,) names.

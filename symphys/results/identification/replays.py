@@ -54,7 +54,7 @@ class RecordingReplay:
         held_back: whether it was held back.
         ratio: root mean square of its residuals by noise.
         time: (n,) [s] of the samples, on the simulation's clock.
-        quantities: that were measured.
+        quantities: the measured ones.
         bodies: b bodies whose positions were measured.
         position, orientation: (n, b, 3) [m], (n, b, 4) of these; nan where a sample is missing.
         motion: the simulation.

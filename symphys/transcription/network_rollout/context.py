@@ -67,7 +67,7 @@ class RolloutContext:
 
     Attributes:
         partition: the problem taken apart.
-        objectives: what is asked of a rollout.
+        objectives: of a rollout.
         sensors: names of those that large nets use.
         columns: for each net, which columns of what they read it takes.
     """

@@ -149,7 +149,7 @@ class BackwardPass:
 
         Args:
             context: of the problem.
-            batch_step: that the motion was made with.
+            batch_step: the step of the motion.
             nets: likewise.
             motion: forwards.
             smoothing: of it [m/s].

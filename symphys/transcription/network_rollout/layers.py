@@ -163,7 +163,7 @@ class NetValues:
     Of layers that are kept there are those of all steps, of others those of one segment.
 
     Attributes:
-        net: whose.
+        net: the net.
         length: steps of a segment.
     """
 

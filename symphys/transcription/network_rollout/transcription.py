@@ -38,7 +38,7 @@ class LargeTranscription(Transcription):
     """A ``Transcription`` whose ``rollout`` is that of the problem without its large nets.
 
     Attributes:
-        context: what it is computed with.
+        context: the data of its rollouts.
     """
 
     context: RolloutContext

@@ -33,7 +33,7 @@ class ExpansionSums:
         Args:
             sizes: N, n, m and s.
             of_constants: (c, s) what the terms' constants do with the static entries of z.
-            knots: which of the constants are knots of controls (k,), and the step and input of each (k, 2).
+            knots: the constants that are knots of controls (k,), with step and input of each (k, 2).
         """
         steps, n, m, s = sizes
         self.of_constants, self.knots = of_constants, knots
@@ -135,7 +135,7 @@ class SquareStack:
         """Collect the slopes; functions are compiled on demand.
 
         Args:
-            symbols: that the terms are expressions of.
+            symbols: the arguments of the terms.
             terms: to stack.
             places: where limits are among all limits, by the ``id`` of the term.
             bounds: (c,) each, of all limits.

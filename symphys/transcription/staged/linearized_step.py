@@ -43,9 +43,9 @@ class LinearizedStep:
     What evaluates is built when it is first asked for.
 
     Attributes:
-        rollout, tangent: whose step it is, and in what its slopes are.
+        rollout, tangent: of the step and of its derivatives.
         backend: the name of a backend that is a kernel; other names mean casadi's virtual machine.
-        threads: that share a batch; None: one for each processor.
+        threads: their number for a batch; None: one for each processor.
         exact: whether it is for smoothing 0 only.
         parameters: whether there are slopes by p; without, those are 0.
         clock: [s] the time at which step 0 begins; of a rollout whose duration does not vary.

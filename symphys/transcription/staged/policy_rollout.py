@@ -98,10 +98,10 @@ class PolicyRollout:
     """Rollouts under policies of one size.
 
     Attributes:
-        step: which is taken.
+        step: the step of the rollout.
         sizes: of the policies.
         costs: of the motion; without, it costs 0.
-        threads: that share step lengths.
+        threads: their number for the step lengths.
     """
 
     step: LinearizedStep
@@ -136,7 +136,7 @@ class PolicyRollout:
         Args:
             start: (nx,) or (B, nx) first states.
             p: (np,) or (B, np) parameters.
-            policy: that they follow.
+            policy: of the motions.
             lengths: (B,).
             smoothing: of the steps.
             clock: [s] the time at the start.

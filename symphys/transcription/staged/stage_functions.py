@@ -69,7 +69,7 @@ class ReadingFunction:
 
     Attributes:
         function: (entries of each argument) -> columns.
-        reads: which entries of each argument.
+        reads: the entries of each argument.
         after: whether the first argument is the state after the step, and the last the number of that.
     """
 
@@ -122,7 +122,7 @@ class StageFunctions:
             functions: to evaluate together.
             steps: of a horizon.
             backend: a name of a kernel, or another for casadi's virtual machine.
-            threads: that share the steps; None: one for each processor.
+            threads: their number for the steps; None: one for each processor.
             worth: operations of a horizon above which they are compiled; None: ``MIN_COMPILED_OPERATIONS``.
         """
         self.functions, self.backend, self.threads = list(functions), backend, threads

@@ -35,7 +35,7 @@ class MotionSum:
     """One number that is summed along a motion.
 
     Attributes:
-        formula, component: what is added.
+        formula, component: the summed number.
         before, after: (N,) its weights at the start and at the end of each step.
     """
 
@@ -212,7 +212,7 @@ class StageSymbols:
         x: the state that is looked at, with its sums.
         first: the state before the step, without sums: where it is another one.
         u: inputs as variables give them.
-        constants: what is the same all along a motion: p, the entries ``named`` of z, the starts of ``MotionSums``.
+        constants: constant along a motion: p, the entries ``named`` of z, the starts of ``MotionSums``.
         tick: the number of the state that is looked at.
         named: entries of z that some formula names by their variable.
         plain: whether the constants are p alone.

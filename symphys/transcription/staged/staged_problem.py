@@ -35,11 +35,11 @@ class SlopedTerm(NamedTuple):
     """A term along a motion.
 
     Attributes:
-        term: which.
+        term: the term.
         value: (T, r).
         blocks: its slopes.
         by_s: (T, r, s) its slopes by the static entries of z.
-        slopes, found: what its curvature is made of.
+        slopes, found: the data of its curvature.
     """
 
     term: StageTerm
@@ -69,8 +69,8 @@ class RolloutStages:
 
         Args:
             rollout: of a problem.
-            backend: what evaluates the step.
-            threads: that share a batch; None: one for each processor.
+            backend: the evaluator of the step.
+            threads: their number for a batch; None: one for each processor.
             exact: whether it is for smoothing 0 only.
             priced: whether motions under a policy come with their merits, and an iteration shall take least time.
         """

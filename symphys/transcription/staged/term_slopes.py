@@ -224,7 +224,7 @@ class TermGroups:
     """All terms, with their values and slopes at their steps.
 
     Attributes:
-        symbols: that they are expressions of.
+        symbols: the arguments of the terms.
         terms: costs, targets and constraints in the problem's order, then sums.
         clock: [steps] the time at which state 0 is.
     """
