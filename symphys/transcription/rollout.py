@@ -363,11 +363,15 @@ class Rollout:
 
     def sampled(self, formula: Formula, shift: int) -> Expr:
         """Return the values (m, N) of a formula at the starts (0) or ends (1) of all steps, with each step's inputs."""
-        x, ticks = self.x[:, shift : self.steps + shift], np.arange(shift, self.steps + shift)
-        p, z = ca.repmat(self.p, 1, self.steps), self.z
+        return self.sampled_along(formula, shift, self.x, self.u, self.p, self.z)
+
+    def sampled_along(self, formula: Formula, shift: int, x: Expr, u: Expr, p: Expr, z: Expr) -> Expr:
+        """Return ``sampled`` of other states (nx, N + 1), inputs (nu, N), parameters (np,) and decision vector (n,)."""
+        ticks, interval = np.arange(shift, self.steps + shift), self.parameters.step_length(self.problem.simulation, p)
         named = any(variable.name in formula.names for variable in self.problem.variables)
         shared = ca.repmat(z, 1, self.steps) if named else ca.DM(z.shape[0], self.steps)
-        return self.compiled(formula).map(self.steps)(x, self.u, p, ca.DM(ticks).T * self.interval, shared)
+        given = (x[:, shift : self.steps + shift], u, ca.repmat(p, 1, self.steps), ca.DM(ticks).T * interval, shared)
+        return self.compiled(formula).map(self.steps)(*given)
 
     def moves(self, formula: Formula) -> bool:
         """Whether the formula depends on what changes within a step."""

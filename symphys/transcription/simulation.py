@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,7 +36,12 @@ def recorder(rollout: Rollout) -> ca.Function:
 
 def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: float) -> Record:
     """Simulate z; NotFinite, with place and cause, if a number is not finite."""
-    x, u, given, p, *happened = (np.array(part).T for part in record(z, smoothing))
+    return recorded(rollout, [np.array(part) for part in record(z, smoothing)], z, smoothing)
+
+
+def recorded(rollout: Rollout, simulated: Sequence[Array], z: Array, smoothing: float) -> Record:
+    """Return the rollout of z from the results of ``recorder``; NotFinite, with place and cause, if it has none."""
+    x, u, given, p, *happened = (part.T for part in simulated)
     z = np.asarray(z, float)
     dt = rollout.parameters.step_length(rollout.problem.simulation, p.ravel())
     time = np.arange(rollout.steps + 1, dtype=np.float64) * dt

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -15,10 +15,10 @@ from symphys.codegen.backends import Description
 from symphys.problem import DURATION, Problem
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import Trajectory
-from symphys.transcription.functions import ExpressionFunctions, function_of
+from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.gradient_probe import ExpressionProbe, Probe
 from symphys.transcription.judge import Assessment, assessment
-from symphys.transcription.objective import Terms
+from symphys.transcription.objective import FormulaSamples, Terms, terms
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 
@@ -65,9 +65,20 @@ class Transcription:
 
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
         """Simulate z and return motion, states and arguments; NotFinite if a number is not finite."""
-        from symphys.transcription.simulation import simulate
+        from symphys.transcription.simulation import recorded
 
-        return simulate(self.rollout, self._recorder, z, smoothing)
+        return recorded(self.rollout, self._simulated(z, smoothing), z, smoothing)
+
+    def _simulated(self, z: Array, smoothing: float) -> list[Array]:
+        """Return the results of ``recorder`` for z; the last ones are cached for judging and recording."""
+        key = np.asarray(z, np.float64).tobytes(), smoothing
+        if self._last.get("key") != key:
+            self._last.update(key=key, found=[np.array(part) for part in self._recorder(z, smoothing)])
+        return list(self._last["found"])
+
+    @cached_property
+    def _last(self) -> dict[str, Any]:
+        return {}
 
     def motion(self, z: Array, x: Array, u: Array) -> Trajectory:
         """Return the motion of states (N + 1, nx) with inputs (N, m) of variables and the parameters of z (n,)."""
@@ -174,7 +185,7 @@ class Transcription:
 
     @cached_property
     def _judge(self) -> Judge:
-        return judge_of(self.rollout, self.terms)
+        return judge_of(self.rollout, self._simulated)
 
     @cached_property
     def _recorder(self) -> ca.Function:
@@ -183,12 +194,23 @@ class Transcription:
         return recorder(self.rollout)
 
 
-def judge_of(rollout: Rollout, asked: Terms) -> Judge:
-    """Return a judge of candidates by the exact rollout, without the functions that solvers need."""
-    numbers = function_of(rollout, "judge", [asked.objective, asked.costs, asked.errors, asked.outputs])
+def judge_of(rollout: Rollout, simulated: Callable[[Array, float], list[Array]]) -> Judge:
+    """Return a judge of candidates by the results of ``simulated``: states, inputs, given inputs, parameters, ..."""
+    samples = FormulaSamples(rollout)
+    asked = terms(samples)
+    outputs = [ca.densify(part) for part in (asked.objective, asked.costs, asked.errors, asked.outputs)]
+    numbers = ca.Function("judge", samples.symbols, outputs)
+    states = ca.MX.sym("x", rollout.x0.shape[0], rollout.steps + 1)
+    inputs = ca.MX.sym("u", *rollout.given.shape)
+    motion = [states, inputs, samples.p, samples.z]
+    series = [rollout.sampled_along(*each, *motion) for each in samples.series]
+    values = ca.Function("series", motion, series) if series else None
 
     def judge(z: Array, smoothing: float = 0.0) -> Assessment:
-        objective, *parts = (np.array(part).ravel() for part in numbers(z, smoothing))
+        x, u, _, p, *_ = simulated(z, smoothing)
+        moments = [part for k, step in samples.moments for part in (x[:, k], u[:, step])]
+        along = [] if values is None else values.call([x, u, p, z])
+        objective, *parts = (np.array(part).ravel() for part in numbers.call([z, p, *moments, *along]))
         return assessment(rollout.problem, float(objective[0]), *parts)
 
     return judge
