@@ -27,7 +27,7 @@ from symphys import files
 from symphys.batches import Observer, run_batch
 from symphys.problem import load_problem
 from symphys.report import WantedPages, make_pages, wanted_below, write_batch_report
-from symphys.results.case_name import case_name
+from symphys.results.config import case_name
 from symphys.results.file_names import CONFIG, GUESS, LOG, PROBLEM, RESULT, SCENE, TRACE, TRAJECTORY
 from symphys.results.table import Journal, write_table
 from symphys.runs import Job, make_jobs

@@ -29,7 +29,7 @@ from symphys.solvers.core.interface import Iteration, StageContext
 from symphys.solvers.core.point import Incumbent
 from symphys.solvers.ddp.backward_pass import backward_pass
 from symphys.solvers.ddp.forward_pass import forward_pass
-from symphys.solvers.methods.ilqr import LENGTHS, Ilqr
+from symphys.solvers.methods.ilqr import STEP_LENGTHS, Ilqr
 from symphys.transcription import transcribe
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.staged.linearization import Linearization
@@ -86,7 +86,7 @@ def measured(problem: str, calls: dict[str, Call], turns: int) -> Iterator[Row]:
 def jacobians(problem: Problem) -> tuple[str, dict[str, Call]]:
     """Return the size of a problem and calls that take the Jacobians of STEPS steps."""
     made = Linearization(symbolic_rollout(problem), threads=1, exact=True)
-    x0, u, p = made.begun(guess_of(problem))
+    x0, u, p = made.start(guess_of(problem))
     states = [x0]
     for k in range(STEPS):
         states.append(made.step.step(k, states[-1][None], u[None, k], p, 0.0)[0])
@@ -173,7 +173,7 @@ def parts_of(method: Ilqr, first: Iteration[Any]) -> dict[str, Call]:
     bounds = method._room(state.z)
     policy = backward_pass(slopes, expanded, knots, staged.statics, bounds, state.damping)
     assert policy is not None
-    motions = forward_pass(staged, motion, policy, method.padded, LENGTHS)
+    motions = forward_pass(staged, motion, policy, method.padded, STEP_LENGTHS)
     return {
         "motion": lambda: staged.roll_out(state.z, 0.0),
         "Jacobians": lambda: [*staged.linearize_from_end(motion)],
@@ -182,7 +182,7 @@ def parts_of(method: Ilqr, first: Iteration[Any]) -> dict[str, Call]:
         "Jacobians and backward pass": lambda: backward_pass(
             staged.linearize_from_end(motion), expanded, knots, staged.statics, bounds, state.damping
         ),
-        "forward pass of 8": lambda: forward_pass(staged, motion, policy, method.padded, LENGTHS),
+        "forward pass of 8": lambda: forward_pass(staged, motion, policy, method.padded, STEP_LENGTHS),
         "costs of 8 motions": lambda: staged.measure(*motions),
         "one rollout of the evaluator": lambda: method.evaluator.value(state.z),
     }

@@ -22,7 +22,7 @@ from symphys.runs.job import solver_options
 from symphys.shooting import ScenarioSamples
 from symphys.solvers import SOLVERS, TraceRow
 from symphys.transcription import transcribe
-from symphys.transcription.randomization.transcription import KernelSamples, ScenarioGrids
+from symphys.transcription.transcribe import KernelSamples, ScenarioGrids
 from symphys.types import Array
 
 UNSEEN, FEWER, SEED = 500, 64, 20161105

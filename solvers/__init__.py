@@ -61,7 +61,7 @@ solve_together = solve_multi_start
 
 
 def solver(name: str) -> Solver[Any]:
-    """The solver called ``name``; SymphysError naming the nearest ones if there is none."""
+    """Return the solver called ``name``; raise SymphysError, which names the nearest ones, if there is none."""
     if name not in SOLVERS:
         close = get_close_matches(name.lower(), SOLVERS)
         guess = f"did you mean {close[0]!r}? " if close else ""

@@ -1,1 +1,1 @@
-"""What all methods share: the driver, the counting evaluator, the checkpoint, continuation, line search."""
+"""Parts that all methods share: driver, counting evaluator, checkpoint, continuation, convergence, line search."""

@@ -1,4 +1,4 @@
-"""How much of its budget a solve has used, and how long the rest takes at most, from the rows of its trace."""
+"""The used share of a solve's budget, and the time left at most, from the rows of its trace."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from symphys.solvers.core.outcome import TraceRow
 
 BOUNDED = {"iterations": "iteration", "evaluations": "rollouts"}
-"""Options that bound each stage of smoothing, and the number of a row that each of them bounds."""
+"""Options that bound each stage of smoothing, each with the field of a row that it bounds."""
 
 
 class BudgetUse:
-    """The use of the budget of one solve; ``add`` takes its rows as they come.
+    """The use of the budget of one solve; ``add`` takes its rows in order.
 
     A budget is an upper bound: solvers converge earlier. So ``seconds_left`` is the time that is left at most, if
     iterations go on at their present pace.
@@ -34,11 +34,11 @@ class BudgetUse:
 
     @property
     def row(self) -> TraceRow | None:
-        """The last row; None before the first."""
+        """The last row; None before the first one."""
         return self._row
 
     def add(self, row: TraceRow) -> None:
-        """Take the next row; the first of a solve that goes on may be any."""
+        """Add the next row; the first row of a resumed solve may have any number."""
         before = self._row
         if before is None or row.smoothing != before.smoothing:
             rollouts = before.rollouts if before else row.rollouts if row.iteration else 0
@@ -47,7 +47,7 @@ class BudgetUse:
 
     @property
     def share(self) -> float:
-        """Return the used share, 0 to 1, of the bound that is nearest; nan without a bound."""
+        """Return the used share, 0 to 1, of the tightest bound; nan without a bound."""
         if self._row is None:
             return 0.0 if math.isfinite(min(self._most, *self._limits.values())) else math.nan
         stages = len(self._smoothing) or 1
@@ -58,7 +58,7 @@ class BudgetUse:
 
     @property
     def seconds_left(self) -> float:
-        """[s] at most; inf where that is not known."""
+        """Return the time left [s] at most; inf where it is unknown."""
         row, first = self._row, self._first
         if row is None or first is None:
             return self._most
@@ -72,7 +72,7 @@ class BudgetUse:
 
     @property
     def _stage(self) -> int:
-        """The index of the stage of the last row."""
+        """Return the index of the stage of the last row."""
         known = self._row is not None and self._row.smoothing in self._smoothing
         return self._smoothing.index(self._row.smoothing) if known and self._row else 0
 

@@ -1,4 +1,4 @@
-"""A solve that was interrupted, as plain JSON-able values, and back again without the loss of a bit."""
+"""Checkpoints of interrupted solves as plain JSON-able values, and back again without loss of a bit."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ READERS: dict[str, Callable[[Any], Any]] = {
     "dict[str, float]": lambda value: {str(key): float(number) for key, number in value.items()},
     "tuple[float, ...]": lambda value: tuple(float(number) for number in value),
 }
-"""By the annotation of a field; float() also reads the strings "nan" and "inf" of strict JSON."""
+"""Readers by the annotation of a field; float() also reads the strings "nan" and "inf" of strict JSON."""
 OUTCOME = "outcome"
-"""The key of a checkpoint whose solve is over, and only has to be judged."""
+"""The key of a checkpoint whose solve is over and only has to be judged."""
 OLD_NAMES = {"miss": "max_violation"}
-"""Of fields in checkpoints that were written before these were renamed."""
+"""Present names by the names of fields in older checkpoints."""
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """All that a solve needs to go on: taken when an iteration is complete, never in its middle.
+    """The data from which a solve resumes, taken between two iterations.
 
     Attributes:
         stages: of smoothing, that were over by then.
@@ -55,7 +55,7 @@ class Checkpoint:
 
 
 def to_plain(solver: str, checkpoint: Checkpoint, rows: Iterable[TraceRow]) -> dict[str, object]:
-    """Everything that ``from_plain`` reads."""
+    """Return a checkpoint as plain values, which ``from_plain`` reads."""
     best = checkpoint.best
     return {
         "solver": solver,
@@ -79,7 +79,7 @@ def to_plain(solver: str, checkpoint: Checkpoint, rows: Iterable[TraceRow]) -> d
 def from_plain(
     saved: dict[str, Any], solver: str, problem: ShootingProblem
 ) -> tuple[Checkpoint, dict[str, Any], list[TraceRow]]:
-    """The checkpoint, the method's state as plain values, the trace; SymphysError if damaged or of another solve."""
+    """Return checkpoint, plain state of the method, and trace; SymphysError if damaged or of another solve."""
     if saved.get("solver") != solver:
         raise SymphysError(f"this checkpoint is of the solver {saved.get('solver')!r}, not of {solver!r}")
     try:
@@ -102,7 +102,7 @@ def from_plain(
 
 
 def plain_outcome(outcome: Outcome, solver: str, seconds: float) -> dict[str, object]:
-    """Everything that ``revived_outcome`` reads of a solve that is over; ``seconds``: what it took."""
+    """Return the outcome of a solve that took ``seconds``, as plain values for ``revived_outcome``."""
     return {
         "solver": solver,
         "best": {"z": plain(outcome.z)},
@@ -120,7 +120,7 @@ def plain_outcome(outcome: Outcome, solver: str, seconds: float) -> dict[str, ob
 
 
 def revived_outcome(saved: dict[str, Any], solver: str) -> Outcome:
-    """The outcome in such a checkpoint; SymphysError if damaged or of another solver."""
+    """Return the outcome in a checkpoint; SymphysError if it is damaged or of another solver."""
     if saved.get("solver") != solver:
         raise SymphysError(f"this checkpoint is of the solver {saved.get('solver')!r}, not of {solver!r}")
     try:
@@ -143,12 +143,12 @@ def revived_outcome(saved: dict[str, Any], solver: str) -> Outcome:
 
 
 def present(stage: dict[str, Any]) -> dict[str, Any]:
-    """The fields of a stage by their present names."""
+    """Return the fields of a stage by their present names."""
     return {OLD_NAMES.get(name, name): value for name, value in stage.items()}
 
 
 def revive(kind: type[T], values: dict[str, Any], *parts: type[Any]) -> T:
-    """A dataclass of numbers, arrays and ``parts`` from their plain values; SymphysError if they do not fit."""
+    """Make a dataclass of numbers, arrays and ``parts`` from plain values; SymphysError if they do not fit."""
     readers = READERS | {part.__name__: partial(revive, part) for part in parts}
     types = {field.name: str(field.type) for field in fields(kind)}  # type: ignore[arg-type]
     try:
@@ -158,7 +158,7 @@ def revive(kind: type[T], values: dict[str, Any], *parts: type[Any]) -> T:
 
 
 def plain(value: object) -> Any:
-    """A dataclass, array, tuple or dict as dicts and lists of Python numbers and text, enumerations by their values."""
+    """Return a dataclass, array, tuple or dict as dicts and lists of plain values; enumerations by their values."""
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, np.ndarray):
@@ -171,10 +171,10 @@ def plain(value: object) -> Any:
 
 
 def damaged(error: Exception) -> SymphysError:
-    """The error for a checkpoint that cannot be read."""
+    """Return the error for a checkpoint that cannot be read."""
     return SymphysError(f"the checkpoint is damaged ({error!r}): start afresh without it")
 
 
 def names(kind: type[Any]) -> list[str]:
-    """The fields of a dataclass in order."""
+    """Return the fields of a dataclass in order."""
     return [field.name for field in fields(kind)]

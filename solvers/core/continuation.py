@@ -1,4 +1,4 @@
-"""Continuation: a solve as stages of smoothing, from large to small, each from the best point of the one before.
+"""Continuation: stages of smoothing, from large to small, each from the best point of the previous stage.
 
 A stage passes on a point and nothing else. Step lengths, damping and sigma begin anew: those that a stage ends with are
 small because it has converged, and do not fit the next one, whose merit is another function. A stage ends as a solve
@@ -23,9 +23,9 @@ from symphys.solvers.core.point import Incumbent, Point
 from symphys.types import Array
 
 Rate = Callable[[CountingEvaluator, Sequence[Array]], list[Point]]
-"""Rates points as the solver compares them, without offering them to the incumbent; [] where it compares none."""
-EXACT = 0.0
-OVERTAKEN = (
+"""Evaluates points by the solver's own measure, without offering them to the incumbent; [] if it has none."""
+EXACT_SMOOTHING = 0.0
+BETTER_CANDIDATE = (
     "{} does better in the exact rollout than what the last stage came to, and is kept: what the stages gained, they "
     "gained for another problem; try other stages, or none"
 )
@@ -39,7 +39,7 @@ def stage_result(
     total: tuple[Counts, float],
     before: Sequence[StageResult],
 ) -> StageResult:
-    """A stage that ended at ``z``; ``total``: the work and seconds up to its end, those of ``before`` included."""
+    """Return the result of a stage that ended at ``z``; ``total``: work and seconds up to its end, with ``before``."""
     counts, seconds = total
     for stage in before:
         counts -= stage.counts
@@ -56,7 +56,7 @@ def exact_best(
     z: Array,
     reason: StopReason,
 ) -> tuple[StopReason, Array]:
-    """The end of a solve and its solution (n,), where the last stage came to ``z`` (n,) for ``reason``.
+    """Return why a solve ends and its solution (n,); the last stage ended at ``z`` (n,) for ``reason``.
 
     Args:
         evaluator: of the last stage.
@@ -67,20 +67,20 @@ def exact_best(
         reason: why the last stage ended.
     """
     problem = evaluator.problem
-    if problem.smoothing == (EXACT,) or reason.status is Status.NOT_APPLICABLE:
+    if problem.smoothing == (EXACT_SMOOTHING,) or reason.status is Status.NOT_APPLICABLE:
         return reason, z
     points = _rated(evaluator, rate, [z, *(stage.z for stage in stages), start])
     if not points:
         return reason, z
     last, *others = points
-    if evaluator.smoothing == EXACT and evaluator.incumbent.best is not None:
+    if evaluator.smoothing == EXACT_SMOOTHING and evaluator.incumbent.best is not None:
         last = evaluator.incumbent.best
     chosen = last
     for point in others:
         chosen = point if point.better(chosen) else chosen
     if chosen is last:
         return reason, z
-    advice = OVERTAKEN.format(_name(stages, chosen.z))
+    advice = BETTER_CANDIDATE.format(_name(stages, chosen.z))
     if chosen.met and problem.stop_when_met:
         return StopReason(Status.MET, advice), chosen.z
     if reason.whole:
@@ -90,17 +90,17 @@ def exact_best(
 
 
 def _rated(evaluator: CountingEvaluator, rate: Rate, candidates: Sequence[Array]) -> list[Point]:
-    """Evaluate candidates at smoothing 0; [] if that fails or all candidates are equal."""
+    """Evaluate candidates at smoothing 0; return [] if that fails or all candidates are equal."""
     if all(np.array_equal(each, candidates[0]) for each in candidates):
         return []
     try:
-        return rate(evaluator.at(EXACT, Incumbent(stop_when_met=False)), candidates)
+        return rate(evaluator.at(EXACT_SMOOTHING, Incumbent(stop_when_met=False)), candidates)
     except (RuntimeError, ArithmeticError, np.linalg.LinAlgError):
         return []
 
 
 def _name(stages: Sequence[StageResult], z: Array) -> str:
-    """A candidate in the words of the advice."""
+    """Return the name of a candidate in the advice."""
     for stage in stages:
         if np.array_equal(stage.z, z):
             return f"the point of the stage at smoothing {stage.smoothing:g}"

@@ -1,4 +1,4 @@
-"""Directions of first-order descent, each made from the gradient. All in x = z / scale.
+"""Directions of first-order descent, made from the gradient in x = z / scale.
 
 gradient   d = -rate g
 momentum   m <- momentum m + g,  d = -rate m                                 (Polyak 1964, heavy ball)
@@ -19,15 +19,15 @@ from symphys.types import Array
 
 ADAM_FLOOR = 1e-8
 """Added to Adam's root mean square gradient, as in the paper."""
-LONGEST = 1e12
-"""A spectral step and its inverse stay below it."""
-GROWTH = 10.0
-"""The spectral step grows by it where the merit curves downward and so suggests no length."""
+MAX_SPECTRAL_STEP = 1e12
+"""Bound of a spectral step and of its inverse."""
+NEGATIVE_CURVATURE_GROWTH = 10.0
+"""Factor on the spectral step where the merit curves downward and suggests no length."""
 
 
 @dataclass(frozen=True)
 class DirectionMemory:
-    """What a direction depends on beside the gradient: running means of the gradients before, and a step length.
+    """The memory of a direction: running means of past gradients, and a step length.
 
     Attributes:
         ticks: gradients since the memory was empty.
@@ -42,13 +42,13 @@ class DirectionMemory:
 
     @classmethod
     def empty(cls, n: int) -> DirectionMemory:
-        """Before the first gradient."""
+        """Return the memory before the first gradient."""
         return cls(0, np.zeros(n), np.zeros(n), 0.0)
 
 
 @dataclass(frozen=True)
 class MomentumWeights:
-    """Weights of the past in a direction: ``momentum`` and ``betas`` of ``GradientOptions``."""
+    """Weights of past gradients: ``momentum`` and ``betas`` of ``GradientOptions``."""
 
     momentum: float
     betas: tuple[float, float]
@@ -59,18 +59,18 @@ Direction = Callable[[Array, DirectionMemory, float, MomentumWeights], tuple[Arr
 
 
 def plain(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeights) -> tuple[Array, DirectionMemory]:
-    """Straight down."""
+    """Return the negative gradient."""
     return -rate * g, memory
 
 
 def momentum(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeights) -> tuple[Array, DirectionMemory]:
-    """Heavy ball."""
+    """Return the heavy-ball direction."""
     mean = weights.momentum * memory.mean + g
     return -rate * mean, replace(memory, mean=mean)
 
 
 def adam(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeights) -> tuple[Array, DirectionMemory]:
-    """Each component by its own root mean square."""
+    """Return Adam's direction: each component divided by its root mean square."""
     b1, b2 = weights.betas
     ticks = memory.ticks + 1
     mean = b1 * memory.mean + (1 - b1) * g
@@ -80,8 +80,8 @@ def adam(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeight
 
 
 def spectral(g: Array, memory: DirectionMemory, rate: float, weights: MomentumWeights) -> tuple[Array, DirectionMemory]:
-    """Return a step as long as the last change of the gradient suggests; the first has the length ``rate``."""
-    length = memory.length or rate / max(float(np.linalg.norm(g)), 1 / LONGEST)
+    """Return a step whose length the last change of the gradient suggests; the first has the length ``rate``."""
+    length = memory.length or rate / max(float(np.linalg.norm(g)), 1 / MAX_SPECTRAL_STEP)
     return -length * g, replace(memory, length=length)
 
 
@@ -89,7 +89,7 @@ DIRECTIONS: dict[str, Direction] = {"spectral": spectral, "gradient": plain, "mo
 
 
 def learn_length(memory: DirectionMemory, s: Array, y: Array) -> DirectionMemory:
-    """The spectral step after a step s that changed the gradient by y."""
+    """Return the memory with the spectral length after a step s that changed the gradient by y."""
     curvature = float(s @ y)
-    length = curvature / float(y @ y) if curvature > 0 else GROWTH * memory.length
-    return replace(memory, length=min(max(length, 1 / LONGEST), LONGEST))
+    length = curvature / float(y @ y) if curvature > 0 else NEGATIVE_CURVATURE_GROWTH * memory.length
+    return replace(memory, length=min(max(length, 1 / MAX_SPECTRAL_STEP), MAX_SPECTRAL_STEP))

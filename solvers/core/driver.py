@@ -1,4 +1,4 @@
-"""The driver of a solve: it runs the stages and the loop of a method, records iterations, keeps the checkpoint.
+"""The driver of a solve: runs stages and the loop of a method, records iterations, keeps the checkpoint.
 
 A method has ``init``, ``step`` and ``terminate``, see ``interface.Method``. Interruption and going on, limits of the
 solve, the errors of foreign code, the trace and continuation are here, the same for all.
@@ -6,8 +6,9 @@ solve, the errors of foreign code, the trace and continuation are here, the same
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, astuple, dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,33 +19,79 @@ from symphys.solvers.core.continuation import Rate, exact_best, stage_result
 from symphys.solvers.core.evaluator import CountingEvaluator, WorkCounter
 from symphys.solvers.core.interface import Iteration, IterationRecorder, Log, Method, Solver, StageContext, nothing
 from symphys.solvers.core.options import SolverOptions
-from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageResult, Status, StopReason
+from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageResult, Status, StopReason, TraceRow
 from symphys.solvers.core.point import Incumbent, Stop
-from symphys.solvers.core.trace import SolveTrace, counts_of
 from symphys.types import Array
 
-FINISHED: dict[str, object] = {}
-"""The state of a stage that has nothing left to do."""
+
+class SolveTrace:
+    """The iterations of a solve and their times, interruptions left out."""
+
+    def __init__(self, rows: Iterable[TraceRow] = (), seconds: float = 0.0) -> None:
+        """Start the clock; ``rows`` and ``seconds``: those of a resumed solve."""
+        self._rows = list(rows)
+        self._earlier, self._began = seconds, time.perf_counter()
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self._rows)
+
+    @property
+    def rows(self) -> tuple[TraceRow, ...]:
+        """All rows."""
+        return tuple(self._rows)
+
+    @property
+    def last(self) -> TraceRow | None:
+        """The last row; None before the first one."""
+        return self._rows[-1] if self._rows else None
+
+    @property
+    def seconds(self) -> float:
+        """The time [s] since the solve began, interruptions left out."""
+        return self._earlier + time.perf_counter() - self._began
+
+    def append(self, counts: Counts, numbers: Iterable[float], outputs: Mapping[str, float]) -> TraceRow:
+        """Add an iteration that ends now; ``numbers``: objective to smoothing, in the order of ``TraceRow``."""
+        row = TraceRow(*(len(self), *astuple(counts), self.seconds, *numbers, dict(outputs)))
+        self._rows.append(row)
+        return row
+
+    def distribute(self, work: Counts, first: int) -> None:
+        """Add work evenly to the rows from ``first`` on, for a library that reports it only at its end."""
+        share = len(self) - first
+        for index in range(first, len(self)):
+            row, part = self._rows[index], work.share((index - first + 1) / share)
+            self._rows[index] = replace(row, **asdict(counts_of(row) + part))
+
+
+def counts_of(row: TraceRow) -> Counts:
+    """Return the work up to a row."""
+    return Counts(row.rollouts, row.gradients, row.jacobians, row.hessians)
+
+
+FINISHED_STATE: dict[str, object] = {}
+"""The state of a stage that is complete."""
 INTERRUPTED = "interrupted; with its checkpoint the solve goes on from here"
 
 O_inv = TypeVar("O_inv", bound=SolverOptions)
 StateT = TypeVar("StateT")
 Stage = Callable[[StageContext, O_inv, "dict[str, object] | None", IterationRecorder], StopReason]
-"""Runs one stage from its start, or from the saved state of a method where a solve goes on."""
+"""Runs one stage from its start, or from the saved state of a method that is resumed."""
 
 
 def refuse_none(problem: ShootingProblem) -> str:
-    """No reason: the solver is for every problem."""
+    """Return no reason: the solver is for every problem."""
     return ""
 
 
 def rate_by_rollout(options: object, seed: int) -> Rate:
-    """Rates points by one rollout each."""
+    """Return a ``Rate`` by one rollout for each point."""
     return CountingEvaluator.rate
 
 
-def iterating(method: Callable[[StageContext, O_inv], Method[Any]]) -> Stage[O_inv]:
-    """The stage of a method, whose loop is here."""
+def stage_of(method: Callable[[StageContext, O_inv], Method[Any]]) -> Stage[O_inv]:
+    """Make a stage that runs the loop of a method."""
 
     def stage(
         context: StageContext, options: O_inv, saved: dict[str, object] | None, recorder: IterationRecorder
@@ -55,7 +102,7 @@ def iterating(method: Callable[[StageContext, O_inv], Method[Any]]) -> Stage[O_i
 
 
 def iterate(method: Method[StateT], saved: dict[str, object] | None, recorder: IterationRecorder) -> StopReason:
-    """The loop of every method that has none of its own."""
+    """Run the loop of a method: ``init``, then ``step`` until ``terminate``."""
     if saved:
         state = method.resume(saved)
     else:
@@ -102,9 +149,9 @@ def make_solver(
     scenarios: bool | None = False,
     feedback: MakeGains = without_feedback,
 ) -> Solver[O_inv]:
-    """A solver of its parts; those that are not named here are the fields of ``Solver``.
+    """Make a solver from its parts; parameters that are not described here are fields of ``Solver``.
 
-    ``stage`` runs one stage of smoothing, see ``iterating``. ``check`` raises SymphysError for options that cannot be
+    ``stage`` runs one stage of smoothing, see ``stage_of``. ``check`` raises SymphysError for options that cannot be
     passed to a library. ``refusal`` returns why the solver is not for a problem, or nothing. ``rate`` makes, from
     options and seed, what compares the points of several stages. ``constraints``: whether violated constraints come
     before the merit in the comparison of points. ``feedback`` makes the gains of the outcome.
@@ -132,7 +179,7 @@ def make_solver(
             return stage(context, options, saved, recorder)
 
         request = Request(
-            name, problem, start, options, seed, monitor, checkpoint, log or silent, constraints, keep, feedback
+            name, problem, start, options, seed, monitor, checkpoint, log or ignore_log, constraints, keep, feedback
         )
         return Driver(request, run_stage, rate(options, seed)).run()
 
@@ -141,7 +188,7 @@ def make_solver(
 
 @dataclass(frozen=True)
 class Request:
-    """What a solver was called with, see ``interface.Solve``.
+    """The arguments of a solve; see ``interface.Solve``.
 
     Attributes:
         solver: its name.
@@ -164,7 +211,7 @@ class Request:
 
 
 class Driver:
-    """One solve from start to outcome; a ``IterationRecorder`` for its stages."""
+    """One solve from start to outcome; the ``IterationRecorder`` of its stages."""
 
     def __init__(
         self,
@@ -186,7 +233,7 @@ class Driver:
         self._multipliers: Mapping[str, Array] = {}
 
     def run(self) -> Outcome:
-        """Run every stage; whatever happens becomes a status with advice. SymphysError alone passes through."""
+        """Run every stage; failures become a status with advice, and SymphysError alone passes through."""
         try:
             reason, z = self._run_stages()
         except KeyboardInterrupt as stopped:
@@ -209,7 +256,7 @@ class Driver:
         )
 
     def _gains(self, status: Status, z: Array) -> Mapping[str, Array]:
-        """Feedback about the solution z (n,); none where the solve or foreign code failed."""
+        """Return feedback gains about the solution z (n,); none where the solve or foreign code failed."""
         if status.fatal or status is Status.INTERRUPTED:
             return {}
         try:
@@ -260,7 +307,7 @@ class Driver:
         return len(self._trace)
 
     def _run_stages(self) -> tuple[StopReason, Array]:
-        """One stage after the other; why the last one ended, and the solution (n,)."""
+        """Run all stages in order; return why the last one ended, and the solution (n,)."""
         z, saved = self._resume()
         reason, smoothings = StopReason(Status.MET), self._request.problem.smoothing
         for index, smoothing in enumerate(smoothings[len(self._stages) :], len(self._stages)):
@@ -268,7 +315,7 @@ class Driver:
                 self._evaluator = self._evaluator.at(smoothing, Incumbent(self._request.problem.stop_when_met))
                 self._last = None
             self._request.log(f"stage {index + 1} of {len(smoothings)}: smoothing {smoothing:g}")
-            reason = StopReason(Status.MET) if saved == FINISHED else self._run_stage(z, saved)
+            reason = StopReason(Status.MET) if saved == FINISHED_STATE else self._run_stage(z, saved)
             status, best = reason.status, self._evaluator.incumbent.best
             z, saved = (best.z if best else z), None
             solution, over = z, reason.whole or status.fatal or index + 1 == len(smoothings)
@@ -299,7 +346,7 @@ class Driver:
         return self._stages[-1].z if self._stages else self._start, saved
 
     def _run_stage(self, z: Array, saved: dict[str, object] | None) -> StopReason:
-        """Run a stage; errors of foreign code, and matrices that there is no memory for, become a reason."""
+        """Run a stage; errors of foreign code and of memory become a reason."""
         context = StageContext(self._evaluator, z, self._request.seed, self._request.log)
         try:
             try:
@@ -312,14 +359,14 @@ class Driver:
             return StopReason(Status.FAILED, f"{self._request.solver} failed: {text}")
 
     def _commit_incumbent(self) -> None:
-        """A row for the point that ended a stage in the middle of an iteration."""
+        """Record a row for the point that ended a stage within an iteration."""
         best = self._evaluator.incumbent.best
         if best is not None:
             before = best.z if self._last is None else self._last
-            self.commit(Iteration(FINISHED, best, step=float(np.linalg.norm(best.z - before))))
+            self.commit(Iteration(FINISHED_STATE, best, step=float(np.linalg.norm(best.z - before))))
 
     def _interrupted(self, reason: StopReason, checkpoint: Checkpoint) -> Outcome:
-        """The outcome at the end of the last complete iteration, with what the solve needs to go on."""
+        """Return the outcome at the end of the last complete iteration, with the checkpoint to resume from."""
         request, before, best = self._request, checkpoint.stages, checkpoint.best
         rows = self._trace.rows[: checkpoint.rows]
         halfway = stage_result(
@@ -334,5 +381,5 @@ class Driver:
         return Outcome(reason.status, reason.advice, best.z, rows, checkpoint.counts, saved, (*before, halfway))
 
 
-def silent(line: str) -> None:
-    """A log that drops each line."""
+def ignore_log(line: str) -> None:
+    """Drop a line of the log."""

@@ -1,4 +1,4 @@
-"""The counting evaluator between a method and its problem: one smoothing, points within the bounds, work counted."""
+"""The counting evaluator between a method and its problem, at one smoothing and within the bounds."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from symphys.types import Array
 
 
 class WorkCounter:
-    """The work of a solve so far; the evaluators of all stages share one."""
+    """The work of a solve so far, shared by the evaluators of all stages."""
 
     def __init__(self, counts: Counts | None = None) -> None:
-        """Start from ``counts``, where a solve goes on."""
+        """Start from ``counts``, those of a resumed solve."""
         self._counts = counts or Counts()
 
     @property
     def counts(self) -> Counts:
-        """The total."""
+        """The total work."""
         return self._counts
 
     def add(self, work: Counts) -> None:
-        """Count some more."""
+        """Add work."""
         self._counts += work
 
 
@@ -41,7 +41,7 @@ class CountingEvaluator:
     scenario are offered to none.
 
     Attributes:
-        problem: what is evaluated.
+        problem: the evaluated problem.
         smoothing: of all evaluations.
         incumbent: the best point of the stage.
         counter: of the work.
@@ -56,66 +56,66 @@ class CountingEvaluator:
 
     @cached_property
     def scale(self) -> Array:
-        """(n,) the size of a typical change of z."""
+        """The typical change (n,) of z."""
         return self.problem.stacked("scale")
 
     @cached_property
     def lower(self) -> Array:
-        """(n,) bound on z."""
+        """The lower bounds (n,) of z."""
         return self.problem.stacked("lower")
 
     @cached_property
     def upper(self) -> Array:
-        """(n,) bound on z."""
+        """The upper bounds (n,) of z."""
         return self.problem.stacked("upper")
 
     def at(self, smoothing: float, incumbent: Incumbent) -> CountingEvaluator:
-        """An evaluator of the same problem at another smoothing, which counts its work here too."""
+        """Return an evaluator of the same problem and counter at another smoothing."""
         return replace(self, smoothing=smoothing, incumbent=incumbent)
 
     def clip(self, z: Array) -> Array:
-        """The nearest point within the bounds."""
+        """Return the nearest point within the bounds."""
         return np.clip(z, self.lower, self.upper)
 
     def stationarity(self, z: Array, gradient: Array) -> float:
-        """Length of the step in z / scale that the projected gradient takes; 0 at a stationary point."""
+        """Return the length of the projected gradient step in z / scale; 0 at a stationary point."""
         return float(np.linalg.norm((self.clip(z - gradient * self.scale**2) - z) / self.scale))
 
     def value(self, z: Array) -> Point:
-        """One rollout at z, which must lie within the bounds."""
+        """Evaluate one rollout at z, which must lie within the bounds."""
         return self.values([z])[0]
 
     def values(self, population: Sequence[Array]) -> list[Point]:
-        """One rollout for each, in one call; stops after it if one of them meets everything."""
+        """Evaluate one rollout for each point in one call; stop after it if one of them meets everything."""
         return self._offered(self.rate(population))
 
     def rate(self, population: Sequence[Array]) -> list[Point]:
-        """One rollout for each, in one call, not offered to the incumbent."""
+        """Evaluate one rollout for each point in one call, without offering them to the incumbent."""
         Z = np.array(population)
         values = self._evaluator.value(Z, self.smoothing)
         self.counter.add(Counts(rollouts=len(Z)))
         return self._points(Z, values)
 
     def gradient(self, z: Array) -> Point:
-        """One gradient at z."""
+        """Evaluate one gradient at z."""
         values = self._evaluator.gradient(z[None], self.smoothing)
         self.counter.add(Counts(gradients=1))
         return self._offered(self._points(z[None], values))[0]
 
     def residuals(self, z: Array) -> Point:
-        """One rollout at z, with residuals."""
+        """Evaluate one rollout at z, with residuals."""
         values = self._evaluator.residuals(z[None], self.smoothing)
         self.counter.add(Counts(rollouts=1))
         return self._offered(self._points(z[None], values))[0]
 
     def jacobian(self, z: Array) -> Point:
-        """One Jacobian of the residuals at z; the gradient comes with it."""
+        """Evaluate one Jacobian of the residuals at z, from which the gradient follows."""
         values = self._evaluator.jacobian(z[None], self.smoothing)
         self.counter.add(Counts(jacobians=1))
         return self._offered(self._points(z[None], values))[0]
 
     def sample_values(self, Z: Array, samples: ScenarioSamples) -> Values:
-        """One rollout in each sample of a scenario; Z (batch, n), or (1, n) for all."""
+        """Evaluate one rollout in each sample of a scenario; Z (batch, n), or (1, n) for all."""
         values = self.scenario.value(Z, samples, self.smoothing)
         self.counter.add(Counts(rollouts=len(samples.numbers)))
         return values
@@ -123,14 +123,14 @@ class CountingEvaluator:
     def sample_gradients(
         self, z: Array, samples: ScenarioSamples, adjoint_discount: float = 0.0, horizon: float = math.inf
     ) -> Values:
-        """One gradient at z (n,) in each sample of a scenario; see ``ScenarioEvaluator.gradient``."""
+        """Evaluate one gradient at z (n,) in each sample of a scenario; see ``ScenarioEvaluator.gradient``."""
         values = self.scenario.gradient(z[None], samples, self.smoothing, adjoint_discount, horizon)
         self.counter.add(Counts(gradients=len(samples.numbers)))
         return values
 
     @property
     def scenario(self) -> ScenarioEvaluator:
-        """The problem's scenario, for those who have checked that it has one."""
+        """The problem's scenario; callers check first that it has one."""
         assert self.problem.scenario is not None, "the problem has a scenario"
         return self.problem.scenario
 
@@ -143,7 +143,7 @@ class CountingEvaluator:
         return points
 
     def _points(self, Z: Array, values: Values) -> list[Point]:
-        """The rows as points with their own copies of everything."""
+        """Return the rows as points with their own copies of all arrays."""
         names = [name for name in ("outputs", "gradient", "residuals", "jacobian") if getattr(values, name) is not None]
         merits, objectives = values.merit.tolist(), values.objective.tolist()
         points = []

@@ -1,4 +1,4 @@
-"""What every solver looks like from outside, and what a method is: ``init``, ``step``, ``terminate``."""
+"""The interface of solvers, and that of methods: ``init``, ``step``, ``terminate``."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ StateT = TypeVar("StateT")
 
 @dataclass(frozen=True)
 class StageContext:
-    """What a method works with in one stage of smoothing.
+    """The inputs of a method in one stage of smoothing.
 
     Attributes:
         evaluator: of the problem at the smoothing of the stage; its incumbent is the best point of the stage.
@@ -40,7 +40,7 @@ class StageContext:
 
 @dataclass(frozen=True)
 class Iteration(Generic[StateT]):
-    """What one iteration came to: the state after it, and what the trace records.
+    """The result of one iteration: the state after it, and the values for the trace.
 
     Attributes:
         state: all that the next step depends on; a dataclass of numbers, arrays and dataclasses of these.
@@ -65,43 +65,43 @@ class Method(Protocol[StateT]):
     """
 
     def init(self) -> Iteration[StateT] | StopReason:
-        """Evaluate the start; the reason where no step can be made from there."""
+        """Evaluate the start; return the reason where no step can be made from there."""
         ...
 
     def step(self, state: StateT) -> Iteration[StateT] | StopReason:
-        """Make one iteration; the reason where none leads on."""
+        """Make one iteration; return the reason where no step is possible."""
         ...
 
     def terminate(self, state: StateT) -> StopReason | None:
-        """Why to end here: a stationary point, a budget that is used up, no progress. None: make another step."""
+        """Return why to end: a stationary point, a used budget, no progress; None to make another step."""
         ...
 
     def conclude(self, state: StateT, reason: StopReason) -> StopReason:
-        """Do what is left to do where a limit of the solve ends it; the reason, perhaps with other advice."""
+        """Finish where a limit of the solve ends it; return the reason, perhaps with other advice."""
         return reason
 
     def resume(self, saved: dict[str, Any]) -> StateT:
-        """The state from the plain values of a checkpoint; SymphysError if they do not fit."""
+        """Make the state from the plain values of a checkpoint; SymphysError if they do not fit."""
         ...
 
 
 class IterationRecorder(Protocol):
-    """Where iterations are recorded: the driver, as a library with a loop of its own depends on it."""
+    """Records iterations: the driver, as seen by a library with a loop of its own."""
 
     def commit(self, iteration: Iteration[Any]) -> None:
         """End an iteration: a row of the trace, a checkpoint, then the monitor, which may raise KeyboardInterrupt."""
         ...
 
     def spent(self) -> StopReason | None:
-        """Why a limit of the solve ends it after the last row, see ``SolverOptions``; None: it goes on."""
+        """Return why a limit of the solve ends it after the last row, see ``SolverOptions``; None to go on."""
         ...
 
     def distribute(self, work: Counts, first: int) -> None:
-        """Count work that a library reports at its end only, evenly over the rows from ``first`` on."""
+        """Add work that a library reports only at its end, evenly over the rows from ``first`` on."""
         ...
 
     def multipliers(self, found: Mapping[str, Array]) -> None:
-        """Note the multipliers of the present iterate: they are part of the outcome if the solve ends well there."""
+        """Set the multipliers of the present iterate, part of the outcome if the solve ends well there."""
         ...
 
     @property
@@ -114,7 +114,7 @@ class Solve(Protocol[O_contra]):
     """Minimise the merit from ``start``.
 
     Args of the call:
-        problem: what to minimise, within which bounds.
+        problem: objective, constraints and bounds.
         start: (n,) where to begin; a seed's perturbation of the guess is already in it.
         options: of the solver.
         seed: the random stream is ``numpy.random.default_rng([seed, 1])``, the same for every solver that draws.
@@ -143,12 +143,12 @@ class Solve(Protocol[O_contra]):
 
 
 def nothing() -> None:
-    """Load nothing, as most solvers need no library."""
+    """Load nothing: most solvers need no library."""
 
 
 @dataclass(frozen=True)
 class Solver(Generic[O_inv]):
-    """A solver: its name, its options and what it does.
+    """A solver: name, options and the function that solves.
 
     Attributes:
         name: as in ``--solver`` and ``[solver.NAME]``.

@@ -19,12 +19,12 @@ from typing import Any, Generic, Protocol, Self, TypeVar
 
 from symphys.types import Array, Bools
 
-LOOSEST = 1 / 3
-"""lambda falls at most to this share after a step whose decrease was as the model said."""
-WORTH = 1e-4
-"""A step is taken if the merit falls by more than this share of what the model expects."""
-STIFFEST = 1e20
-"""lambda over the largest diagonal entry of the first H: beyond it a step is no step."""
+MIN_DAMPING_FACTOR = 1 / 3
+"""Least factor on lambda, after a step whose decrease was as the model predicted."""
+MIN_GAIN_RATIO = 1e-4
+"""Least ratio of actual to predicted decrease with which a step is taken."""
+MAX_RELATIVE_DAMPING = 1e20
+"""Largest lambda over the largest diagonal entry of the first H; beyond it steps vanish."""
 
 StepT = TypeVar("StepT")
 EndT = TypeVar("EndT")
@@ -34,7 +34,7 @@ DampedT = TypeVar("DampedT", bound="Damped")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Damped:
-    """The damping of an iteration; states of a descent are kinds of it.
+    """The damping of an iteration; states of a descent extend it.
 
     Attributes:
         damping: lambda.
@@ -46,20 +46,20 @@ class Damped:
     growth: float
     stiffest: float
 
-    def stiffer(self) -> Self:
-        """Return the state after a step that is refused."""
+    def more_damped(self) -> Self:
+        """Return the state with more damping, after a refused step."""
         return replace(self, damping=self.damping * self.growth, growth=2 * self.growth)
 
-    def softer(self, gain: float) -> Self:
-        """Return the state after a step with this gain ratio is taken."""
+    def less_damped(self, gain: float) -> Self:
+        """Return the state with the damping after a step with this gain ratio."""
         share = min(max(gain, 0.0), 1.0)
-        return replace(self, damping=self.damping * max(LOOSEST, 1 - (2 * share - 1) ** 3), growth=2.0)
+        return replace(self, damping=self.damping * max(MIN_DAMPING_FACTOR, 1 - (2 * share - 1) ** 3), growth=2.0)
 
 
 def first_damping(share: float, largest: float) -> dict[str, Any]:
     """Return the fields of ``Damped`` at the start, from the largest diagonal entry of H there."""
     size = largest or 1.0
-    return {"damping": share * size, "growth": 2.0, "stiffest": STIFFEST * size}
+    return {"damping": share * size, "growth": 2.0, "stiffest": MAX_RELATIVE_DAMPING * size}
 
 
 def movable(values: Array, lower: Array, upper: Array, gradient: Array) -> Bools:
@@ -70,7 +70,7 @@ def movable(values: Array, lower: Array, upper: Array, gradient: Array) -> Bools
 
 @dataclass(frozen=True)
 class Trial(Generic[StepT]):
-    """A step that was evaluated.
+    """An evaluated step.
 
     Attributes:
         step: within the bounds.
@@ -84,14 +84,14 @@ class Trial(Generic[StepT]):
 
 
 class Refusal(Enum):
-    """What follows a step that is not taken: a trial with more damping, or again with the same."""
+    """The consequence of a refused step: a trial with more damping, or again with the same."""
 
     STIFFER = 1
     AGAIN = 2
 
 
 class LocalModel(Protocol[StepT, EndT_co]):
-    """The merit about a point, as one iteration sees it.
+    """The model of the merit about a point, for one iteration.
 
     Attributes:
         merit: at the point.
@@ -123,7 +123,7 @@ def descend(model: LocalModel[StepT, EndT], state: DampedT) -> tuple[EndT | None
         gain = (model.merit - trial.merit) / trial.expected if modelled else -math.inf
         found = model.judge(trial.step, gain)
         if not isinstance(found, Refusal):
-            return found, state.softer(gain)
+            return found, state.less_damped(gain)
         if found is Refusal.STIFFER:
-            state = state.stiffer()
+            state = state.more_damped()
     return None, state

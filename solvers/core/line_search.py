@@ -10,18 +10,19 @@ from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.point import Point
 from symphys.types import Array
 
-SLOPE_SHARE = 1e-4
-"""Of the decrease that the slope promises, so much must come (Armijo)."""
-SHORTEST, LONGEST = 0.1, 0.5
-"""A rejected step is cut to a share within these, by quadratic interpolation."""
-CANDIDATES = 30
-ROUNDING = 64 * float(np.finfo(float).eps)
-"""Relative change of a merit that is no more than rounding."""
+ARMIJO_SHARE = 1e-4
+"""Least share of the decrease predicted by the slope (Armijo)."""
+MIN_SHRINK, MAX_SHRINK = 0.1, 0.5
+"""Bounds of the factor on a rejected step, which quadratic interpolation gives."""
+MAX_CANDIDATES = 30
+"""Largest number of step lengths that are tried."""
+RELATIVE_ROUNDING = 64 * float(np.finfo(float).eps)
+"""Relative change of a merit that counts as rounding."""
 
 
 @dataclass(frozen=True)
 class LineSearchResult:
-    """Where a line search ended.
+    """The end of a line search.
 
     Attributes:
         point: low enough; None if there was none.
@@ -46,9 +47,9 @@ def backtrack(
         ceiling: the merit of z, or the largest of the last few.
     """
     t, candidate = 1.0, None
-    for _ in range(CANDIDATES):
+    for _ in range(MAX_CANDIDATES):
         candidate = evaluator.value(evaluator.clip(z + t * step))
-        if candidate.finite and candidate.merit <= ceiling + SLOPE_SHARE * t * slope:
+        if candidate.finite and candidate.merit <= ceiling + ARMIJO_SHARE * t * slope:
             return LineSearchResult(candidate)
         t *= shrink(candidate, t, slope, merit)
     finite = candidate is not None and candidate.finite
@@ -56,8 +57,8 @@ def backtrack(
 
 
 def shrink(candidate: Point, t: float, slope: float, merit: float) -> float:
-    """The factor on t: to the lowest point of the parabola through the values so far, within limits."""
+    """Return the factor on t: the minimum of the parabola through the values so far, within bounds."""
     above = candidate.merit - merit - t * slope
     if not candidate.finite or above <= 0:
-        return SHORTEST if not candidate.finite else LONGEST
-    return min(max(-t * slope / (2 * above), SHORTEST), LONGEST)
+        return MIN_SHRINK if not candidate.finite else MAX_SHRINK
+    return min(max(-t * slope / (2 * above), MIN_SHRINK), MAX_SHRINK)

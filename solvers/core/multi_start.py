@@ -1,4 +1,4 @@
-"""Batched multi-start: several solves of one problem side by side, their evaluations gathered into batches.
+"""Batched multi-start: several solves of one problem at once, their evaluations gathered into batches.
 
 Each solve runs in a thread of its own and evaluates through one batcher. When every solve that is still going has
 requested an evaluation, the last one to do so evaluates for all: one call for each kind of evaluation and smoothing. A
@@ -32,7 +32,7 @@ def solve_multi_start(
     seeds: Sequence[int] | None = None,
     monitors: Sequence[Monitor | None] | None = None,
 ) -> list[Outcome]:
-    """Solve from every start; the outcomes in the order of the starts.
+    """Solve from every start; return the outcomes in the order of the starts.
 
     Args:
         solver: one that may run in threads, see ``Solver.threaded``; SymphysError for another.
@@ -66,7 +66,7 @@ def solve_multi_start(
 
 @dataclass
 class PendingEvaluation:
-    """An evaluation that a solve waits for, and its values or error."""
+    """A requested evaluation, and its values or error."""
 
     kind: str
     Z: Array
@@ -76,17 +76,17 @@ class PendingEvaluation:
 
 
 class EvaluationBatcher:
-    """Collects the pending evaluations of all solves, and evaluates them in one call."""
+    """Collects the pending evaluations of all solves and evaluates them in one call."""
 
     def __init__(self, evaluator: Evaluator, solves: int) -> None:
-        """``solves``: how many wait for each other."""
+        """Serve ``solves`` solves, which run in threads."""
         self.evaluator, self.solves = evaluator, solves
         self.changed = threading.Condition()
         self.waiting: list[PendingEvaluation] = []
         self.closed = False
 
     def ask(self, request: PendingEvaluation) -> Values:
-        """Wait until all have requested; an error of the evaluator is raised in every solve that it concerns."""
+        """Block until all solves have requested; raise an error of the evaluator in every solve concerned."""
         with self.changed:
             self.waiting.append(request)
             self.serve()
@@ -98,19 +98,19 @@ class EvaluationBatcher:
         return request.values
 
     def leave(self) -> None:
-        """A solve is over: the others need not wait for it."""
+        """Remove a finished solve."""
         with self.changed:
             self.solves -= 1
             self.serve()
 
     def close(self) -> None:
-        """Interrupt all solves that evaluate."""
+        """Interrupt all evaluating solves."""
         with self.changed:
             self.closed = True
             self.changed.notify_all()
 
     def serve(self) -> None:
-        """Evaluate once every solve has requested."""
+        """Evaluate once every solve has a request."""
         if not self.waiting or len(self.waiting) < self.solves or self.closed:
             return
         pending, self.waiting = self.waiting, []
@@ -135,14 +135,14 @@ def evaluate_batch(evaluator: Evaluator, pending: Sequence[PendingEvaluation]) -
 
 
 def rows(values: Values, start: int, stop: int) -> Values:
-    """A part of a batch."""
+    """Return a part of a batch."""
     parts: dict[str, Any] = {field.name: getattr(values, field.name) for field in fields(values)}
     return replace(values, **{name: part[start:stop] for name, part in parts.items() if part is not None})
 
 
 @dataclass(frozen=True)
 class BatchedEvaluator:
-    """An evaluator that leaves its requests with the batcher; see ``Evaluator``."""
+    """An evaluator that passes its requests to the batcher; see ``Evaluator``."""
 
     batcher: EvaluationBatcher
 

@@ -1,4 +1,4 @@
-"""What every solver returns: an outcome, with its status, advice, work, trace and stages."""
+"""The outcome that every solver returns: status, advice, work, trace and stages."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from symphys.types import Array
 
 
 class Status(Enum):
-    """How a solve ended, as the solver saw it; whether the problem is solved is judged afterwards."""
+    """How a solve ended, by the solver's own tests; whether the problem is solved is judged afterwards."""
 
     MET = "met"
     CONVERGED = "converged"
@@ -23,7 +23,7 @@ class Status(Enum):
 
     @property
     def fatal(self) -> bool:
-        """Whether it ends the solve in whatever stage: numbers that are not finite may be so at one smoothing only."""
+        """Whether the status ends the solve in whatever stage; values may be not finite at one smoothing only."""
         return self in (Status.NOT_APPLICABLE, Status.FAILED)
 
 
@@ -47,7 +47,7 @@ class StopReason:
 
 @dataclass(frozen=True)
 class Counts:
-    """Work done: each rollout, gradient, residual Jacobian, Hessian that was evaluated, line searches included."""
+    """Counts of evaluated rollouts, gradients, residual Jacobians and Hessians, line searches included."""
 
     rollouts: int = 0
     gradients: int = 0
@@ -56,11 +56,11 @@ class Counts:
 
     @classmethod
     def of_slopes(cls, rows: int) -> Counts:
-        """The work of the slopes of all steps: an adjoint for each of the ``rows`` numbers of a state's tangent."""
+        """Return the work of the slopes of all steps: an adjoint for each of the ``rows`` numbers of a tangent."""
         return cls(gradients=rows)
 
     def __add__(self, other: Counts) -> Counts:
-        """Return the work of both."""
+        """Return the sum of both counts."""
         return Counts(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
     def __sub__(self, other: Counts) -> Counts:
@@ -74,7 +74,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class TraceRow:
-    """One iteration.
+    """A row of the trace: one iteration.
 
     Attributes:
         iteration: from 0, the guess.
@@ -106,14 +106,14 @@ class TraceRow:
 
 @dataclass(frozen=True)
 class StageResult:
-    """What one stage of smoothing came to.
+    """The result of one stage of smoothing.
 
     Attributes:
         smoothing: of the stage.
         status: how it ended; INTERRUPTED for one that is to go on.
         z: (n,) its best point.
         objective, max_violation: of that point at this smoothing; see ``TraceRow``. nan where nothing was evaluated.
-        counts, seconds: what the stage took, those before it left out.
+        counts, seconds: of this stage alone.
     """
 
     smoothing: float
@@ -127,7 +127,7 @@ class StageResult:
 
 Monitor = Callable[[TraceRow], None]
 Keep = Callable[[Callable[[], dict[str, object]]], None]
-"""Is offered, after each iteration, what makes the checkpoint there; calls it when it wants to keep one."""
+"""Receives after each iteration a function that makes the checkpoint, and calls it to keep one."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class Outcome:
         z: (n,) the best point.
         trace: one row per iteration.
         counts: total work.
-        checkpoint: what the solver needs to go on exactly here; JSON-able numbers, strings and lists of numbers.
+        checkpoint: the data from which the solver resumes exactly; JSON-able numbers, strings and lists of numbers.
         stages: those of smoothing that were begun, in their order; of an interrupted solve the last one is halfway.
         gains: feedback about the best point, as named arrays; empty of solvers without, and of interrupted solves.
         multipliers: those of a solve that ended well, by names of the solver's own, from which another may start; empty

@@ -1,4 +1,4 @@
-"""An evaluated point, which of two points is better, and the incumbent: the best point of a stage."""
+"""Evaluated points, their order, and the incumbent: the best point of a stage."""
 
 from __future__ import annotations
 
@@ -44,21 +44,21 @@ class Point:
 
     @property
     def max_violation(self) -> float:
-        """The largest of the errors; nan without any."""
+        """The largest error; nan without any."""
         return float(np.max(self.errors)) if self.errors.size else math.nan
 
     @property
     def valued(self) -> bool:
-        """Whether merit, objective and errors are finite: all that decides which point is better."""
+        """Whether merit, objective and errors are finite, which decide the order of points."""
         return math.isfinite(self.merit) and math.isfinite(self.objective) and bool(np.isfinite(self.errors).all())
 
     @cached_property
     def finite(self) -> bool:
-        """Whether every number that was asked for is finite."""
+        """Whether all evaluated numbers are finite."""
         return self.valued and all(bool(np.isfinite(p).all()) for p in (self.gradient, self.residuals, self.jacobian))
 
     def better(self, other: Point | None) -> bool:
-        """Whether it is strictly better, by ``rank``; one whose values are not finite is never better."""
+        """Whether the point is strictly better, by ``rank``; one whose values are not finite never is."""
         if not self.valued:
             return False
         return other is None or not other.valued or self.rank < other.rank
@@ -70,7 +70,7 @@ class Point:
 
 
 def best_of(points: list[Point]) -> Point | None:
-    """The best; None if none is finite."""
+    """Return the best point; None if none is finite."""
     best = None
     for point in points:
         best = point if point.better(best) else best
@@ -78,19 +78,19 @@ def best_of(points: list[Point]) -> Point | None:
 
 
 class Stop(Exception):
-    """Ends a stage from within an evaluation: the incumbent meets everything, and the problem asks to stop there."""
+    """Raised within an evaluation to end a stage: the incumbent meets everything, and the problem stops there."""
 
     def __init__(self) -> None:
-        """Carry the reason."""
+        """Set the reason."""
         super().__init__(Status.MET.value)
         self.reason = StopReason(Status.MET)
 
 
 class Incumbent:
-    """The best point of a stage, in the measure that a run is judged by, see ``Point.rank``."""
+    """The best point of a stage by the measure that judges runs, see ``Point.rank``."""
 
     def __init__(self, stop_when_met: bool, best: Point | None = None) -> None:
-        """Start from ``best``, where a solve goes on; ``stop_when_met``: see ``ShootingProblem``."""
+        """Start from ``best``, that of a resumed solve; ``stop_when_met``: see ``ShootingProblem``."""
         self._stop_when_met, self._best = stop_when_met, best
 
     @property
@@ -99,14 +99,14 @@ class Incumbent:
         return self._best
 
     def offer(self, points: Iterable[Point]) -> None:
-        """Keep the best of these and the present one; Stop where that is enough."""
+        """Keep the best of the points and the present one; raise Stop where everything is met."""
         for point in points:
             if point.better(self._best):
                 self._best = point
         self._stop_if_met()
 
     def replace(self, point: Point) -> None:
-        """Keep this point, whatever the present one is; Stop where that is enough."""
+        """Keep this point, whatever the present one is; raise Stop where everything is met."""
         self._best = point
         self._stop_if_met()
 

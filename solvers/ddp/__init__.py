@@ -1,1 +1,1 @@
-"""Differential dynamic programming: a backward pass along the steps of a motion, and motions by its feedback."""
+"""Differential dynamic programming: a backward pass along the steps of a motion, and rollouts under its feedback."""

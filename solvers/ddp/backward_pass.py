@@ -1,4 +1,4 @@
-"""The backward pass: from the last state to the first, the best change of every knot as a function of the state."""
+"""The backward pass: from the last state to the first, the optimal change of every knot as a function of the state."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Selection = slice | Ints
 
 @dataclass(frozen=True)
 class Bounds:
-    """Of z: how far each entry may go down and up from where it is, and the size of a typical change; (len(z),)."""
+    """Distances of each entry of z from its bounds, and its typical change; (len(z),)."""
 
     down: Array
     up: Array
@@ -29,7 +29,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Policy:
-    """What a backward pass finds.
+    """The result of a backward pass.
 
     Attributes:
         gains: how the new knots of each step answer: ``ahead`` (w,), and ``back`` (w, n + o + s) of state, old knots
@@ -47,7 +47,7 @@ class Policy:
 
     @cached_property
     def aligned(self) -> tuple[Array, Array]:
-        """(N, w) and (N, w, n): ``ahead`` and ``back`` of all steps, where their knots are aligned."""
+        """Return ``ahead`` (N, w) and ``back`` (N, w, n) of all steps, where their knots are aligned."""
         gains = [gain for gain in self.gains if gain is not None]
         return np.array([gain.ahead for gain in gains]), np.array([gain.back for gain in gains])
 
@@ -61,7 +61,7 @@ def backward_pass(
     damping: float,
     gradient: bool = True,
 ) -> Policy | None:
-    """The policy about a motion; None where a Hessian is not positive definite.
+    """Compute the policy about a motion; None where a Hessian is not positive definite.
 
     Args:
         slopes: of runs of steps, the last run first: a run is asked for when those after it are done.
@@ -76,11 +76,13 @@ def backward_pass(
     optimization, IROS 2012. Theirs has one slope of the cost to go; here it is a costate and what decisions add to
     that. Numbers of the state on which nothing later depends are left out of the recursion.
     """
+    # Eliminate all knots, backwards over the steps.
     costate = gradient or knots.aligned is None or bool(len(statics))
     made = _Steps(costs, knots, statics, bounds, damping, costate)
     found = riccati_recursion(made.from_end(slopes), made.last())
     if found is None:
         return None
+    # The static entries remain: minimise over them, then close the loop.
     slope, curve = made.at_start(found.cost)
     chosen = _static_step(slope, curve, bounds, statics, damping)
     if chosen is None:
@@ -91,7 +93,7 @@ def backward_pass(
 
 
 class _Steps:
-    """The steps of a motion for the Riccati recursion; its states are (live tangent, old knots, static entries).
+    """The steps of a motion for the Riccati recursion, in states (live tangent, old knots, static entries).
 
     The numbers of a tangent are live where the step, or a cost, depends on them. Without a costate all are.
 
@@ -118,7 +120,7 @@ class _Steps:
         self._start = np.zeros((costs.x.shape[1], len(statics)))
 
     def _in_costs(self) -> Bools:
-        """(N + 1, n): numbers of the tangents on which some cost's curvature depends; the costate has the slopes."""
+        """Return (N + 1, n) which tangent entries have curvature in some cost; the costate has the slopes."""
         costs = self.costs
         asked: Bools = np.diagonal(costs.xx, axis1=1, axis2=2) != 0  # others are 0 with it: xx is positive semidefinite
         asked |= costs.sx.any(axis=1)
@@ -127,7 +129,7 @@ class _Steps:
         return asked
 
     def last(self) -> CostToGo:
-        """Of the state after the last step, less its costate."""
+        """Return the cost to go of the state after the last step, without its costate."""
         live, s = self._lives[-1], len(self.statics)
         curve, by_statics = self.costs.xx[-1][live][:, live], self.costs.sx[-1][:, live]
         if s:
@@ -135,7 +137,7 @@ class _Steps:
         return CostToGo(np.zeros(len(curve)) if self._with_costate else self.costs.x[-1][live], curve)
 
     def from_end(self, slopes: Iterable[Linearized]) -> Iterator[LinearStep]:
-        """The steps, the last one first."""
+        """Yield the steps from the last to the first."""
         end = len(self.knots)
         for run in slopes:
             first = end - len(run.a)
@@ -152,13 +154,13 @@ class _Steps:
         self.gradient[self.statics] += self.costs.s + self._start.T @ self._costate
 
     def at_start(self, cost: CostToGo) -> tuple[Array, Array]:
-        """Slope (s,) and curvature (s, s) by the static entries, of the whole motion; once all steps were made."""
+        """Return slope (s,) and curvature (s, s) of the whole motion by the static entries, after the recursion."""
         start = np.concatenate([self._start[self._lives[0]], np.eye(len(self.statics))])
         slope = cost.slope @ start + self._start.T @ self._costate + self.costs.s
         return slope, start.T @ cost.curve @ start + self.costs.ss
 
     def gains(self, feedback: Sequence[Feedback | None]) -> Sequence[Feedback | None]:
-        """The feedback of all steps by the whole tangent."""
+        """Return the feedback of all steps by the whole tangent."""
         n = self.costs.x.shape[1]
         lives = {id(each): each for each in self._lives[:-1]}.values()
         if self._aligned is not None and all(_is_whole(each, n) for each in lives):
@@ -166,7 +168,7 @@ class _Steps:
         return [self._gain(k, each) for k, each in enumerate(feedback)]
 
     def _gain(self, k: int, feedback: Feedback | None) -> Feedback | None:
-        """The feedback of step k by the whole tangent."""
+        """Return the feedback of step k by the whole tangent."""
         if feedback is None:
             return None
         n, beside = self.costs.x.shape[1], len(self.knots[k].old) + len(self.statics)
@@ -176,18 +178,21 @@ class _Steps:
         return Feedback(feedback.ahead, back)
 
     def _run(self, first: int, end: int, run: Linearized, knots: AlignedKnots) -> Iterator[LinearStep]:
-        """A run of steps whose knots are their own, without static entries, all in arrays; the last step first."""
+        """Yield a run of steps with knots of their own and no static entries, as arrays; the last step first."""
         steps, n = slice(first, end), run.a.shape[1]
+        # Slopes of the next state by (state, knots), and costs of the steps by the same.
         after = np.concatenate([run.a, run.b if knots.plain else run.b @ knots.weights[steps]], axis=2)
         slopes, curves = self._own_slopes[steps], self._own_curves[steps]
         if self._with_costate:
             slopes = self._by_costate(first, run, knots.weights[steps])
             self.gradient[knots.new[steps]] = slopes[:, n:]
+        # Mixed second derivatives of costs by inputs and the next state.
         if self._mixed[1]:
             crossed = (knots.weights[steps].transpose(0, 2, 1) @ self.costs.uy[steps]) @ after
             curves = curves.copy()
             curves[:, n:] += crossed
             curves[:, :, n:] += crossed.transpose(0, 2, 1)
+        # Restrict the states to the tangent entries on which later costs depend.
         live, later = self._lives[first], self._lives[end]
         through: Array | list[Array] = after
         if not _is_whole(live, n):
@@ -200,7 +205,7 @@ class _Steps:
         yield from map(LinearStep, *(each[::-1] for each in parts))
 
     def _aligned_costs(self, knots: AlignedKnots) -> tuple[Array, Array]:
-        """Slopes (N, n + w) and curvatures (N, n + w, n + w) of all steps' costs, by the state and the knots."""
+        """Return slopes (N, n + w) and curvatures (N, n + w, n + w) of all costs by the state and the knots."""
         costs, n, across = self.costs, self.costs.x.shape[1], knots.weights.transpose(0, 2, 1)
         by_knots = costs.u if knots.plain else (costs.u[:, None] @ knots.weights)[:, 0]
         slopes = np.concatenate([costs.x[:-1], by_knots], axis=1)
@@ -213,7 +218,7 @@ class _Steps:
         return slopes, curves
 
     def _by_costate(self, first: int, run: Linearized, weights: Array) -> Array:
-        """(K, n + w) slopes of a run of steps by its knots, less those by the state, which the costate has."""
+        """Return (K, n + w) slopes of a run of steps by its knots; those by the state are in the costate."""
         costs, by_inputs = self.costs, np.empty((len(run.a), run.b.shape[2]))
         for k in reversed(range(len(run.a))):
             by_inputs[k] = costs.u[first + k] + self._costate @ run.b[k]
@@ -223,13 +228,15 @@ class _Steps:
         return slopes
 
     def _step(self, k: int, a: Array, b: Array, c: Array) -> LinearStep:
-        """The step, and the costs of the state and the inputs before it; columns are (state, old, statics, new)."""
+        """Return the step and the costs of the state and inputs before it; columns: (state, old, statics, new)."""
         costs, knot, costate, live = self.costs, self.knots[k], self._costate, self._lives[k]
+        # Adjoint step: gradient of the objective by the knots and the static entries.
         self._costate = costs.x[k] + costate @ a
         by_inputs, by_statics = costs.u[k] + costate @ b, costate @ c
         by_knots = knot.weights.T @ by_inputs
         self.gradient[knot.acting] += by_knots
         self.gradient[self.statics] += by_statics
+        # Slopes of the next state by the columns (state, old knots, statics, new knots).
         rows = self._lives[k + 1]
         a, b, c = a[rows][:, live], b[rows] @ knot.weights, c[rows]
         n, o, s, new = a.shape[1], len(knot.old), len(self.statics), knot.new
@@ -237,6 +244,7 @@ class _Steps:
         acting, statics = _places(n, o, s, len(new)), slice(n + o, n + o + s)
         slope = np.zeros(after.shape[1])
         slope[acting], slope[statics] = by_knots, by_statics
+        # Costs by the same columns; knots that act again and statics are carried on unchanged.
         curve = self._curve(k, after, acting)
         through = after
         if s or len(knot.kept):
@@ -247,7 +255,7 @@ class _Steps:
         return LinearStep(through, slope, curve, self.bounds.down[new], self.bounds.up[new], self._damping[new])
 
     def _curve(self, k: int, after: Array, acting: Selection) -> Array:
-        """Of the costs of step k; ``after``: the state after it by all that this is the curvature by."""
+        """Return the curvature of the costs of step k; ``after``: derivative of the state after it."""
         costs, knot, live, s = self.costs, self.knots[k], self._lives[k], len(self.statics)
         size, w = after.shape[1], knot.weights
         own = costs.xx[k][live][:, live]
@@ -270,7 +278,7 @@ class _Steps:
 
 
 def _selection(chosen: NDArray[np.bool_]) -> Selection:
-    """Of these numbers; a slice, which copies nothing, where they follow each other."""
+    """Return a selection of these numbers; a slice, which copies nothing, where they are contiguous."""
     numbers = np.flatnonzero(chosen)
     if not len(numbers):
         return slice(0, 0)
@@ -284,12 +292,12 @@ def _is_whole(selection: Selection, n: int) -> bool:
 
 
 def _places(n: int, o: int, s: int, new: int) -> Selection:
-    """Of the knots among (state, old knots, static entries, new knots)."""
+    """Return the places of the knots among (state, old knots, static entries, new knots)."""
     return np.concatenate([np.arange(n, n + o), np.arange(n + o + s, n + o + s + new)]) if s else slice(n, n + o + new)
 
 
 def _static_step(slope: Array, curve: Array, bounds: Bounds, statics: Ints, damping: float) -> Array | None:
-    """(s,) the best change of the static entries."""
+    """Return (s,) the optimal change of the static entries."""
     if not len(statics):
         return np.zeros(0)
     damped = (curve + curve.T) / 2 + np.diag(damping / bounds.scale[statics] ** 2)

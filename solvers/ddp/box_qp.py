@@ -9,16 +9,20 @@ from scipy.linalg import lapack
 
 from symphys.types import Array, Bools
 
-ROUNDS = 100
-ARMIJO = 0.1
+MAX_ITERATIONS = 100
+"""Largest number of projected Newton steps."""
+ARMIJO_SHARE = 0.1
+"""Least share of the decrease that the slope predicts."""
 SHRINK = 0.6
-SMALLEST = 1e-10
-FLAT = 1e-10
-"""A projected gradient below it, relative to the first, is none."""
+"""Factor on a refused step."""
+MIN_STEP_FACTOR = 1e-10
+"""Least factor on a step."""
+GRADIENT_TOLERANCE = 1e-10
+"""Projected gradient, relative to the first one, that counts as zero."""
 
 
 class BoxSolution(NamedTuple):
-    """A minimum: ``step`` (m,), which entries are ``free`` of the bounds, and their lower Cholesky factor."""
+    """A minimum: ``step`` (m,), which entries are ``free`` of bounds, and the Cholesky factor of the free block."""
 
     step: Array
     free: Bools
@@ -46,8 +50,9 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
     x = np.clip(start, lower, upper)
     free, factor = np.zeros(len(x), np.bool_), None
     size = 1.0 + float(np.abs(gradient).max(initial=0.0))
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         slope = gradient + hessian @ x
+        # Free set: entries at no bound that the gradient pushes against.
         now = ~(((x <= lower) & (slope > 0)) | ((x >= upper) & (slope < 0)))
         if factor is None or not np.array_equal(now, free):
             free = now
@@ -56,8 +61,9 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
             factor, failed = lapack.dpotrf(hessian[free][:, free], lower=1)
             if failed:
                 return None
-        if np.abs(slope[free]).max() <= FLAT * size:
+        if np.abs(slope[free]).max() <= GRADIENT_TOLERANCE * size:
             break
+        # Newton step in the free entries, then an Armijo search along its projection.
         ahead = np.zeros(len(x))
         ahead[free] = -lapack.dpotrs(factor, slope[free], lower=1)[0]
         found = _projected(hessian, gradient, (lower, upper), x, slope, ahead)
@@ -68,7 +74,7 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
 
 
 def _within(hessian: Array, gradient: Array, lower: Array, upper: Array) -> BoxSolution | None:
-    """The minimum without bounds, where it exists and meets them."""
+    """Return the unconstrained minimum, where it exists and lies within the bounds."""
     factor, failed = lapack.dpotrf(hessian, lower=1)
     if failed:
         return None
@@ -80,12 +86,12 @@ def _within(hessian: Array, gradient: Array, lower: Array, upper: Array) -> BoxS
 def _projected(
     hessian: Array, gradient: Array, bounds: tuple[Array, Array], x: Array, slope: Array, ahead: Array
 ) -> Array | None:
-    """The first point along the projected step that is enough lower; None where none is."""
+    """Return the first point along the projected step with enough decrease; None if there is none."""
     value, share = x @ (hessian @ x) / 2 + gradient @ x, 1.0
-    while share > SMALLEST:
+    while share > MIN_STEP_FACTOR:
         trial = np.clip(x + share * ahead, *bounds)
         gain = value - (trial @ (hessian @ trial) / 2 + gradient @ trial)
-        if gain >= ARMIJO * -(slope @ (trial - x)) and np.any(trial != x):
+        if gain >= ARMIJO_SHARE * -(slope @ (trial - x)) and np.any(trial != x):
             return trial
         share *= SHRINK
     return None

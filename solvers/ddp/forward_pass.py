@@ -1,4 +1,4 @@
-"""The forward pass: motions under a policy, one for each step length, side by side."""
+"""The forward pass: rollouts under a policy, one for each step length, in one batch."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class MotionBatch(NamedTuple):
     merit: Array | None = None
 
     def motion(self, row: int, smoothing: float) -> StagedMotion:
-        """One of them."""
+        """Return the motion of a row."""
         return StagedMotion(self.z[row], self.x[row], self.u[row], smoothing, gapless=True)
 
 
 def forward_pass(
     problem: StagedProblem, motion: StagedMotion, policy: Policy, knots: PaddedKnots, lengths: Array
 ) -> MotionBatch:
-    """The motions of step lengths (B,), their z within the bounds of ``knots``.
+    """Return the motions of step lengths (B,), with z within the bounds of ``knots``.
 
     A motion that is not finite stays so to its end.
     """
@@ -49,7 +49,7 @@ def forward_pass(
 
 
 def affine(motion: StagedMotion, policy: Policy, knots: PaddedKnots) -> AffinePolicy:
-    """The policy in arrays."""
+    """Return the policy as arrays."""
     lower, upper = knots.bounds
     if knots.steps.aligned is not None and not len(policy.statics):
         about = motion.x[:-1], np.zeros(knots.old.shape), motion.z[knots.new]

@@ -1,4 +1,4 @@
-"""Feedback about a motion as named arrays, a row for each knot that is decided along the way; and motions by it.
+"""Feedback about a motion as named arrays, a row for each knot that is decided along the way; and rollouts under it.
 
 A knot moves by ``by_state`` @ (how far the state at ``step`` is from ``states[step]``, in its tangent), and by
 ``by_others`` @ (how far the entries ``others`` of z are from ``z``): knots that were decided before and still act, and
@@ -17,13 +17,13 @@ from symphys.solvers.ddp.knots import KnotStep, knot_steps
 from symphys.types import Array
 
 Gains = Mapping[str, Array]
-"""See ``gain_arrays``."""
+"""Arrays by name, see ``gain_arrays``."""
 DAMPINGS = 10.0 ** np.arange(-10, 3, 3)
-"""The first with which the Hessians are positive definite is taken."""
+"""Tried in order; the first with positive definite Hessians is taken."""
 
 
 def gains_about(problem: ShootingProblem, z: Array, smoothing: float) -> dict[str, Array]:
-    """The feedback about the motion of z (len(z),), by the merit; nothing where that has no finite expansion."""
+    """Return the feedback about the motion of z (len(z),) by the merit; empty without a finite expansion."""
     assert problem.staged is not None, "the problem can be seen step by step"
     staged = problem.staged()
     motion = staged.roll_out(z, smoothing)
@@ -42,7 +42,7 @@ def gains_about(problem: ShootingProblem, z: Array, smoothing: float) -> dict[st
 def gain_arrays(
     motion: StagedMotion, policy: Policy, knots: Sequence[KnotStep], problem: StagedProblem
 ) -> dict[str, Array]:
-    """The arrays, for K knots in the order of their steps; n numbers are a tangent.
+    """Return the arrays of K knots in the order of their steps; n is the tangent dimension.
 
     Returns:
         ``z`` (len(z),), ``states`` (N + 1, nx), ``step`` and ``knot`` (K,), ``by_state`` (K, n), ``others`` (K, q)
@@ -67,7 +67,7 @@ def gain_arrays(
 def follow(
     problem: StagedProblem, gains: Gains, x: Array, bounds: tuple[Array, Array], feedback: bool = True
 ) -> StagedMotion:
-    """The motion from a state x (nx,), step by step, at smoothing 0; without feedback its controls are as planned.
+    """Simulate from a state x (nx,) at smoothing 0; without feedback the controls are the planned ones.
 
     ``bounds``: (len(z),) each, of z.
     """

@@ -1,4 +1,4 @@
-"""One iteration of iLQR about a motion: steps and costs to second order, a policy, and the best motion along it.
+"""One iteration of iLQR about a motion: quadratic expansion, policy, and line search along it.
 
 The solver ``ilqr`` and model predictive control iterate by this. They differ in what a motion is worth, in how damping
 follows success, and in how often they iterate.
@@ -19,12 +19,12 @@ from symphys.solvers.ddp.forward_pass import MotionBatch, forward_pass
 from symphys.solvers.ddp.knots import PaddedKnots
 from symphys.types import Array
 
-LENGTHS = 0.5 ** np.arange(8.0)
-"""Step lengths that are tried side by side."""
+STEP_LENGTHS = 0.5 ** np.arange(8.0)
+"""Step lengths, which are evaluated in one batch."""
 
 
 class BestMotion(NamedTuple):
-    """The lowest motion of a line search.
+    """The best motion of a line search.
 
     Attributes:
         motion: itself.
@@ -40,7 +40,7 @@ class BestMotion(NamedTuple):
 
 
 class LocalExpansion:
-    """A problem to second order about a motion.
+    """The quadratic expansion of a problem about a motion.
 
     Attributes:
         bounds: of changes of z.
@@ -55,7 +55,7 @@ class LocalExpansion:
         scale: Array,
         slopes: Iterable[Linearized] | None = None,
     ) -> None:
-        """Expand the objective while threads are at the slopes of the steps.
+        """Expand the objective while threads compute the slopes of the steps.
 
         Args:
             problem: to expand.
@@ -71,17 +71,17 @@ class LocalExpansion:
         self.bounds = Bounds(knots.lower[:-1] - motion.z, knots.upper[:-1] - motion.z, scale)
 
     def policy(self, damping: float, gradient: bool = True) -> Policy | None:
-        """Pass backwards over the steps; see ``backward_pass``."""
+        """Run the backward pass; see ``backward_pass``."""
         runs, self._slopes = tee(self._slopes)
         statics = self.problem.statics
         return backward_pass(runs, self._costs, self.knots.steps, statics, self.bounds, damping, gradient)
 
     def search(self, policy: Policy, values: Callable[[MotionBatch], Array]) -> BestMotion:
-        """Follow a policy with all step lengths, side by side; ``values`` (B,) of motions decide."""
-        motions = forward_pass(self.problem, self.motion, policy, self.knots, LENGTHS)
+        """Evaluate the policy with all step lengths in one batch; ``values`` (B,) of motions decide."""
+        motions = forward_pass(self.problem, self.motion, policy, self.knots, STEP_LENGTHS)
         found = values(motions)
         found = np.where(np.isfinite(found), found, math.inf)
         best = int(found.argmin())
-        length = float(LENGTHS[best])
+        length = float(STEP_LENGTHS[best])
         expected = -(length * policy.first + length**2 * policy.second)
         return BestMotion(motions.motion(best, self.motion.smoothing), float(found[best]), length, expected)

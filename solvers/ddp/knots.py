@@ -1,4 +1,4 @@
-"""Which knots of the controls act in which step, and where each is decided."""
+"""The knots of the controls: in which steps each acts, and in which step it is decided."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class KnotStep:
 
     @property
     def acting(self) -> Ints:
-        """(o + w,)."""
+        """Return (o + w,) the entries of all knots that act in the step."""
         return np.concatenate([self.old, self.new])
 
 
@@ -38,7 +38,7 @@ class KnotSteps(list[KnotStep]):
 
     @cached_property
     def aligned(self) -> AlignedKnots | None:
-        """All knots in arrays, where each acts in one step and all steps have equally many; else None."""
+        """Return all knots as arrays if each acts in one step and all steps have equally many; else None."""
         widths = {len(each.new) for each in self}
         if any(len(each.old) for each in self) or len(widths) != 1 or widths == {0}:
             return None
@@ -49,7 +49,7 @@ class KnotSteps(list[KnotStep]):
 
 @dataclass(frozen=True)
 class AlignedKnots:
-    """Knots of which each acts in one step, w in each.
+    """Knots that act in one step each, w in each step.
 
     Attributes:
         new: (N, w) entries of z.
@@ -64,7 +64,7 @@ class AlignedKnots:
 
 @dataclass(frozen=True)
 class PaddedKnots:
-    """The knots of all steps in arrays: o old ones at most and w new ones, with zeros where a step has fewer.
+    """The knots of all steps as arrays: at most o old ones and w new ones, padded with zeros.
 
     Attributes:
         steps: N of them.
@@ -84,7 +84,7 @@ class PaddedKnots:
 
     @staticmethod
     def of(steps: KnotSteps, lower: Array, upper: Array) -> PaddedKnots:
-        """Of steps, with bounds of z (len(z),)."""
+        """Make the arrays of steps, with bounds of z (len(z),)."""
         count, none = len(steps), len(lower)
         o, w = (max(len(getattr(each, name)) for each in steps) for name in ("old", "new"))
         old, new = np.full((count, o), none), np.full((count, w), none)
@@ -98,12 +98,12 @@ class PaddedKnots:
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """(N, w) each, of the new knots."""
+        """Return lower and upper bounds (N, w) of the new knots."""
         return self.lower[self.new], self.upper[self.new]
 
 
 def knot_steps(problem: StagedProblem) -> KnotSteps:
-    """One for each step; knots that never act are in none."""
+    """Return the knots of each step; knots that never act are in none."""
     steps, m = problem.steps, problem.input_size
     weights = problem.weights.tocsr()
     rows, columns = weights.nonzero()

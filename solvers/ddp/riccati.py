@@ -1,4 +1,4 @@
-"""The Riccati recursion: from the last step to the first, the best decisions as functions of the state, within bounds.
+"""The Riccati recursion: backwards over the steps, the optimal decisions within bounds as functions of the state.
 
 A step leads from a state r to the state after it by r' = through @ (r, v), where v are its decisions, and costs
 slope . (r, v) + (r, v) . curve . (r, v) / 2. What a state is, and how many numbers it and the decisions have, may
@@ -18,7 +18,7 @@ from symphys.types import Array
 
 
 class LinearStep(NamedTuple):
-    """One step about a motion.
+    """One linearised step about a motion.
 
     Attributes:
         through: (r', r + w) the state after it by (state, decisions).
@@ -37,21 +37,21 @@ class LinearStep(NamedTuple):
 
 
 class CostToGo(NamedTuple):
-    """Of a state: ``slope`` (r,) and ``curve`` (r, r)."""
+    """Cost to go of a state to second order: ``slope`` (r,) and ``curve`` (r, r)."""
 
     slope: Array
     curve: Array
 
 
 class Feedback(NamedTuple):
-    """The decisions of a step: ``ahead`` (w,), and ``back`` (w, r) by the state; 0 where a bound holds a decision."""
+    """The decisions of a step: ``ahead`` (w,), and gains ``back`` (w, r) by the state; 0 at active bounds."""
 
     ahead: Array
     back: Array
 
 
 class RiccatiSolution(NamedTuple):
-    """What a recursion comes to.
+    """The result of a recursion.
 
     Attributes:
         feedback: of the steps, from the last to the first; None for those without decisions.
@@ -66,7 +66,7 @@ class RiccatiSolution(NamedTuple):
 
 
 def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSolution | None:
-    """The best decisions of all steps, the last one first; None where a Hessian is not positive definite.
+    """Compute the optimal decisions of all steps, backwards; None where a Hessian is not positive definite.
 
     Args:
         steps: from the last to the first.
@@ -79,6 +79,7 @@ def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSol
     found: list[Feedback | None] = []
     first = second = 0.0
     for through, own_slope, own_curve, lower, upper, damping in steps:
+        # Q = cost of the step + cost to go of the next state: slope and curvature by (state, decisions).
         total = own_slope + slope @ through
         whole = own_curve + through.T @ (curve @ through)
         if not len(damping):
@@ -101,12 +102,14 @@ def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSol
             curve = 0.5 * (curve + curve.T)
             found.append(Feedback(np.array([step]), back[None]))
             continue
+        # Minimise Q over the decisions within bounds; feedback of those at no bound.
         by_decisions, hessian, cross = total[rest:], whole[rest:, rest:], whole[rest:, :rest]
         made = _decided(hessian, damping, by_decisions, cross, lower, upper)
         if made is None:
             return None
         ahead, back = made
         found.append(made)
+        # Expected change for a step length t: first t + second t^2; then the cost to go of the state.
         along = hessian @ ahead
         first, second = first + float(by_decisions @ ahead), second + float(ahead @ along) / 2
         slope = total[:rest] + (along + by_decisions) @ back + ahead @ cross
@@ -117,7 +120,7 @@ def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSol
 
 
 def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: Array, upper: Array) -> Feedback | None:
-    """The best decisions within bounds, and how those that no bound holds answer the state."""
+    """Return the optimal decisions within bounds, and the gains of those that are at no bound."""
     damped = hessian.copy()
     damped.ravel()[:: len(slope) + 1] += damping
     factor, fault = lapack.dpotrf(damped, lower=1, clean=0)

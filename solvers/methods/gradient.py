@@ -1,9 +1,9 @@
-"""First-order descent: d merit / dz by the adjoint of the rollout, one step along a direction of it at a time.
+"""First-order descent: d merit / dz by the adjoint of the rollout, and one line search along a direction at a time.
 
 A direction (``core.directions``) is projected into the bounds, then shortened until the merit is below the largest of
 the last few (``backtracking``; Grippo, Lampariello, Lucidi 1986; with bounds and the spectral step this is the SPG2 of
 Birgin, Martinez, Raydan 2000). A direction that does not descend is replaced by that of an empty memory.
-A step onto a plateau is refused and shortened, see ``vanishing_gradient``.
+A step onto a plateau is refused and shortened, see ``core.convergence``.
 """
 
 from __future__ import annotations
@@ -15,16 +15,22 @@ from typing import Any, Literal
 import numpy as np
 
 from symphys.solvers.core.checkpoint import revive
-from symphys.solvers.core.convergence import Progress, not_finite, stationary
+from symphys.solvers.core.convergence import (
+    MAX_SHORTENINGS,
+    SHORTENING_FACTOR,
+    Progress,
+    ends_on_plateau,
+    not_finite,
+    stationary,
+)
 from symphys.solvers.core.directions import DIRECTIONS, DirectionMemory, MomentumWeights, learn_length
-from symphys.solvers.core.driver import iterating, make_solver
+from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
-from symphys.solvers.core.line_search import ROUNDING, backtrack
+from symphys.solvers.core.line_search import RELATIVE_ROUNDING, backtrack
 from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.core.vanishing_gradient import REFUSALS, SHORTER, vanished
 from symphys.types import Array
 
 RATES: dict[str, tuple[float, ...]] = {
@@ -77,7 +83,7 @@ class GradientOptions(SolverOptions):
     patience: int = 30
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and what would be valid."""
+        """Raise ValueError, which names the option and what would be valid."""
         super().__post_init__()
         require(self.method in DIRECTIONS, "method", f"one of {', '.join(DIRECTIONS)}")
         at_least(0, iterations=self.iterations, backtracking=self.backtracking)
@@ -88,11 +94,11 @@ class GradientOptions(SolverOptions):
         require(self.clip > 0, "clip", "above 0")
 
     def rate(self, iteration: int) -> float:
-        """The rate in force: each of the rates has an equal share of the iterations."""
+        """Return the rate of an iteration: each of the rates has an equal share of the iterations."""
         return self.schedule[self.share(iteration)]
 
     def at_last_rate(self, iteration: int) -> bool:
-        """Whether no other rate follows."""
+        """Whether the iteration uses the last rate."""
         return self.share(iteration) == len(self.schedule) - 1
 
     @property
@@ -101,13 +107,13 @@ class GradientOptions(SolverOptions):
         return self.rates or RATES[self.method]
 
     def share(self, iteration: int) -> int:
-        """The index of the rate in force."""
+        """Return the index of the rate of an iteration."""
         return min(iteration * len(self.schedule) // max(self.iterations, 1), len(self.schedule) - 1)
 
 
 @dataclass(frozen=True)
 class GradientState:
-    """Between two iterations.
+    """The state between two iterations.
 
     Attributes:
         iteration: of this stage.
@@ -126,7 +132,7 @@ class GradientState:
 
 
 class GradientDescent(Method[GradientState]):
-    """The method, see ``interface.Method``. Nothing is drawn: the seed acts through the start alone."""
+    """The method, see ``interface.Method``. It draws nothing: the seed acts only through the start."""
 
     def __init__(self, context: StageContext, options: GradientOptions) -> None:
         """Set up one stage."""
@@ -134,7 +140,7 @@ class GradientDescent(Method[GradientState]):
         self.start, self.options = context.start, options
 
     def init(self) -> Iteration[GradientState] | StopReason:
-        """The gradient at the start."""
+        """Evaluate the gradient at the start."""
         point = self.evaluator.gradient(self.start)
         if not point.finite:
             return not_finite(point)
@@ -143,7 +149,7 @@ class GradientDescent(Method[GradientState]):
         return self._iteration(point, GradientState(0, z, point.gradient, (point.merit,), memory, progress), math.nan)
 
     def step(self, state: GradientState) -> Iteration[GradientState] | StopReason:
-        """Direction, line search, new gradient."""
+        """Compute a direction, search along it, and evaluate the new gradient."""
         scale, options = self.evaluator.scale, self.options
         step, memory = self._direction(state)
         point = self._follow(state, step)
@@ -176,7 +182,7 @@ class GradientDescent(Method[GradientState]):
         return Iteration(state, point, self.evaluator.stationarity(point.z, point.gradient), step)
 
     def _direction(self, state: GradientState) -> tuple[Array, DirectionMemory]:
-        """The step (n,) in z to a point within the bounds; downhill, unless every step is taken as it comes."""
+        """Return the step (n,) in z to a point within the bounds; downhill, unless every step is accepted."""
         evaluator, options = self.evaluator, self.options
         g = shortened(state.gradient * evaluator.scale, options.clip)
         weights, rate = MomentumWeights(options.momentum, options.betas), options.rate(state.iteration)
@@ -188,21 +194,21 @@ class GradientDescent(Method[GradientState]):
         return step, memory
 
     def _follow(self, state: GradientState, step: Array) -> Point | StopReason:
-        """The next point with its gradient; one on a plateau is refused a few times, and the step shortened."""
+        """Return the next point with its gradient; steps onto a plateau are refused a few times and shortened."""
         plateau: Point | None = None
-        for _ in range(REFUSALS + 1):
+        for _ in range(MAX_SHORTENINGS + 1):
             z = self._search(state, step)
             if isinstance(z, StopReason):
                 return plateau or z
             point = self.evaluator.gradient(z)
             flat = point.finite and self.options.backtracking > 0
-            if not (flat and vanished(self.evaluator, point, point.gradient, state.gradient)):
+            if not (flat and ends_on_plateau(self.evaluator, point, point.gradient, state.gradient)):
                 return point
-            plateau, step = point, SHORTER * (z - state.z)
+            plateau, step = point, SHORTENING_FACTOR * (z - state.z)
         return point
 
     def _search(self, state: GradientState, step: Array) -> Array | StopReason:
-        """The next z (n,) along the step."""
+        """Return the next z (n,) along the step."""
         evaluator = self.evaluator
         if not self.options.backtracking:
             return evaluator.clip(state.z + step)
@@ -212,13 +218,13 @@ class GradientDescent(Method[GradientState]):
             return found.point.z
         if found.not_finite:
             return StopReason(Status.NOT_FINITE, NOT_FINITE)
-        if -slope <= ROUNDING * abs(merit):
+        if -slope <= RELATIVE_ROUNDING * abs(merit):
             return stationary(evaluator, state.z, merit)
         return StopReason(Status.STALLED, STALLED)
 
 
 def shortened(g: Array, longest: float) -> Array:
-    """The gradient, its norm at most ``longest``."""
+    """Return the gradient, its norm clipped to ``longest``."""
     norm = float(np.linalg.norm(g))
     return g * (longest / norm) if norm > longest else g
 
@@ -227,6 +233,6 @@ GRADIENT = make_solver(
     "gradient",
     "first-order descent by the adjoint of the rollout",
     GradientOptions,
-    iterating(GradientDescent),
+    stage_of(GradientDescent),
     threaded=True,
 )

@@ -14,7 +14,7 @@ import numpy as np
 from symphys.shooting import Linearized, ShootingProblem, StagedMotion, StagedProblem
 from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.convergence import Progress, converged, not_finite, stationary
-from symphys.solvers.core.driver import iterating, make_solver
+from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, require
@@ -23,16 +23,16 @@ from symphys.solvers.core.point import Point
 from symphys.solvers.ddp.backward_pass import Policy
 from symphys.solvers.ddp.forward_pass import MotionBatch
 from symphys.solvers.ddp.gains import gains_about
-from symphys.solvers.ddp.iteration import LENGTHS, BestMotion, LocalExpansion
+from symphys.solvers.ddp.iteration import STEP_LENGTHS, BestMotion, LocalExpansion
 from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
 from symphys.types import Array
 
-WORTH = 1e-4
-"""A step must reach this share of the expected fall."""
-STIFFEST, SOFTEST = 1e12, 1e-12
-"""Of the damping."""
-LESS_VIOLATED = 0.25
-"""If the violation has not fallen to this share of itself, the penalty grows."""
+MIN_GAIN_RATIO = 1e-4
+"""Least ratio of actual to expected decrease with which a step is taken."""
+MAX_DAMPING, MIN_DAMPING = 1e12, 1e-12
+"""Bounds of the damping."""
+VIOLATION_DECREASE = 0.25
+"""The penalty grows if the violation has not fallen to this share of itself."""
 NO_STEPS = "ilqr needs a problem that can be seen step by step: take gradient, ipopt or cma"
 STALLED = "no step lowers the objective: a kink (smoothing above 0 rounds it), or good enough"
 SLOW = "the objective hardly falls any more: a kink (smoothing above 0 rounds it), or good enough"
@@ -60,7 +60,7 @@ class IlqrOptions(SolverOptions):
     growth: float = 10.0
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and what would be valid."""
+        """Raise ValueError, which names the option and what would be valid."""
         super().__post_init__()
         at_least(0, iterations=self.iterations, tolerance=self.tolerance, patience=self.patience)
         require(0 < self.damping < math.inf, "damping", "above 0")
@@ -70,7 +70,7 @@ class IlqrOptions(SolverOptions):
 
 @dataclass(frozen=True)
 class IlqrState:
-    """Between two iterations.
+    """The state between two iterations.
 
     Attributes:
         iteration: of this stage.
@@ -96,10 +96,10 @@ class IlqrState:
 
 
 class Ilqr(Method[IlqrState]):
-    """The method, see ``interface.Method``. Nothing is drawn: the seed acts through the start alone."""
+    """The method, see ``interface.Method``. It draws nothing: the seed acts only through the start."""
 
     def __init__(self, context: StageContext, options: IlqrOptions) -> None:
-        """For one stage."""
+        """Set up one stage."""
         self.evaluator: CountingEvaluator = context.evaluator
         self.start, self.options = context.start, options
 
@@ -112,11 +112,11 @@ class Ilqr(Method[IlqrState]):
 
     @cached_property
     def knots(self) -> PaddedKnots:
-        """Of the steps, with the bounds of z."""
+        """The knots of the steps, with the bounds of z."""
         return PaddedKnots.of(knot_steps(self.staged), self.evaluator.lower, self.evaluator.upper)
 
     def init(self) -> Iteration[IlqrState] | StopReason:
-        """Roll the guess out."""
+        """Simulate the guess."""
         point = self.evaluator.value(self.start)
         if not point.finite:
             return not_finite(point)
@@ -130,12 +130,12 @@ class Ilqr(Method[IlqrState]):
         return self._iteration(point, replace(state, value=value), math.nan, math.nan)
 
     def step(self, state: IlqrState) -> Iteration[IlqrState] | StopReason:
-        """Linearise, then make the best of the steps that the policy suggests; lambda grows until there is one."""
+        """Linearise and take the best step of the policy; lambda grows until there is one."""
         motion, limits = self._motion(state.z), (state.multipliers, state.penalties)
         about = LocalExpansion(self.staged, motion, limits, self.knots, self.evaluator.scale, self._runs(motion))
         self.evaluator.counter.add(Counts.of_slopes(self.staged.tangent_size))
         damping, growth = state.damping, state.growth
-        while damping <= STIFFEST:
+        while damping <= MAX_DAMPING:
             policy = about.policy(damping)
             if policy is not None:
                 if -policy.first <= self.options.tolerance * (1 + abs(state.value)):
@@ -143,14 +143,14 @@ class Ilqr(Method[IlqrState]):
                 taken = self._search(state, about, policy)
                 if taken is not None:
                     softer = damping / growth if taken.length > 0.3 else damping
-                    z, damping = taken.motion.z.copy(), max(SOFTEST, softer)
+                    z, damping = taken.motion.z.copy(), max(MIN_DAMPING, softer)
                     after = replace(state, z=z, value=taken.value, damping=damping, growth=2.0)
                     return self._advance(state, after, policy)
             damping, growth = damping * growth, 2 * growth
         return StopReason(Status.STALLED, STALLED)
 
     def terminate(self, state: IlqrState) -> StopReason | None:
-        """Whether nothing is to be gained, the budget used up, or the descent gets nowhere."""
+        """Return the reason if the state is stationary, the budget used up, or progress has stalled."""
         if state.settled:
             point = self.evaluator.value(state.z)
             return (
@@ -163,11 +163,11 @@ class Ilqr(Method[IlqrState]):
         return StopReason(Status.STALLED, SLOW) if state.progress.quiet >= (self.options.patience or math.inf) else None
 
     def resume(self, saved: dict[str, Any]) -> IlqrState:
-        """See ``Method``."""
+        """Implement ``Method.resume``."""
         return revive(IlqrState, saved, Progress)
 
     def _advance(self, before: IlqrState, after: IlqrState, policy: Policy) -> Iteration[IlqrState] | StopReason:
-        """The state after a step, with its point; the slopes about it are begun meanwhile."""
+        """Return the state after a step, with its point; start computing the slopes about it."""
         if before.iteration + 1 < self.options.iterations:
             self._runs(self._motion(after.z))
         point = self.evaluator.value(after.z)
@@ -178,7 +178,7 @@ class Ilqr(Method[IlqrState]):
         return self._iteration(point, state, norm, float(np.linalg.norm(after.z - before.z)))
 
     def _settle(self, state: IlqrState, policy: Policy) -> Iteration[IlqrState] | StopReason:
-        """Nothing to gain with these multipliers: set them anew, or end."""
+        """Update the multipliers at a minimum of the augmented objective, or end."""
         point = self.evaluator.value(state.z)
         norm = self.evaluator.stationarity(state.z, policy.gradient)
         after = replace(state, iteration=state.iteration + 1, settled=True)
@@ -188,26 +188,26 @@ class Ilqr(Method[IlqrState]):
         violation = self._beyond(limits, np.zeros_like(limits), np.ones_like(limits))
         largest = float(np.abs(violation).max())
         worst = self.evaluator.problem.violation(point.errors)
-        if worst == 0.0 and largest >= LESS_VIOLATED * state.violated:
+        if worst == 0.0 and largest >= VIOLATION_DECREASE * state.violated:
             return self._iteration(point, after, norm, 0.0)
         multipliers = state.penalties * self._beyond(limits, state.multipliers, state.penalties)
-        grown = state.penalties * (self.options.growth if largest > LESS_VIOLATED * state.violated else 1.0)
+        grown = state.penalties * (self.options.growth if largest > VIOLATION_DECREASE * state.violated else 1.0)
         after = replace(after, multipliers=multipliers, penalties=grown, violated=largest, settled=False)
         value = float(self._values(after, self._single(state.z))[0])
         after = replace(after, value=value, progress=Progress(value))
         return self._iteration(point, after, norm, 0.0)
 
     def _search(self, state: IlqrState, about: LocalExpansion, policy: Policy) -> BestMotion | None:
-        """The lowest of the motions of all step lengths; None where none is low enough."""
+        """Return the best of the motions of all step lengths; None where none is low enough."""
         best = about.search(policy, lambda motions: self._values(state, motions))
-        self.evaluator.counter.add(Counts(rollouts=len(LENGTHS)))
-        if state.value - best.value < WORTH * max(best.expected, 0.0) or best.value >= state.value:
+        self.evaluator.counter.add(Counts(rollouts=len(STEP_LENGTHS)))
+        if state.value - best.value < MIN_GAIN_RATIO * max(best.expected, 0.0) or best.value >= state.value:
             return None
         self._kept = best.motion
         return best
 
     def _motion(self, z: Array) -> StagedMotion:
-        """The motion of z; that of the last step is known."""
+        """Return the motion of z; that of the last step is cached."""
         if self._kept is None or not np.array_equal(self._kept.z, z):
             self._kept = self.staged.roll_out(z, self.evaluator.smoothing)
         return self._kept
@@ -215,7 +215,7 @@ class Ilqr(Method[IlqrState]):
     _kept: StagedMotion | None = None
 
     def _runs(self, motion: StagedMotion) -> Iterator[Linearized]:
-        """The slopes of a motion from its end; those of the last one that was asked for are known, or begun."""
+        """Return the slopes of a motion from its end; those of the last motion are cached or in progress."""
         if self._begun is None or self._begun[0] is not motion:
             self._begun = motion, self.staged.linearize_from_end(motion)
         runs, kept = tee(self._begun[1])
@@ -229,17 +229,17 @@ class Ilqr(Method[IlqrState]):
         return MotionBatch(z[None], motion.x[None], motion.u[None])
 
     def _limits(self, motions: MotionBatch) -> Array:
-        """(B, c)."""
+        """Return the limits (B, c) of motions."""
         return self.staged.measure(*motions[:3])[1]
 
     def _values(self, state: IlqrState, motions: MotionBatch) -> Array:
-        """(B,) the augmented objective."""
+        """Return the augmented objective (B,)."""
         objective, limits = self.staged.measure(*motions[:3])
         beyond = self._beyond(limits, state.multipliers, state.penalties)
         return np.asarray(objective + np.sum(state.penalties * beyond**2, axis=1) / 2)
 
     def _beyond(self, limits: Array, multipliers: Array, penalties: Array) -> Array:
-        """How far limits, shifted by their multipliers, lie outside of their bounds."""
+        """Return the violations of limits that are shifted by their multipliers."""
         moved = limits + multipliers / penalties
         return np.asarray(moved - np.clip(moved, self.staged.lower, self.staged.upper))
 
@@ -248,7 +248,7 @@ class Ilqr(Method[IlqrState]):
 
 
 def refusal(problem: ShootingProblem) -> str:
-    """Why the solver is not for a problem."""
+    """Return why the solver is not for a problem; empty if it is."""
     return NO_STEPS if problem.staged is None else ""
 
 
@@ -256,7 +256,7 @@ ILQR = make_solver(
     "ilqr",
     "differential dynamic programming within bounds, for controls over time",
     IlqrOptions,
-    iterating(Ilqr),
+    stage_of(Ilqr),
     refusal=refusal,
     constraints=True,
     feedback=gains_about,

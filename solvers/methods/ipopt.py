@@ -15,9 +15,11 @@ A solve goes on from its last iterate with a fresh barrier, so its end may diffe
 
 from __future__ import annotations
 
+import contextlib
+import io
 import math
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -32,14 +34,65 @@ from symphys.solvers.core.convergence import converged, not_finite
 from symphys.solvers.core.driver import make_solver
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, IterationRecorder, StageContext
-from symphys.solvers.core.options import SolverOptions, at_least, require
+from symphys.solvers.core.options import SolverOptions, at_least, refuse, require
 from symphys.solvers.core.outcome import Counts, Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.methods.ipopt_options import SILENT, check
 from symphys.types import Array
 
+LIBRARY = "a problem file loads no library: install it where IPOPT looks by itself"
+RESERVED = {
+    "max_iter": "use iterations",
+    "tol": "use tolerance",
+    "hessian_approximation": "use hessian",
+    "print_level": "the text goes to the log: use file_print_level",
+    "output_file": "the text goes to the log",
+    "option_file_name": "no option file is read",
+    "sb": "the text goes to the log",
+    "hsllib": LIBRARY,
+    "pardisolib": LIBRARY,
+}
+"""Options that are not passed on, each with the reason."""
+SILENT: dict[str, Any] = {"print_level": 0, "sb": "yes", "option_file_name": ""}
+"""Options with which IPOPT neither prints nor reads ipopt.opt from the current folder."""
+
+
+def check(options: Mapping[str, Any]) -> None:
+    """Raise SymphysError for the first option that IPOPT refuses, or that cannot be passed on."""
+    for name, value in options.items():
+        if name in RESERVED:
+            raise refuse("ipopt", name, f"cannot be set: {RESERVED[name]}")
+        reason = refusal(name, value)
+        if reason:
+            raise refuse("ipopt", name, f"IPOPT does not take {value!r}: {reason}")
+
+
+def refusal(name: str, value: Any) -> str:
+    """Return why IPOPT refuses an option; empty if it does not."""
+    x = ca.MX.sym("x")
+    problem: dict[str, Any] = {"x": x, "f": x**2}
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        try:
+            solver = ca.nlpsol("trial", "ipopt", problem, {"ipopt": {**SILENT, name: value}, "print_time": False})
+            solver(x0=1)
+        except (RuntimeError, NotImplementedError) as error:
+            return explain(printed.getvalue(), str(error))
+    return "it is not available here" if solver.stats()["return_status"] == "Invalid_Option" else ""
+
+
+def explain(printed: str, error: str) -> str:
+    """Return the relevant part of what IPOPT printed or casadi raised."""
+    lines = [" ".join(line.split()) for line in printed.splitlines() if line.strip()]
+    if lines:
+        start = next((i for i, line in enumerate(lines) if line.startswith(("Valid", "Allowed"))), 0)
+        return "; ".join(lines[start : start + 6])
+    if "No such IPOPT option" in error:
+        return "there is no such option"
+    return "it is of the wrong type" if "type mismatch" in error else error.strip().splitlines()[-1]
+
+
 BUDGET = "the iterations are used up: raise `iterations`, or try the other `hessian`"
-ENDS: dict[str, tuple[Status, str]] = {
+ENDINGS: dict[str, tuple[Status, str]] = {
     "Maximum_Iterations_Exceeded": (Status.BUDGET, BUDGET),
     "Maximum_CpuTime_Exceeded": (Status.BUDGET, "the time given to IPOPT is used up: raise max_cpu_time"),
     "Maximum_WallTime_Exceeded": (Status.BUDGET, "the time given to IPOPT is used up: raise max_wall_time"),
@@ -67,15 +120,15 @@ ENDS: dict[str, tuple[Status, str]] = {
     ),
     "Not_Enough_Degrees_Of_Freedom": (Status.FAILED, "there are more equality constraints than variables"),
 }
-"""By IPOPT's name for how it ended."""
-PASSED = (
+"""Status and advice by IPOPT's return status."""
+WORSE_THAN_ITERATE = (
     "IPOPT ended at a point that is worse than one that it had passed, which is kept: the objective may have a cliff "
     "or a kink there (smoothing above 0 rounds it), or a watchdog step led away (watchdog_shortened_iter_trigger = 0 "
     "in `options` forbids these)"
 )
-LOSS = 1e-6
-"""Of 1 + |merit|: a solution may be worse by so much than an iterate before it."""
-GOOD = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
+MERIT_TOLERANCE = 1e-6
+"""Share of 1 + |merit| by which a solution may be worse than an earlier iterate."""
+SUCCESS_STATUSES = ("Solve_Succeeded", "Solved_To_Acceptable_Level", "Feasible_Point_Found")
 
 
 @dataclass(frozen=True)
@@ -95,7 +148,7 @@ class IpoptOptions(SolverOptions):
     options: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and what would be valid."""
+        """Raise ValueError, which names the option and what would be valid."""
         super().__post_init__()
         at_least(0, iterations=self.iterations)
         require(0 < self.tolerance < math.inf, "tolerance", "above 0")
@@ -118,7 +171,7 @@ class IpoptState:
 def stage(
     context: StageContext, options: IpoptOptions, saved: dict[str, object] | None, recorder: IterationRecorder
 ) -> StopReason:
-    """One call of IPOPT, then its counts and its log. Nothing is drawn: the seed acts through the start alone."""
+    """Run IPOPT once, then add its counts and its log. Nothing is drawn: the seed acts only through the start."""
     evaluator = context.evaluator
     state = revive(IpoptState, saved) if saved else IpoptState(0, context.start)
     if not saved:
@@ -129,7 +182,7 @@ def stage(
     spent = recorder.spent()
     if spent is not None:
         return spent
-    watch, first = Watch(evaluator, recorder, state), recorder.rows
+    watch, first = IterateCallback(evaluator, recorder, state), recorder.rows
     with tempfile.TemporaryDirectory() as folder:
         text = Path(folder) / "ipopt.txt"
         solver = build(evaluator, options, options.iterations - state.iteration, watch, text)
@@ -145,8 +198,10 @@ def stage(
     return reason(evaluator, str(stats["return_status"]), np.array(result["x"]).ravel() * evaluator.scale)
 
 
-def build(evaluator: CountingEvaluator, options: IpoptOptions, iterations: int, watch: Watch, text: Path) -> Any:
-    """The nlpsol over x = z / scale, with the smoothing as its parameter."""
+def build(
+    evaluator: CountingEvaluator, options: IpoptOptions, iterations: int, watch: IterateCallback, text: Path
+) -> Any:
+    """Make the nlpsol over x = z / scale, with the smoothing as its parameter."""
     if evaluator.problem.nlp.expression is None:
         raise SymphysError("IPOPT needs expressions, which nets this large do not have; take gradient or cma")
     nlp, derivatives = functions(evaluator.problem.nlp, evaluator.scale, options.hessian == "exact")
@@ -170,7 +225,7 @@ def build(evaluator: CountingEvaluator, options: IpoptOptions, iterations: int, 
 
 
 def arguments(evaluator: CountingEvaluator, z: Array) -> dict[str, Any]:
-    """Start, smoothing and bounds."""
+    """Return start, smoothing and bounds."""
     problem, scale = evaluator.problem, evaluator.scale
     bounds = {"lbx": evaluator.lower / scale, "ubx": evaluator.upper / scale}
     limits = {"lbg": problem.constraint_lower, "ubg": problem.constraint_upper}
@@ -185,28 +240,28 @@ def work(stats: dict[str, Any], constrained: bool) -> Counts:
 
 
 def reason(evaluator: CountingEvaluator, ending: str, z: Array) -> StopReason:
-    """Why IPOPT ended; a solution that is worse than an iterate before it is none."""
-    if ending in GOOD:
+    """Return why IPOPT ended; a solution that is worse than an earlier iterate counts as stalled."""
+    if ending in SUCCESS_STATUSES:
         solution = evaluator.value(evaluator.clip(z))
         return (
-            StopReason(Status.STALLED, PASSED)
+            StopReason(Status.STALLED, WORSE_THAN_ITERATE)
             if worse(solution, evaluator.incumbent.best or solution)
             else converged(evaluator)
         )
     unknown = (Status.FAILED, f"IPOPT ended with {ending.replace('_', ' ').lower()}")
-    return StopReason(*ENDS.get(ending, unknown))
+    return StopReason(*ENDINGS.get(ending, unknown))
 
 
 def worse(solution: Point, best: Point) -> bool:
-    """Whether the best iterate was better by more than what an end within a tolerance may lose."""
-    return solution.rank[:-1] != best.rank[:-1] or solution.merit - best.merit > LOSS * (1 + abs(best.merit))
+    """Whether the best iterate was better by more than the tolerance of a converged solve."""
+    return solution.rank[:-1] != best.rank[:-1] or solution.merit - best.merit > MERIT_TOLERANCE * (1 + abs(best.merit))
 
 
-class Watch(ca.Callback):
-    """Records every iterate: one rollout, a row of the trace; ends the solve when all is met, at limits, on Ctrl-C."""
+class IterateCallback(ca.Callback):
+    """Records every iterate with one rollout; ends the solve when all is met, at limits, on Ctrl-C."""
 
     def __init__(self, evaluator: CountingEvaluator, recorder: IterationRecorder, state: IpoptState) -> None:
-        """``state``: of the start, which has its row already."""
+        """Start from ``state``, whose row is recorded already."""
         ca.Callback.__init__(self)
         self.evaluator, self.recorder, self.state, self.skip = evaluator, recorder, state, True
         self.ended: BaseException | None = None
@@ -214,21 +269,21 @@ class Watch(ca.Callback):
         self.construct("watch", {})
 
     def get_n_in(self) -> int:
-        """All outputs of nlpsol."""
+        """Return the number of inputs: all outputs of nlpsol."""
         return int(ca.nlpsol_n_out())
 
     def get_n_out(self) -> int:
-        """Tell IPOPT whether to stop."""
+        """Return the number of outputs: the flag that stops IPOPT."""
         return 1
 
     def get_sparsity_in(self, index: int) -> Any:
-        """Return the value of an argument by its name."""
+        """Return the sparsity of an argument by its name."""
         n, m = self.evaluator.problem.n, len(self.evaluator.problem.constraint_lower)
         sizes = {"x": n, "lam_x": n, "f": 1, "g": m, "lam_g": m, "lam_p": 1}
         return ca.Sparsity.dense(sizes[ca.nlpsol_out(index)], 1)
 
     def eval(self, arguments: Sequence[Any]) -> list[Any]:
-        """No exception may leave it: casadi would lose it."""
+        """Record; exceptions are stored, since casadi would lose them."""
         if self.skip:
             self.skip = False
             return [0.0]
@@ -239,7 +294,7 @@ class Watch(ca.Callback):
         return [float(self.ended is not None or self.spent is not None)]
 
     def record(self, z: Array) -> None:
-        """A row of the trace, after which a limit of the solve may end it."""
+        """Record a row of the trace, after which a limit of the solve may end it."""
         point, before = self.evaluator.value(z), self.state
         self.state = IpoptState(before.iteration + 1, z)
         self.recorder.commit(Iteration(self.state, point, step=float(np.linalg.norm(z - before.z))))
@@ -247,7 +302,7 @@ class Watch(ca.Callback):
 
 
 def functions(nlp: Nlp, scale: Array, exact: bool) -> tuple[dict[str, Any], dict[str, Any]]:
-    """(the problem for ``casadi.nlpsol``, settings with its derivatives).
+    """Return the problem for ``casadi.nlpsol``, and settings with its derivatives.
 
     Casadi differentiates the expression itself; compiled functions are handed over, an exact Hessian aside, which
     is that of the expression always.
@@ -269,7 +324,7 @@ def functions(nlp: Nlp, scale: Array, exact: bool) -> tuple[dict[str, Any], dict
 
 
 def hessian(nlp: Nlp, scale: Array, x: Any, smoothing: Any) -> ca.Function:
-    """The upper half of the Lagrangian's second derivative."""
+    """Return the upper half of the Lagrangian's second derivative."""
     objective, constraints = nlp.expression(x * scale, smoothing)
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", constraints.sparsity())
     lagrangian = lam_f * objective + ca.dot(lam_g, constraints)

@@ -1,7 +1,7 @@
 """The solver ``least_squares``: Levenberg-Marquardt on residuals r with merit = r . r, in x = z / scale.
 
 The loop is that of ``core.levenberg_marquardt``, on the dense Jacobian of all residuals. A step onto a plateau is
-refused like one that raises the merit, see ``vanishing_gradient``.
+refused like one that raises the merit, see ``core.convergence``.
 
 Why not scipy.optimize.least_squares: it can be stopped between iterations but not at the first point that meets the
 targets, and its trust region cannot be set when a solve goes on, so an interrupted solve would end elsewhere.
@@ -18,12 +18,12 @@ import scipy.linalg
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import revive
-from symphys.solvers.core.convergence import Progress, not_finite, stationary
-from symphys.solvers.core.driver import iterating, make_solver
+from symphys.solvers.core.convergence import MAX_SHORTENINGS, Progress, ends_on_plateau, not_finite, stationary
+from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.levenberg_marquardt import (
-    WORTH,
+    MIN_GAIN_RATIO,
     Damped,
     LocalModel,
     Refusal,
@@ -32,11 +32,10 @@ from symphys.solvers.core.levenberg_marquardt import (
     first_damping,
     movable,
 )
-from symphys.solvers.core.line_search import ROUNDING
+from symphys.solvers.core.line_search import RELATIVE_ROUNDING
 from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.core.vanishing_gradient import REFUSALS, vanished
 from symphys.types import Array
 
 NO_SQUARES = (
@@ -70,7 +69,7 @@ class LeastSquaresOptions(SolverOptions):
     patience: int = 10
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and what would be valid."""
+        """Raise ValueError, which names the option and what would be valid."""
         super().__post_init__()
         at_least(0, iterations=self.iterations, tolerance=self.tolerance, patience=self.patience)
         require(0 < self.damping < math.inf, "damping", "above 0")
@@ -78,7 +77,7 @@ class LeastSquaresOptions(SolverOptions):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LeastSquaresState(Damped):
-    """Between two iterations.
+    """The state between two iterations.
 
     Attributes:
         iteration: of this stage.
@@ -95,25 +94,25 @@ class LeastSquaresState(Damped):
 
     @property
     def merit(self) -> float:
-        """At z."""
+        """The merit at z."""
         return float(self.residuals @ self.residuals)
 
     @property
     def gradient(self) -> Array:
-        """(n,) of the merit by z."""
+        """The derivative (n,) of the merit by z."""
         return 2 * self.jacobian.T @ self.residuals
 
 
 class LevenbergMarquardt(Method[LeastSquaresState]):
-    """The method, see ``interface.Method``. Nothing is drawn: the seed acts through the start alone."""
+    """The method, see ``interface.Method``. It draws nothing: the seed acts only through the start."""
 
     def __init__(self, context: StageContext, options: LeastSquaresOptions) -> None:
-        """For one stage."""
+        """Set up one stage."""
         self.evaluator: CountingEvaluator = context.evaluator
         self.start, self.options = context.start, options
 
     def init(self) -> Iteration[LeastSquaresState] | StopReason:
-        """The Jacobian at the start sets the size of lambda."""
+        """Evaluate the Jacobian at the start, which sets the size of lambda."""
         point = self.evaluator.jacobian(self.start)
         if not point.finite:
             return not_finite(point)
@@ -129,7 +128,7 @@ class LevenbergMarquardt(Method[LeastSquaresState]):
         return self._iteration(point, state, math.nan)
 
     def step(self, state: LeastSquaresState) -> Iteration[LeastSquaresState] | StopReason:
-        """One step that lowers the merit, and the Jacobian there; lambda grows until there is one."""
+        """Take a step that lowers the merit, with the Jacobian there; lambda grows until there is one."""
         model = DenseModel(self.evaluator, state)
         point, damped = descend(model, state)
         if point is None:
@@ -149,7 +148,7 @@ class LevenbergMarquardt(Method[LeastSquaresState]):
         return self._iteration(point, taken, float(np.linalg.norm(point.z - state.z)))
 
     def terminate(self, state: LeastSquaresState) -> StopReason | None:
-        """Whether the state is stationary, the budget used up, or the descent gets nowhere."""
+        """Return the reason if the state is stationary, the budget used up, or progress has stalled."""
         evaluator, options = self.evaluator, self.options
         flat = evaluator.stationarity(state.z, state.gradient) <= options.tolerance * (1 + state.merit)
         if flat or cosine(evaluator, state) <= options.tolerance:
@@ -159,7 +158,7 @@ class LevenbergMarquardt(Method[LeastSquaresState]):
         return StopReason(Status.STALLED, SLOW) if state.progress.quiet >= (options.patience or math.inf) else None
 
     def resume(self, saved: dict[str, Any]) -> LeastSquaresState:
-        """See ``Method``."""
+        """Implement ``Method.resume``."""
         return revive(LeastSquaresState, saved, Progress)
 
     def _iteration(self, point: Point, state: LeastSquaresState, step: float) -> Iteration[LeastSquaresState]:
@@ -167,7 +166,7 @@ class LevenbergMarquardt(Method[LeastSquaresState]):
 
 
 class DenseModel(LocalModel[Array, Point | StopReason]):
-    """The merit about a state, by the dense Jacobian; see ``LocalModel``. Its steps are new z (n,).
+    """The quadratic model about a state by the dense Jacobian; see ``LocalModel``. Its steps are new z (n,).
 
     Attributes:
         merit: at the state.
@@ -177,40 +176,42 @@ class DenseModel(LocalModel[Array, Point | StopReason]):
     last: Point | None = None
 
     def __init__(self, evaluator: CountingEvaluator, state: LeastSquaresState) -> None:
-        """Before the first trial."""
+        """Start without trials."""
         self.evaluator, self.state, self.merit = evaluator, state, state.merit
         self._first, self._plateaus = True, 0
         self._free = movable(state.z, evaluator.lower, evaluator.upper, state.gradient)
         self._jacobian = state.jacobian * evaluator.scale
 
     def trial(self, damping: float) -> Trial[Array] | Point | StopReason:
-        """Evaluate the residuals after a step; end where the first one promises no more than rounding."""
+        """Evaluate the residuals after a step; end if the first one predicts no more than rounding."""
         evaluator, state, r = self.evaluator, self.state, self.state.residuals
         d = np.zeros(self._free.size)
         d[self._free] = damped_step(self._jacobian[:, self._free], r, damping)
         z = evaluator.clip(state.z + evaluator.scale * d)
         after = r + self._jacobian @ ((z - state.z) / evaluator.scale)
         expected = float(r @ r - after @ after)
-        if self._first and expected <= ROUNDING * self.merit:
+        if self._first and expected <= RELATIVE_ROUNDING * self.merit:
             return stationary(evaluator, state.z, self.merit)
         self.last, self._first = evaluator.residuals(z), False
         return Trial(z, self.last.merit if self.last.finite else math.inf, expected)
 
     def judge(self, z: Array, gain: float) -> Point | StopReason | Refusal:
-        """Take a step that lowers the merit enough and does not end on a plateau, with the Jacobian there."""
-        if not gain > WORTH:
+        """Accept a step that lowers the merit enough and does not end on a plateau; evaluate the Jacobian there."""
+        if not gain > MIN_GAIN_RATIO:
             return Refusal.STIFFER
         point = self.evaluator.jacobian(z)
         if not point.finite:
             return not_finite(point, NOT_FINITE)
-        if self._plateaus < REFUSALS and vanished(self.evaluator, point, point.jacobian, self.state.jacobian):
+        if self._plateaus < MAX_SHORTENINGS and ends_on_plateau(
+            self.evaluator, point, point.jacobian, self.state.jacobian
+        ):
             self._plateaus += 1
             return Refusal.STIFFER
         return point
 
 
 def damped_step(jacobian: Array, r: Array, damping: float) -> Array:
-    """(n,) -(J'J + lambda I)^-1 J'r, which is also -J'(JJ' + lambda I)^-1 r: whichever matrix is smaller."""
+    """Return (n,) -(J'J + lambda I)^-1 J'r, or -J'(JJ' + lambda I)^-1 r: whichever matrix is smaller."""
     tall = jacobian.shape[0] >= jacobian.shape[1]
     square = jacobian.T @ jacobian if tall else jacobian @ jacobian.T
     floor = 4 * len(square) * float(np.finfo(float).eps) * float(np.trace(square))
@@ -221,7 +222,7 @@ def damped_step(jacobian: Array, r: Array, damping: float) -> Array:
 
 
 def cosine(evaluator: CountingEvaluator, state: LeastSquaresState) -> float:
-    """The largest |cosine| between the residuals and a column of the Jacobian that is free to act on them."""
+    """Return the largest |cosine| between the residuals and a column of the Jacobian of a free variable."""
     free = movable(state.z, evaluator.lower, evaluator.upper, state.gradient)
     jacobian = state.jacobian[:, free]
     lengths = np.linalg.norm(jacobian, axis=0) * np.linalg.norm(state.residuals)
@@ -230,7 +231,7 @@ def cosine(evaluator: CountingEvaluator, state: LeastSquaresState) -> float:
 
 
 def refusal(problem: ShootingProblem) -> str:
-    """Why the solver is not for a problem."""
+    """Return why the solver is not for a problem; empty if it is."""
     return "" if problem.squares else NO_SQUARES
 
 
@@ -238,7 +239,7 @@ LEAST_SQUARES = make_solver(
     "least_squares",
     "Levenberg-Marquardt within bounds, for costs that are sums of squares",
     LeastSquaresOptions,
-    iterating(LevenbergMarquardt),
+    stage_of(LevenbergMarquardt),
     refusal=refusal,
     threaded=True,
 )

@@ -27,9 +27,8 @@ from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, IterationRecorder, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, refuse, require
 from symphys.solvers.core.outcome import Status, StopReason
-from symphys.solvers.methods.ipopt import ENDS, GOOD, worse
-from symphys.solvers.methods.ipopt_options import RESERVED
-from symphys.solvers.methods.ipopt_options import refusal as refused_by_ipopt
+from symphys.solvers.methods.ipopt import ENDINGS, RESERVED, SUCCESS_STATUSES, worse
+from symphys.solvers.methods.ipopt import refusal as refused_by_ipopt
 from symphys.solvers.multiple_shooting.by_fatrop import (
     NO_STEP,
     RESERVED_OF_FATROP,
@@ -40,9 +39,14 @@ from symphys.solvers.multiple_shooting.by_fatrop import (
 from symphys.solvers.multiple_shooting.by_ipopt import solve_by_ipopt
 from symphys.solvers.multiple_shooting.grid import make_grid
 from symphys.solvers.multiple_shooting.library import ITERATIONS_USED, LibraryRequest, LibraryResult
-from symphys.solvers.multiple_shooting.multipliers import NlpMultipliers, at_nodes, barrier_at, fitted
-from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
-from symphys.solvers.multiple_shooting.programs import Programs
+from symphys.solvers.multiple_shooting.nlp import (
+    MultipleShootingNlp,
+    NlpMultipliers,
+    Programs,
+    at_nodes,
+    barrier_at,
+    fitted,
+)
 from symphys.types import Array
 
 DEFECT = "largest defect"
@@ -50,15 +54,15 @@ NO_STEPS = (
     "this problem cannot be taken step by step, which multiple shooting needs: take ipopt, gradient, or least_squares "
     "where costs are squares"
 )
-APART = (
+ROLLOUT_WORSE = (
     "the rollout of the solution is worse than that of an iterate before it, which is kept: the motion is so unstable "
     "that what is left of the defects grows along it (a lower `tolerance`, or a feedback controller)"
 )
-STUCK = (
+NO_FATROP_STEP = (
     "FATROP found no step that leads on: try backend = 'ipopt', another [guess] of the motion, or a larger `tolerance`"
 )
-TURN = 0.5
-"""A node whose tangent's slope is so far from the unit matrix has turned by about a radian: it gets a new reference."""
+MAX_CHART_DEVIATION = 0.5
+"""Deviation of a node's chart slope from the unit matrix, about one radian, that needs a new reference."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,7 @@ class MultipleShootingOptions(SolverOptions):
     options: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and what would be valid."""
+        """Raise ValueError, which names the option and what would be valid."""
         super().__post_init__()
         at_least(0, iterations=self.iterations, steps_between_nodes=self.steps_between_nodes)
         require(0 < self.tolerance < math.inf, "tolerance", "above 0")
@@ -128,7 +132,8 @@ def stage(
     saved: dict[str, object] | None,
     recorder: IterationRecorder,
 ) -> StopReason:
-    """Calls of IPOPT or FATROP, each with references at the nodes of the one before."""
+    """Call IPOPT or FATROP repeatedly, each time with references at the nodes of the previous call."""
+    # Start: nodes and multipliers of the guess, or of the checkpoint.
     evaluator = context.evaluator
     assert evaluator.problem.staged is not None, "refused otherwise"
     problem = evaluator.problem.staged()
@@ -145,21 +150,23 @@ def stage(
         state = warm_started(context, programs.at(state.nodes), state)
         recorder.commit(Iteration(state, point, outputs={DEFECT: programs.at(state.nodes).largest_defect(state.z)}))
     while True:
+        # One call of the library with references at the present nodes.
         spent = recorder.spent()
         if spent is not None:
             return spent
         if state.iteration >= options.iterations:
-            return StopReason(*ENDS[ITERATIONS_USED])
+            return StopReason(*ENDINGS[ITERATIONS_USED])
         nlp = programs.at(state.nodes)
         watch, first = ShootingWatch(evaluator, recorder, nlp, state), recorder.rows
         ending, result = run(nlp, evaluator, options, state, watch, context)
         recorder.distribute(nlp.work, first)
         if isinstance(watch.error, SlopesNotFinite):
-            return StopReason(*ENDS["Invalid_Number_Detected"])
+            return StopReason(*ENDINGS["Invalid_Number_Detected"])
         if watch.error:
             raise watch.error
         if watch.spent is not None:
             return watch.spent
+        # Again with new references after large rotations, or with exact Hessians where FATROP stalls.
         state = watch.state
         if watch.turned:
             context.log("nodes have turned far: new references")
@@ -174,7 +181,7 @@ def stage(
 
 
 def guess(problem: StagedProblem, context: StageContext, options: MultipleShootingOptions) -> MultipleShootingState:
-    """The start: nodes from the rollout of z, or as they are guessed, in the first stage of smoothing."""
+    """Return the start: nodes from the rollout of z or, in the first stage of smoothing, from the guess."""
     evaluator, z = context.evaluator, context.start
     starts = make_grid(problem, options.steps_between_nodes).starts[1:]
     if evaluator.problem.guessed_states and evaluator.smoothing == evaluator.problem.smoothing[0]:
@@ -187,7 +194,7 @@ def guess(problem: StagedProblem, context: StageContext, options: MultipleShooti
 def warm_started(
     context: StageContext, nlp: MultipleShootingNlp, state: MultipleShootingState
 ) -> MultipleShootingState:
-    """The start with the multipliers of the guess, in the first stage and where the seed leaves the guess as it is."""
+    """Return the start with the multipliers of the guess, in the first stage if the seed keeps the guess."""
     problem, smoothing = context.evaluator.problem, context.evaluator.smoothing
     if not problem.multipliers or context.seed or smoothing != problem.smoothing[0]:
         return state
@@ -206,7 +213,7 @@ def run(
     watch: ShootingWatch,
     context: StageContext,
 ) -> tuple[str, LibraryResult]:
-    """One call of the library: how it ended in IPOPT's words, and what it returned."""
+    """Call the library once; return how it ended, in IPOPT's terms, and its result."""
     acting = np.zeros(len(state.z), bool)
     for entries in (*nlp.plan.grid.knots, nlp.plan.grid.statics):
         acting[entries] = True
@@ -230,7 +237,7 @@ def run(
 
 
 class ShootingWatch:
-    """Records every iterate: one rollout, a row of the trace; ends the call at limits, on Ctrl-C, at large turns."""
+    """Records every iterate with one rollout; ends the call at limits, on Ctrl-C, at large rotations."""
 
     def __init__(
         self,
@@ -239,7 +246,7 @@ class ShootingWatch:
         nlp: MultipleShootingNlp,
         state: MultipleShootingState,
     ) -> None:
-        """``state``: of the start, which has its row already."""
+        """Start from ``state``, whose row is recorded already."""
         self.evaluator, self.recorder, self.nlp, self.state = evaluator, recorder, nlp, state
         self.error: BaseException | None = None
         self.spent: StopReason | None = None
@@ -263,42 +270,42 @@ class ShootingWatch:
         step = float(np.linalg.norm(z - before.z))
         self.recorder.commit(Iteration(self.state, self.evaluator.value(z), step=step, outputs={DEFECT: defect}))
         self.spent = self.recorder.spent()
-        self.turned = bool(np.abs(turns - np.eye(turns.shape[1])).max() > TURN)
+        self.turned = bool(np.abs(turns - np.eye(turns.shape[1])).max() > MAX_CHART_DEVIATION)
         return self.ended
 
 
 def multipliers_at(
     nlp: MultipleShootingNlp, evaluator: CountingEvaluator, w: Array, bound_duals: Array, row_duals: Array
 ) -> NlpMultipliers:
-    """Multipliers that a library has for w, as another call may start from them with references at w's nodes."""
+    """Return the multipliers of w, with which another call may start from references at w's nodes."""
     mu = barrier_at(nlp, evaluator.lower, evaluator.upper, w, bound_duals, row_duals)
     return NlpMultipliers(bound_duals, at_nodes(nlp, w, row_duals), mu)
 
 
 def reason(context: StageContext, nlp: MultipleShootingNlp, ending: str, w: Array) -> StopReason:
-    """Why a library ended; a solution whose rollout is worse than that of an iterate before it is none."""
+    """Return why a library ended; a solution whose rollout is worse than an earlier iterate's counts as stalled."""
     evaluator, grid = context.evaluator, nlp.plan.grid
     if np.isfinite(w).all():
         defect = np.abs(nlp.shots(w).defects).max()
         context.log(
             f"{grid.intervals} intervals of {int(np.diff(grid.starts).max())} steps, defects up to {defect:.2e}"
         )
-    if ending in GOOD:
+    if ending in SUCCESS_STATUSES:
         solution = evaluator.value(evaluator.clip(nlp.unpack(w)[0]))
         best = evaluator.incumbent.best or solution
-        return StopReason(Status.STALLED, APART) if worse(solution, best) else converged(evaluator)
+        return StopReason(Status.STALLED, ROLLOUT_WORSE) if worse(solution, best) else converged(evaluator)
     if ending == NO_STEP:
-        return StopReason(Status.STALLED, STUCK)
-    return StopReason(*ENDS.get(ending, (Status.FAILED, f"IPOPT ended with {ending.replace('_', ' ').lower()}")))
+        return StopReason(Status.STALLED, NO_FATROP_STEP)
+    return StopReason(*ENDINGS.get(ending, (Status.FAILED, f"IPOPT ended with {ending.replace('_', ' ').lower()}")))
 
 
 def refusal(problem: ShootingProblem) -> str:
-    """Why the solver is not for a problem."""
+    """Return why the solver is not for a problem; empty if it is."""
     return NO_STEPS if problem.staged is None else ""
 
 
 def check(options: MultipleShootingOptions) -> None:
-    """SymphysError for an option that the library does not take, or a library that is not there."""
+    """Raise SymphysError for an option that the library refuses, or for a missing library."""
     if not ca.has_nlpsol(options.backend):
         raise SymphysError(f"solver.multiple_shooting.backend: this casadi has no {options.backend}")
     library, refused = ("IPOPT", refused_by_ipopt) if options.backend == "ipopt" else ("FATROP", refused_by_fatrop)

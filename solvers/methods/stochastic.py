@@ -1,4 +1,4 @@
-"""First-order descent over samples of a scenario, drawn anew in each iteration: for long motions through contact.
+"""First-order descent over samples of a scenario, redrawn in each iteration: for long motions through contact.
 
 Each iteration evaluates gradients in a batch of samples, the problem's own first, then takes a step of Adam along the
 mean of the gradients, each shortened by itself before (``clip``): a few samples in which small changes explode would
@@ -17,19 +17,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from symphys.shooting import ScenarioSamples
-from symphys.solvers.core.driver import iterating, make_solver
+from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.options import at_least, require
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.randomized.aggregation import GradientAverage, average, evolution, mixed
 from symphys.solvers.randomized.descent import (
-    LASTING,
+    SURVIVING_SHARE,
     Descent,
     DescentOptions,
     DescentState,
     GradientEstimate,
     refusal,
 )
-from symphys.solvers.randomized.validation import NOISE, first_sample, rate_by_validation
+from symphys.solvers.randomized.validation import NOISE_STREAM, first_sample, rate_by_validation
 from symphys.types import Array
 
 NOT_FINITE = "not one sample of a batch is finite: bound the variables, lower `rate`, or add [termination]"
@@ -37,7 +37,7 @@ NOT_FINITE = "not one sample of a batch is finite: bound the variables, lower `r
 
 @dataclass(frozen=True)
 class StochasticOptions(DescentOptions):
-    """Options of descent over samples, beside those of ``DescentOptions``.
+    """Options of descent over samples, added to those of ``DescentOptions``.
 
     Attributes:
         clip: largest norm of each sample's scaled gradient; inf: none.
@@ -58,7 +58,7 @@ class StochasticOptions(DescentOptions):
     sigma: float = 0.03
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and what would be valid."""
+        """Raise ValueError, which names the option and what would be valid."""
         super().__post_init__()
         at_least(0, adjoint_discount=self.adjoint_discount)
         require(self.clip > 0, "clip", "above 0")
@@ -69,13 +69,13 @@ class StochasticOptions(DescentOptions):
             require(0 <= share <= 1, name, "in [0, 1]")
 
     def horizon(self, iteration: int) -> float:
-        """[s] over which the motions of an iteration are computed."""
+        """Return the simulated duration [s] of an iteration."""
         reached = int(len(self.horizons) * iteration / max(self.growth * self.iterations, 1))
         return self.horizons[reached] if reached < len(self.horizons) else math.inf
 
 
 class StochasticDescent(Descent[StochasticOptions]):
-    """Along the mean of shortened gradients."""
+    """Descent along the mean of clipped gradients."""
 
     def estimate(self, state: DescentState, samples: ScenarioSamples) -> GradientEstimate | StopReason:
         """Implement ``Descent.estimate``."""
@@ -90,15 +90,15 @@ class StochasticDescent(Descent[StochasticOptions]):
             f"{found.alive:.0%} last, gradients {found.typical:.2g} (at most {found.longest:.2g}), agreement "
             f"{found.agreement:.2f}" + f", {found.left_out} not finite" * (found.left_out > 0)
         )
-        outputs = {LASTING: found.alive, "agreement of its gradients": found.agreement}
+        outputs = {SURVIVING_SHARE: found.alive, "agreement of its gradients": found.agreement}
         return GradientEstimate(point, self._mixed(state, samples, found), found.typical, words, outputs)
 
     def _mixed(self, state: DescentState, samples: ScenarioSamples, found: GradientAverage) -> Array:
-        """The gradient that the step is made of."""
+        """Return the gradient of the step, mixed with that of the evolution strategy."""
         options = self.options
         if not options.evolution:
             return found.gradient
-        stream = np.random.default_rng([self.seed, NOISE, state.iteration])
+        stream = np.random.default_rng([self.seed, NOISE_STREAM, state.iteration])
         by_values = evolution(self.evaluator.sample_values, state.z, options.sigma * self.scale, samples, stream)
         return mixed(found.gradient, by_values.gradient, options.evolution)
 
@@ -107,9 +107,9 @@ STOCHASTIC = make_solver(
     "stochastic",
     "first-order descent over samples of the scenarios, drawn anew",
     StochasticOptions,
-    iterating(StochasticDescent),
+    stage_of(StochasticDescent),
     refusal=refusal,
     rate=lambda options, seed: rate_by_validation(options.batch(seed)),
     scenarios=True,
 )
-"""See ``Solver``."""
+"""An instance of ``Solver``."""

@@ -1,1 +1,1 @@
-"""Multiple shooting: intervals, charts of the node states, the nonlinear program of both, and who solves it."""
+"""Multiple shooting: intervals, charts of the node states, the nonlinear program, and its solvers."""

@@ -1,4 +1,4 @@
-"""The program of multiple shooting solved by IPOPT, which reports its iterates with their multipliers.
+"""IPOPT as solver of the multiple-shooting program; it reports iterates with their multipliers.
 
 Where the solve is to end, everything is nan, and IPOPT stops.
 """
@@ -12,9 +12,9 @@ from typing import Any
 
 import casadi as ca
 
-from symphys.solvers.methods.ipopt_options import SILENT
+from symphys.solvers.methods.ipopt import SILENT
 from symphys.solvers.multiple_shooting.library import (
-    POINT,
+    SCALAR,
     IterateWatch,
     LibraryRequest,
     LibraryResult,
@@ -25,10 +25,10 @@ from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
 
 
 class IpoptIterates(ca.Callback):
-    """IPOPT's iterates, the start left out."""
+    """Receives IPOPT's iterates, the start left out."""
 
     def __init__(self, nlp: MultipleShootingNlp, watch: IterateWatch) -> None:
-        """Start without iterations."""
+        """Start without iterates."""
         ca.Callback.__init__(self)
         size, rows = nlp.layout.size, nlp.layout.rows
         self.sizes = {"x": size, "lam_x": size, "f": 1, "g": rows, "lam_g": rows, "lam_p": 1}
@@ -36,19 +36,19 @@ class IpoptIterates(ca.Callback):
         self.construct("iterates", {})
 
     def get_n_in(self) -> int:
-        """All outputs of nlpsol."""
+        """Return the number of inputs: all outputs of nlpsol."""
         return int(ca.nlpsol_n_out())
 
     def get_n_out(self) -> int:
-        """Tell IPOPT whether to stop."""
+        """Return the number of outputs: the flag that stops IPOPT."""
         return 1
 
     def get_sparsity_in(self, index: int) -> ca.Sparsity:
-        """Return the value of an argument by its name."""
+        """Return the sparsity of an argument by its name."""
         return ca.Sparsity.dense(self.sizes[ca.nlpsol_out(index)], 1)
 
     def eval(self, arguments: Sequence[Any]) -> list[Any]:
-        """Record."""
+        """Record an iterate."""
         if self.skip:
             self.skip = False
             return [0.0]
@@ -61,17 +61,18 @@ class IpoptIterates(ca.Callback):
 
 
 def solve_by_ipopt(request: LibraryRequest, watch: IterateWatch) -> tuple[str, LibraryResult]:
-    """IPOPT's name for how it ended, and what it returned."""
+    """Return IPOPT's return status and its results."""
+    # The functions of the program as callbacks.
     nlp, size, rows = request.nlp, request.nlp.layout.size, request.nlp.layout.rows
     w, g = ca.Sparsity.dense(size, 1), ca.Sparsity.dense(rows, 1)
     value, constraints = values(nlp, watch)
     parts = {
         "grad_f": NlpPart(
-            "nlp_grad_f", [w, POINT], [POINT, w], lambda x, p: [nlp.objective(x), nlp.gradient(x)], watch
+            "nlp_grad_f", [w, SCALAR], [SCALAR, w], lambda x, p: [nlp.objective(x), nlp.gradient(x)], watch
         ),
         "jac_g": NlpPart(
             "nlp_jac_g",
-            [w, POINT],
+            [w, SCALAR],
             [g, nlp.jacobian_pattern.sparsity],
             lambda x, p: [nlp.constraints(x), nlp.jacobian(x)],
             watch,
@@ -80,11 +81,12 @@ def solve_by_ipopt(request: LibraryRequest, watch: IterateWatch) -> tuple[str, L
     if not request.limited_memory:
         parts["hess_lag"] = NlpPart(
             "nlp_hess_l",
-            [w, POINT, POINT, g],
+            [w, SCALAR, SCALAR, g],
             [nlp.upper_pattern.sparsity],
             lambda x, p, factor, duals: [nlp.hessian(x, float(factor[0]), duals, True)],
             watch,
         )
+    # Options of a start with multipliers.
     warm = {
         "warm_start_init_point": "yes",
         "warm_start_bound_push": 1e-9,
@@ -113,7 +115,7 @@ def solve_by_ipopt(request: LibraryRequest, watch: IterateWatch) -> tuple[str, L
 
 
 def values(nlp: MultipleShootingNlp, watch: IterateWatch) -> tuple[NlpPart, NlpPart]:
-    """Objective and constraints."""
+    """Return objective and constraints as callbacks."""
     w, g = ca.Sparsity.dense(nlp.layout.size, 1), ca.Sparsity.dense(nlp.layout.rows, 1)
-    value = NlpPart("objective", [w, POINT], [POINT], lambda x, p: [nlp.objective(x)], watch)
-    return value, NlpPart("constraints", [w, POINT], [g], lambda x, p: [nlp.constraints(x)], watch)
+    value = NlpPart("objective", [w, SCALAR], [SCALAR], lambda x, p: [nlp.objective(x)], watch)
+    return value, NlpPart("constraints", [w, SCALAR], [g], lambda x, p: [nlp.constraints(x)], watch)

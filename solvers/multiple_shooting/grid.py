@@ -1,4 +1,4 @@
-"""The grid of multiple shooting: the intervals between the nodes, and which entries of z act in which of them.
+"""The grid of multiple shooting: the intervals between nodes, and the entries of z that act in each.
 
 Node j is the state before step ``starts[j]``. Node 0 is the first state, which z decides; the last node is the state
 after the last step. Interval j leads from node j to node j + 1. A stage is an interval with the states that begin its
@@ -16,8 +16,8 @@ import numpy as np
 from symphys.shooting import StagedProblem
 from symphys.types import Array, Ints
 
-MOST_INTERVALS = 40
-"""Of the default grid."""
+MAX_INTERVALS = 40
+"""Largest number of intervals of the default grid."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class IntervalGrid:
 
     @property
     def intervals(self) -> int:
-        """M."""
+        """Return the number of intervals ``M``."""
         return len(self.knots)
 
     def node_size(self, stage: int) -> int:
@@ -48,7 +48,7 @@ class IntervalGrid:
         return self.tangent_size if stage else 0
 
     def local_size(self, stage: int) -> int:
-        """Length of the local vector of a stage."""
+        """Return the length of the local vector of a stage."""
         knots = len(self.knots[stage]) if stage < self.intervals else 0
         return self.node_size(stage) + knots + len(self.statics)
 
@@ -62,23 +62,23 @@ class IntervalGrid:
         return slice(self.node_size(stage), self.local_size(stage) - len(self.statics))
 
     def states(self, stage: int) -> range:
-        """Indices of the states of a stage."""
+        """Return the indices of the states of a stage."""
         last = int(self.starts[-1])
         return range(last, last + 1) if stage == self.intervals else self.steps(stage)
 
     def steps(self, interval: int) -> range:
-        """The steps of an interval."""
+        """Return the steps of an interval."""
         return range(int(self.starts[interval]), int(self.starts[interval + 1]))
 
     @property
     def stage_of_state(self) -> Ints:
-        """(N + 1,): the stage of each state."""
+        """Return (N + 1,) the stage of each state."""
         return np.searchsorted(self.starts, np.arange(self.starts[-1] + 1), side="right") - 1
 
 
 def make_grid(problem: StagedProblem, steps_between_nodes: int) -> IntervalGrid:
-    """The grid with a node every so many steps; 0: so many that there are at most ``MOST_INTERVALS`` intervals."""
-    steps = steps_between_nodes or -(-problem.steps // MOST_INTERVALS)
+    """Make the grid with a node every so many steps; 0: at most ``MAX_INTERVALS`` intervals."""
+    steps = steps_between_nodes or -(-problem.steps // MAX_INTERVALS)
     starts = np.append(np.arange(0, problem.steps, steps), problem.steps).astype(np.int64)
     m, weights = problem.input_size, problem.weights.tocsr()
     knots, shares = [], []

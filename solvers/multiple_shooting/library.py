@@ -1,4 +1,4 @@
-"""The program of multiple shooting handed to a library through casadi's nlpsol, function by function.
+"""The multiple-shooting program passed to a library through casadi's nlpsol, function by function.
 
 No exception may leave a callback, since casadi would lose it. After the first, or where the solve is to end, a callback
 returns what makes the library end. Ctrl-C may come between two callbacks, where an exception would be lost as well: its
@@ -21,18 +21,18 @@ import numpy as np
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
 from symphys.types import Array
 
-POINT = ca.Sparsity.dense(1, 1)
+SCALAR = ca.Sparsity.dense(1, 1)
 ITERATIONS_USED = "Maximum_Iterations_Exceeded"
-"""In IPOPT's words."""
+"""The return status of a used budget, in IPOPT's terms."""
 
 
 class IterateWatch(Protocol):
-    """Takes the iterates of a library."""
+    """Receives the iterates of a library."""
 
     error: BaseException | None
 
     def iterate(self, w: Array, bound_duals: Array, row_duals: Array) -> bool:
-        """Record an iterate; whether to end. Duals are empty where a library does not report them."""
+        """Record an iterate; return whether to end. Duals are empty where a library does not report them."""
         ...
 
     @property
@@ -43,7 +43,7 @@ class IterateWatch(Protocol):
 
 @dataclass(frozen=True)
 class LibraryRequest:
-    """What a library is asked.
+    """The input of a library call.
 
     Attributes:
         nlp: the program.
@@ -74,7 +74,7 @@ class LibraryRequest:
 
 @dataclass(frozen=True)
 class LibraryResult:
-    """What a library returned.
+    """The result of a library call.
 
     Attributes:
         w: (size,) where it ended.
@@ -89,7 +89,7 @@ class LibraryResult:
 
 
 class NlpPart(ca.Callback):
-    """One of the program's functions for casadi."""
+    """One of the program's functions as a casadi callback."""
 
     def __init__(
         self,
@@ -100,18 +100,18 @@ class NlpPart(ca.Callback):
         watch: IterateWatch,
         rest: Sequence[Any] = (),
     ) -> None:
-        """``compute`` takes arrays and returns the nonzeros of each output, which ``rest`` replaces at the end."""
+        """Take ``compute``, arrays -> nonzeros of each output, which ``rest`` replaces at the end."""
         ca.Callback.__init__(self)
         self.inputs, self.outputs, self.compute, self.watch = inputs, outputs, compute, watch
         self.rest = rest or [np.full(sparsity.nnz(), np.nan) for sparsity in outputs]
         self.construct(name, {})
 
     def get_n_in(self) -> int:
-        """The number of inputs."""
+        """Return the number of inputs."""
         return len(self.inputs)
 
     def get_n_out(self) -> int:
-        """The number of outputs."""
+        """Return the number of outputs."""
         return len(self.outputs)
 
     def get_sparsity_in(self, index: int) -> ca.Sparsity:
@@ -123,7 +123,7 @@ class NlpPart(ca.Callback):
         return self.outputs[index]
 
     def eval(self, arguments: Sequence[Any]) -> list[Any]:
-        """Compute."""
+        """Compute the outputs."""
         if not self.watch.ended:
             try:
                 with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""All intervals of a horizon rolled out from their nodes, and the slopes of what comes of it by the local vectors.
+"""All intervals of a horizon simulated from their nodes, and derivatives of the results by the local vectors.
 
 The states of an interval follow from its node by the problem's own steps; the slopes of step after step are products of
 the problem's step Jacobians A, B, C. A defect is measured in the tangent of the reference of the next node:
@@ -22,23 +22,23 @@ from symphys.solvers.multiple_shooting.chart import pulled, transported
 from symphys.solvers.multiple_shooting.grid import IntervalGrid
 from symphys.types import Array, Ints
 
-SAME = 1e-10
-"""Relative or absolute: steps whose results differ by less are the same function."""
+SAME_STEP_TOLERANCE = 1e-10
+"""Relative or absolute difference of results below which steps are the same function."""
 
 
 class IntervalSteps:
-    """Steps of several intervals at once, in one batch where all steps of the problem are the same function."""
+    """Simulates several intervals at once, in one batch where all steps are the same function."""
 
     def __init__(self, problem: StagedProblem, motion: StagedMotion) -> None:
-        """Compare, along a motion, step k with step 0: a problem whose steps depend on time has none alike."""
+        """Compare, along a motion, step k with step 0: steps that depend on time differ."""
         self.problem, self.alike = problem, True
         together = self(np.arange(problem.steps), motion.x[:-1], motion.u, motion.z, motion.smoothing)
         self.alike = False
         alone = self(np.arange(problem.steps), motion.x[:-1], motion.u, motion.z, motion.smoothing)
-        self.alike = np.allclose(together, alone, rtol=SAME, atol=SAME, equal_nan=True)
+        self.alike = np.allclose(together, alone, rtol=SAME_STEP_TOLERANCE, atol=SAME_STEP_TOLERANCE, equal_nan=True)
 
     def __call__(self, steps: Ints, X: Array, U: Array, z: Array, smoothing: float) -> Array:
-        """(B,) steps, (B, nx), (B, m), (len(z),) -> (B, nx)."""
+        """Return the states (B, nx) after steps (B,) from X (B, nx) with U (B, m) and z (len(z),)."""
         Z = np.broadcast_to(z, (len(X), len(z)))
         if self.alike:
             return self.problem.step(0, X, U, Z, smoothing)
@@ -48,7 +48,7 @@ class IntervalSteps:
 
 @dataclass(frozen=True)
 class ShootingPlan:
-    """What stays the same in all evaluations.
+    """The part that all evaluations share.
 
     Attributes:
         problem: the problem step by step.
@@ -68,10 +68,10 @@ class ShootingPlan:
 
 
 class Shots:
-    """One evaluation: of z, the inputs u (N, m) and the tangents d (M, n) of the nodes; slopes where asked for."""
+    """One evaluation: of z, inputs u (N, m) and tangents d (M, n) of the nodes; slopes on demand."""
 
     def __init__(self, plan: ShootingPlan, z: Array, u: Array, d: Array) -> None:
-        """Roll all intervals out."""
+        """Simulate all intervals."""
         self.plan, self.d = plan, d
         problem, starts = plan.problem, plan.grid.starts
         self.nodes = problem.retract(plan.reference, d)
@@ -96,12 +96,12 @@ class Shots:
 
     @property
     def defects(self) -> Array:
-        """(M, n): d[j + 1] - F[j]."""
+        """Return the defects (M, n): d[j + 1] - F[j]."""
         return self.d - self.reached
 
     @cached_property
     def measured(self) -> tuple[float, Array]:
-        """The objective and the limits (c,)."""
+        """Return the objective and the limits (c,)."""
         motion = self.motion
         objective, limits = self.plan.problem.measure(motion.z[None], motion.x[None], motion.u[None])
         return float(objective[0]), limits[0]
@@ -114,7 +114,7 @@ class Shots:
 
     @cached_property
     def turns(self) -> Array:
-        """(M, n, n): the nodes in their own tangents by d."""
+        """Return (M, n, n): the nodes in their own tangents by d."""
         return pulled(self.plan.problem, self.plan.reference, self.nodes, self.d, self.plan.curved)
 
     @cached_property
@@ -141,7 +141,7 @@ class Shots:
         return found
 
     def limit_slopes(self, rows: list[Ints]) -> list[Array]:
-        """The slopes of the limits ``rows`` of each stage by its local vector; those by statics in a row's first stage.
+        """Return slopes of the limits ``rows`` of each stage by its local vector; statics in a row's first stage.
 
         RuntimeError where a limit depends on a stage that ``rows`` does not give it.
         """
@@ -162,7 +162,7 @@ class Shots:
         return found
 
     def gauss_newton(self) -> Iterator[Array]:
-        """The Hessian of the objective by the local vector of each stage, curvature of the steps left out."""
+        """Return the Gauss-Newton Hessian of the objective by the local vector of each stage."""
         e, grid = self.expansion, self.plan.grid
         for stage, slopes in enumerate(self.slopes):
             states, count = list(grid.states(stage)), len(slopes.inputs)
@@ -178,7 +178,7 @@ class Shots:
 
 
 def dense_blocks(matrix: Sparse, rows: list[Ints], spans: list[tuple[int, int]]) -> list[Array]:
-    """The rows and columns (first, one past the last) of each block; spans ascend, and have no gap between them.
+    """Return rows and columns (first, one past the last) of each block; spans ascend without gaps.
 
     RuntimeError where the matrix has an entry in a column of a block, but not in its rows.
     """
@@ -217,7 +217,7 @@ class StageSlopes:
 
 
 def stage_slopes(grid: IntervalGrid, stage: int, linearized: Linearized, turns: Array, transport: Array) -> StageSlopes:
-    """StageChain the slopes of an interval's steps."""
+    """Chain the slopes of an interval's steps."""
     n, v = grid.tangent_size, grid.local_size(stage)
     statics, now = grid.static_part(stage), np.zeros((n, v))
     if stage:

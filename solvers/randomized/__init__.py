@@ -1,1 +1,1 @@
-"""Solving over samples of a scenario: batches, aggregated gradients, validation."""
+"""Optimisation over samples of a scenario: batches, aggregated gradients, validation."""

@@ -1,4 +1,4 @@
-"""Aggregation over samples of a scenario: a gradient from their gradients, and one from their values alone."""
+"""Aggregation over samples of a scenario: a gradient from the samples' gradients, or from their values alone."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import numpy as np
 from symphys.shooting import ScenarioSamples, Values
 from symphys.types import Array
 
-TINY, LARGEST = 1e-300, 1e300
+MIN_LENGTH, MAX_LENGTH = 1e-300, 1e300
+"""Bounds of lengths in divisions and products, against overflow."""
 
 
 @dataclass(frozen=True)
 class GradientAverage:
-    """Of a batch.
+    """The average of a batch.
 
     Attributes:
         gradient: (n,) mean of the gradients, each scaled and shortened first.
@@ -37,20 +38,25 @@ class GradientAverage:
 
 
 def average(values: Values, scale: Array, clip: float, fallen: float) -> GradientAverage:
-    """Each gradient by itself at most ``clip`` long, then their mean; motions that fell count ``fallen`` times."""
+    """Clip each gradient to ``clip``, then average; motions that fell have the weight ``fallen``."""
     assert values.gradient is not None, "gradients were asked for"
     g = values.gradient * scale
     finite = np.isfinite(values.merit) & np.isfinite(g).all(axis=1)
     g = g[finite]
-    largest = np.maximum(np.abs(g).max(axis=1, initial=0.0), TINY)
+    # Normalise by the largest entry first: norms of huge gradients would overflow.
+    largest = np.maximum(np.abs(g).max(axis=1, initial=0.0), MIN_LENGTH)
     directions = g / largest[:, None]
-    lengths = np.maximum(np.linalg.norm(directions, axis=1), TINY)
-    directions, norms = directions / lengths[:, None], largest * np.minimum(lengths, LARGEST / np.maximum(largest, 1))
+    lengths = np.maximum(np.linalg.norm(directions, axis=1), MIN_LENGTH)
+    directions, norms = (
+        directions / lengths[:, None],
+        largest * np.minimum(lengths, MAX_LENGTH / np.maximum(largest, 1)),
+    )
+    # Weighted mean of the clipped gradients.
     lasted = np.ones(len(finite)) if values.alive is None else values.alive
     weights = np.where(lasted[finite] > 0, 1.0, fallen)
     short = directions * np.minimum(norms, clip)[:, None]
     return GradientAverage(
-        gradient=weights @ short / max(weights.sum(), TINY),
+        gradient=weights @ short / max(weights.sum(), MIN_LENGTH),
         objective=mean(values.objective[finite]),
         merit=mean(values.merit[finite]),
         alive=float((lasted * finite).mean()),
@@ -68,7 +74,7 @@ def mean(numbers: Array) -> float:
 
 @dataclass(frozen=True)
 class ValueGradient:
-    """A gradient from values at pairs of points, one to either side.
+    """A gradient from values at antithetic pairs of points.
 
     Attributes:
         gradient: (n,) scaled.
@@ -93,7 +99,7 @@ def evolution(
     samples: ScenarioSamples,
     rng: np.random.Generator,
 ) -> ValueGradient:
-    """A gradient from values: z moved to either side at random in each sample.
+    """Estimate a gradient from values: z is perturbed to either side at random in each sample.
 
     Antithetic pairs (Salimans et al. 2017, arXiv 1703.03864): the mean of (r(z + s e) - r(z - s e)) / 2 e over
     samples, in units of ``step`` = s (n,), where r is the rank of a merit among all that are finite, from -1/2 to
@@ -118,13 +124,13 @@ def evolution(
 
 
 def centred(merits: Array) -> Array:
-    """Ranks of all merits, from -1/2 to 1/2, in their shape; equal ones share theirs."""
+    """Return ranks of all merits, from -1/2 to 1/2, in their shape; equal merits share a rank."""
     _, places, counts = np.unique(merits, return_inverse=True, return_counts=True)
     ranks = np.cumsum(counts) - (counts + 1) / 2
     return np.asarray(ranks[places].reshape(merits.shape) / max(merits.size - 1, 1) - 0.5)
 
 
 def mixed(pathwise: Array, evolved: Array, share: float) -> Array:
-    """Both at length 1, mixed by their shares."""
+    """Return the weighted sum of both gradients, each normalised."""
     parts = [(1 - share, pathwise), (share, evolved)]
-    return np.asarray(sum(weight * g / max(float(np.linalg.norm(g)), TINY) for weight, g in parts))
+    return np.asarray(sum(weight * g / max(float(np.linalg.norm(g)), MIN_LENGTH) for weight, g in parts))

@@ -1,4 +1,4 @@
-"""Descents over samples of a scenario that are drawn anew: batches, steps of Adam, a falling rate, validation.
+"""Descents over samples of a scenario, redrawn in each iteration: batches, Adam, a falling rate, validation.
 
 Draws of an iteration depend on the seed and its number alone. The gradient estimate is the method's own.
 """
@@ -19,15 +19,15 @@ from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point
-from symphys.solvers.randomized.validation import SAMPLES, Validation, ValidationBatch
+from symphys.solvers.randomized.validation import SAMPLE_STREAM, Validation, ValidationBatch
 from symphys.types import Array
 
 NO_SCENARIO = (
     "this problem has no samples to draw: add [[scenario]] tables (and a C compiler, if there is none), or use "
     "another solver"
 )
-DONE = "all iterations are done; kept is the point that did best in the validation samples"
-LASTING = "share of the batch that lasts"
+ITERATIONS_DONE = "all iterations are done; kept is the point that did best in the validation samples"
+SURVIVING_SHARE = "share of the batch that lasts"
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class DescentOptions(SolverOptions):
     patience: float = 0.3
 
     def __post_init__(self) -> None:
-        """ValueError that names the option and what would be valid."""
+        """Raise ValueError, which names the option and what would be valid."""
         super().__post_init__()
         at_least(0, iterations=self.iterations, validation=self.validation)
         at_least(1, samples=self.samples, every=self.every)
@@ -72,12 +72,12 @@ class DescentOptions(SolverOptions):
         require(all(0 <= share < 1 for share in self.betas), "betas", "in [0, 1)")
 
     def rate_at(self, iteration: int) -> float:
-        """The rate in force."""
+        """Return the rate of an iteration."""
         left = (self.iterations - iteration) / max((1 - self.hold) * self.iterations, 1)
         return self.rate * min(1.0, max(self.last, left))
 
     def batch(self, seed: int) -> ValidationBatch:
-        """Set up validation."""
+        """Return the validation batch."""
         return ValidationBatch(self.validation, self.validation_width, seed)
 
     def validates(self, iteration: int) -> bool:
@@ -90,7 +90,7 @@ class DescentOptions(SolverOptions):
 
 @dataclass(frozen=True)
 class DescentState:
-    """Between two iterations.
+    """The state between two iterations.
 
     Attributes:
         iteration: batches that were drawn.
@@ -105,7 +105,7 @@ class DescentState:
 
 @dataclass(frozen=True)
 class GradientEstimate:
-    """What a batch of samples yields at a point.
+    """The gradient estimate of a batch of samples at a point.
 
     Attributes:
         point: with means over the batch, and the errors of the problem's own sample.
@@ -126,7 +126,7 @@ OptionsT = TypeVar("OptionsT", bound=DescentOptions)
 
 
 class Descent(Method[DescentState], Generic[OptionsT]):
-    """The method but for its gradient estimate, see ``interface.Method``.
+    """The method except for its gradient estimate, see ``interface.Method``.
 
     Attributes:
         scale: (n,) of the problem; 0 for what is held by equal bounds, so that it is no part of any gradient.
@@ -141,16 +141,16 @@ class Descent(Method[DescentState], Generic[OptionsT]):
 
     @abstractmethod
     def estimate(self, state: DescentState, samples: ScenarioSamples) -> GradientEstimate | StopReason:
-        """The gradient from a batch; the reason where it yields none."""
+        """Estimate the gradient from a batch; return the reason where that fails."""
 
     def init(self) -> Iteration[DescentState]:
-        """The start is the first point that is validated."""
+        """Validate the start as the first point."""
         if self.options.validation:
             self.validation.keep(self.start)
         return Iteration(DescentState(0, self.start, DirectionMemory.empty(self.start.size)), None)
 
     def step(self, state: DescentState) -> Iteration[DescentState] | StopReason:
-        """One batch, one step of Adam, perhaps a validation."""
+        """Draw one batch, make one step of Adam, perhaps validate."""
         options, k = self.options, state.iteration
         samples = self.draw(k)
         found = self.estimate(state, samples)
@@ -166,10 +166,10 @@ class Descent(Method[DescentState], Generic[OptionsT]):
         return Iteration(DescentState(k + 1, z, memory), found.point, found.typical, length, found.outputs)
 
     def terminate(self, state: DescentState) -> StopReason | None:
-        """After the last iteration."""
+        """Return the reason after the last iteration."""
         if state.iteration < self.options.iterations:
             return None
-        return self.conclude(state, StopReason(Status.BUDGET, DONE))
+        return self.conclude(state, StopReason(Status.BUDGET, ITERATIONS_DONE))
 
     def conclude(self, state: DescentState, reason: StopReason) -> StopReason:
         """Implement ``Method.conclude``: the last point may be kept, so it is validated, unless it was."""
@@ -182,12 +182,12 @@ class Descent(Method[DescentState], Generic[OptionsT]):
         return revive(DescentState, saved, DirectionMemory)
 
     def draw(self, iteration: int) -> ScenarioSamples:
-        """The batch of an iteration, on the grid whose turn it is."""
-        stream = np.random.default_rng([self.seed, SAMPLES, iteration])
+        """Draw the batch of an iteration, on the grid of that iteration."""
+        stream = np.random.default_rng([self.seed, SAMPLE_STREAM, iteration])
         grid = iteration % len(self.scenario.grids)
         return self.scenario.draw(stream, self.options.samples, self.options.width, grid)
 
 
 def refusal(problem: ShootingProblem) -> str:
-    """Why a descent over samples is not for a problem."""
+    """Return why a descent over samples is not for a problem; empty if it is."""
     return NO_SCENARIO if problem.scenario is None else ""

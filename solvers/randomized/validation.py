@@ -1,4 +1,4 @@
-"""Validation: which point is kept where samples of a scenario differ: the one that does best in samples of its own.
+"""Validation: the point is kept that does best in a separate set of samples.
 
 The validation samples are drawn once, so that all points are compared in the same ones.
 """
@@ -23,13 +23,13 @@ NO_BETTER = (
     "no point did better in the validation samples than the start, which is kept: take smaller steps, another "
     "seed or another solver"
 )
-VALIDATION, SAMPLES, NOISE = 1, 2, 3
+VALIDATION_STREAM, SAMPLE_STREAM, NOISE_STREAM = 1, 2, 3
 """Streams of random numbers."""
 
 
 @dataclass(frozen=True)
 class ValidationBatch:
-    """How validation samples are drawn.
+    """Number, width and seed of the validation samples.
 
     Attributes:
         count: how many; 0: every point is kept.
@@ -48,11 +48,11 @@ class Validation:
     def __init__(self, evaluator: CountingEvaluator, batch: ValidationBatch, log: Log) -> None:
         """Draw the samples."""
         self.evaluator, self.batch, self.log = evaluator, batch, log
-        stream = np.random.default_rng([batch.seed, VALIDATION])
+        stream = np.random.default_rng([batch.seed, VALIDATION_STREAM])
         self.samples = evaluator.scenario.draw(stream, max(batch.count, 1), batch.width)
 
     def keep(self, z: Array) -> None:
-        """Make the point the incumbent if it does best; Stop where that is enough.
+        """Make the point the incumbent if it does best; raise Stop where everything is met.
 
         Fewer samples that are not finite go first, then a point that meets everything in the problem's own sample,
         which is what a run is judged by, then the lower merit. A point that is not finite in that sample is not kept.
@@ -68,14 +68,14 @@ class Validation:
             incumbent.replace(point)
 
     def conclude(self, reason: StopReason, start: Array) -> StopReason:
-        """Why a stage ended, or that its start (n,) is kept, unless a limit of the solve came in between."""
+        """Return why a stage ended, or that its start (n,) is kept, unless a limit of the solve intervened."""
         best = self.evaluator.incumbent.best
         if reason.whole or best is None or not np.array_equal(best.z, start):
             return reason
         return StopReason(Status.STALLED if reason.status is Status.CONVERGED else reason.status, NO_BETTER)
 
     def rated(self, z: Array) -> tuple[Point, str]:
-        """The point by its means, and for the log how many motions last."""
+        """Return the point by its means, and for the log how many motions survive."""
         values = self.evaluator.sample_values(z[None], self.samples)
         finite = np.isfinite(values.merit)
         means = mean(values.merit[finite]), mean(values.objective[finite])
@@ -84,7 +84,7 @@ class Validation:
 
 
 def rate_by_validation(batch: ValidationBatch) -> Rate:
-    """Rates points as a validation does where there are samples; by one rollout each where there is no scenario."""
+    """Return a ``Rate`` by validation, or by one rollout for each point without a scenario."""
 
     def rate(evaluator: CountingEvaluator, Z: Sequence[Array]) -> list[Point]:
         if evaluator.problem.scenario is None:
@@ -100,7 +100,7 @@ def rate_by_validation(batch: ValidationBatch) -> Rate:
 def first_sample(
     evaluator: CountingEvaluator, z: Array, values: Values, merit: float, objective: float, failed: int
 ) -> Point:
-    """A point by means over samples, with the errors and outputs of the problem's own, which is the first."""
+    """Return a point by means over samples, with errors and outputs of the first, the problem's own."""
     errors = values.errors[0].copy()
     return Point(
         z, merit, objective, errors, evaluator.problem.met(errors), outputs_of(values, 0), failed_samples=failed
@@ -108,5 +108,5 @@ def first_sample(
 
 
 def outputs_of(values: Values, row: int) -> Array:
-    """(o,) the outputs of a row."""
+    """Return the outputs (o,) of a row."""
     return np.zeros(0) if values.outputs is None else values.outputs[row].copy()

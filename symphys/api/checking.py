@@ -29,9 +29,9 @@ from symphys.runs import check_tables
 from symphys.transcription import Assessment
 from symphys.verification import examine
 
-IN_TABLES = (GRADIENT, GRID)
+TABLE_SUBJECTS = (GRADIENT, GRID)
 """Subjects of findings that the tables of the text show already."""
-WIDTH = 110
+MAX_LINE_WIDTH = 110
 """Largest number of characters in a line."""
 At = None | str | Path | Solution | Mapping[str, ArrayLike]
 """The point that is examined. None: the guess; else a solution, a run folder, or values of variables by name."""
@@ -89,8 +89,8 @@ class Checked(Examined):
     def __str__(self) -> str:
         """Return the report that ``symphys check`` prints: gradients, finer simulations, other findings, advice."""
         tables = (advice.slopes(self.trust), advice.answers(self.trust, self.judged))
-        lines = [text_line(each) for each in self.findings if each.about not in IN_TABLES]
-        paragraphs = [textwrap.fill(text, WIDTH) for text in (sliding(self.trust), self.advice)]
+        lines = [text_line(each) for each in self.findings if each.about not in TABLE_SUBJECTS]
+        paragraphs = [textwrap.fill(text, MAX_LINE_WIDTH) for text in (sliding(self.trust), self.advice)]
         parts = [f"{self.problem.name}: {self.problem.title}", *(text_table(*each) for each in tables)]
         return "\n\n".join(filter(None, [*parts, "\n".join(lines), *paragraphs]))
 
@@ -118,7 +118,7 @@ def check(problem: Source, at: At = None) -> Checked:
     motions.
 
     Args:
-        problem: what ``load`` takes.
+        problem: any argument of ``load``.
         at: the point to examine. None: the guess; else a solution, the path of its run folder, or values of variables
             by name.
 
@@ -154,10 +154,10 @@ def values_of(at: At) -> Mapping[str, ArrayLike]:
 
 
 def text_line(finding: Finding) -> str:
-    """Format a finding in lines of at most ``WIDTH`` characters."""
+    """Format a finding in lines of at most ``MAX_LINE_WIDTH`` characters."""
     said = f"{finding.what}: {finding.number}. {finding.meaning}" if finding.number else finding.meaning
     indent = " " * (max(map(len, MARKS.values())) + 2)
-    return textwrap.fill(f"{MARKS[finding.level]:<{len(indent)}}{said}", WIDTH, subsequent_indent=indent)
+    return textwrap.fill(f"{MARKS[finding.level]:<{len(indent)}}{said}", MAX_LINE_WIDTH, subsequent_indent=indent)
 
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -171,9 +171,9 @@ def compile(
     """Compile a problem's rollout for batches of decision vectors.
 
     Args:
-        problem: what ``load`` takes.
+        problem: any argument of ``load``.
         smoothing: width of the smoothed contact laws [m/s]; 0 is the exact law.
-        backend: what evaluates: "auto", "simd", "simd32", "c", "cuda", "cuda32" or "casadi".
+        backend: the evaluator: "auto", "simd", "simd32", "c", "cuda", "cuda32" or "casadi".
         threads: number of threads that share a batch; None: one for each processor.
 
     Raises:
@@ -207,13 +207,13 @@ def compile_step(
     controllers, and inputs that variables set over time, still act. Observations are the readings of sensors.
 
     Args:
-        problem: what ``load`` takes.
+        problem: any argument of ``load``.
         controllers: names of the controllers that actions replace. None: those whose numbers a variable sets, or else
             all; without controllers the inputs that variables set over time; without these the commands of all motors.
         sensors: names of the sensors that are observed. None: those of these controllers, or else all; without sensors
             the positions, orientations and velocities of all bodies.
         smoothing: width of the smoothed contact laws [m/s]; 0 is the exact law.
-        backend: what evaluates: "auto", "simd", "simd32", "cuda", "cuda32" or "casadi". The first adjoints of a step in
+        backend: the evaluator: "auto", "simd", "simd32", "cuda", "cuda32" or "casadi". The first adjoints of a step in
             single precision are compared with double precision; those of a chain of steps are not, and may be far off.
         threads: number of threads that share a batch; None: one for each processor.
 

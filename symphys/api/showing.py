@@ -30,7 +30,7 @@ def show(
     """Draw the motion of a problem from the side and from above, with its guess or with other values.
 
     Args:
-        problem: what ``load`` takes, or a robot by itself: a shipped one, ``"robots/arm.toml"``, or a file that
+        problem: any argument of ``load``, or a robot by itself: a shipped one, ``"robots/arm.toml"``, or a file that
             problems may include. A robot falls to the ground; motors that track an angle or a position hold the start.
         values: values of variables by name: (components,), or (knots, components).
         page: an HTML file to write as well; it plays the motion, and draws states, joints and contacts.

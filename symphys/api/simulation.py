@@ -14,8 +14,8 @@ from symphys.problem.loading import Source, load
 from symphys.solvers.ddp.gains import Gains
 from symphys.solvers.ddp.gains import follow as gains_motion
 from symphys.trajectory import Trajectory
-from symphys.transcription.feedback.state_reader import StateReader
 from symphys.transcription.staged.tangent import Tangent
+from symphys.transcription.state_reader import StateReader
 
 
 def simulate(
@@ -24,7 +24,7 @@ def simulate(
     """Simulate a problem with its guess, or with other values of its variables.
 
     Args:
-        problem: what ``load`` takes.
+        problem: any argument of ``load``.
         values: values of variables by name, such as ``solution.value``: (components,), or (knots, components).
         smoothing: width of the smoothed contact laws [m/s]; 0 is the exact law.
         variables: the same as ``values``, for names that are Python words.

@@ -13,13 +13,12 @@ from numpy.typing import ArrayLike
 from symphys.api import views
 from symphys.errors import SymphysError
 from symphys.problem import Problem, load_problem
-from symphys.results.archives import read_archive
 from symphys.results.config import read_config
 from symphys.results.discovery import is_run
 from symphys.results.file_names import CONFIG, GAINS, PROBLEM, TRAJECTORY
 from symphys.results.result import CheckRecord
 from symphys.results.run import Run, read_run
-from symphys.results.text_files import ReportError
+from symphys.results.text_files import ReportError, read_archive
 from symphys.results.trace import Trace
 from symphys.results.trajectories import read_trajectory
 from symphys.suggest import hint, quote

@@ -45,7 +45,7 @@ def solve(
     """Solve a problem.
 
     Args:
-        problem: what ``load`` takes.
+        problem: any argument of ``load``.
         solver: the name of a solver. None: the first that the problem names, else the one that suits its structure
             (``symphys.runs.choice``); ``solution.run.provenance["chosen"]`` then gives the reason.
         seed: 0 starts from the guess; other seeds perturb it by the ``spread`` of each variable.
@@ -55,7 +55,7 @@ def solve(
         folder: the folder in which run folders are kept, as with ``symphys solve --out``: a run that is done is read,
             an interrupted one is resumed. None: the run is removed together with the solution.
         examine: whether to examine how far the solution can be trusted, which may take longer than the solve.
-        backend: what evaluates: "auto", "simd", "simd32", "c", "cuda", "cuda32" or "casadi".
+        backend: the evaluator: "auto", "simd", "simd32", "c", "cuda", "cuda32" or "casadi".
         threads: number of threads that share a batch; None: one for each processor.
         progress: a function that is called with each iteration: its ``iteration``, ``objective``, ``max_violation``
             and ``seconds``.

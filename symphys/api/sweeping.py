@@ -35,7 +35,7 @@ BatchProgress = Callable[[str, TraceRow], None]
 """A function that is called with the name of a run, ``"ball_throw gradient seed 0"``, and its iteration."""
 
 
-class How(TypedDict, total=False):
+class BatchArguments(TypedDict, total=False):
     """Limits of a batch, and what its runs start from.
 
     Attributes:
@@ -69,7 +69,7 @@ def solve_all(
     sweep: Mapping[str, Any] | None = None,
     on: str | None = None,
     scheduler: str | None = None,
-    **how: Unpack[How],
+    **how: Unpack[BatchArguments],
 ) -> list[Solution]:
     """Solve problems with several solvers and seeds. A run that fails does not stop the others.
 
@@ -88,7 +88,7 @@ def solve_all(
         on: ``"dask"`` or ``"slurm"``: ``jobs`` drivers do the runs elsewhere; needs a ``folder`` that all machines see.
         scheduler: as ``symphys solve --scheduler``; None: dask workers here, Slurm with its defaults.
         sweep: a table that replaces [sweep] of the problem file; None: the file's; ``{}``: no sweep.
-        how: ``retries``, ``timeout`` [s], ``budget`` [s], ``rerun`` and ``guess``, as ``How`` describes.
+        how: ``retries``, ``timeout`` [s], ``budget`` [s], ``rerun`` and ``guess``, as ``BatchArguments`` describes.
 
     Returns:
         The solutions, ordered by problem, point, solver and seed; ``run.status`` of a run may be "failed".
@@ -141,7 +141,7 @@ def points_of(problem: Problem, table: Mapping[str, Any] | None) -> Iterable[Pro
     return [problem] if own is None else swept(problem, combined(own, problem))
 
 
-def limits_of(how: How) -> BatchLimits:
+def limits_of(how: BatchArguments) -> BatchLimits:
     """Check and collect the limits of a batch."""
     rerun, retries = how.get("rerun"), how.get("retries", 0)
     times = [how.get("timeout"), how.get("budget")]

@@ -13,17 +13,17 @@ if TYPE_CHECKING:
     from symphys.transcription.recorded_rollout import RecordedRollout
     from symphys.transcription.staged.linearization import Linearization
 
-KEPT = 8
+CACHE_SIZE = 8
 """Size of each cache: the kernels of one problem may take hundreds of megabytes."""
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def transcribed(problem: Problem, exact: bool, backend: str, threads: int | None = None) -> Transcription:
     """Transcribe a problem, as ``symphys.transcription.transcribe`` does."""
     return transcribe(problem, exact, backend, threads)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def linearized(problem: Problem, exact: bool, backend: str, threads: int | None = None) -> Linearization:
     """Compile the Jacobians of the steps of a problem."""
     from symphys.transcription.staged.linearization import Linearization
@@ -31,7 +31,7 @@ def linearized(problem: Problem, exact: bool, backend: str, threads: int | None 
     return Linearization(transcribed(problem, exact, backend, threads).rollout, backend, threads, exact)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def stepped(
     problem: Problem,
     controllers: tuple[str, ...] | None,
@@ -46,7 +46,7 @@ def stepped(
     return compile_open_step(problem, controllers, sensors, smoothing, backend, threads)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def recorded(
     problem: Problem, quantities: tuple[str, ...], smoothing: float, backend: str, threads: int | None = None
 ) -> RecordedRollout:

@@ -18,7 +18,7 @@ from symphys.batches.ledger import Ledger, Observer, retried
 from symphys.batches.limits import UNLIMITED, BatchLimits, Halt
 from symphys.batches.pool import NoWorkers, Pool
 from symphys.batches.queue import Queue
-from symphys.batches.worker import TICK
+from symphys.batches.worker import REPORT_INTERVAL
 from symphys.interrupts import Interrupts
 from symphys.results.result import Result
 from symphys.runs.claim import FolderBusy, claimed, owner
@@ -127,7 +127,7 @@ class SerialRunner:
             index = self.queue.take(last)
             if index is None:
                 self.ledger.wait_for(self.queue.claimed)
-                time.sleep(TICK)
+                time.sleep(REPORT_INTERVAL)
                 continue
             try:
                 self.do(index)

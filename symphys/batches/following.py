@@ -1,4 +1,4 @@
-"""A batch that is done elsewhere: an engine starts drivers, and this process follows what they do and computes nothing.
+"""A batch that runs elsewhere: an engine starts drivers, and this process monitors them without computing.
 
 Results are read from run folders; messages of drivers come from their ``Board``.
 """
@@ -27,13 +27,13 @@ from symphys.runs.inspection import RunState, inspect_run
 from symphys.runs.job import Job
 from symphys.runs.record import failure
 
-TICK = 0.25
-"""[s] at least between two looks at the board."""
-SHARE = 20
-"""Looking at the board takes at most one second in so many."""
-MOST_ROUNDS = 3
-"""Times that drivers are restarted while no run ends."""
-GRACE = 5.0
+MIN_POLL_INTERVAL = 0.25
+"""[s] between two reads of the board, at least."""
+MIN_POLL_SPACING = 20
+"""Least time between reads of the board, in units of the time to read it."""
+MAX_ROUNDS = 3
+"""Largest number of restarts of drivers while no run ends."""
+GRACE_TIME = 5.0
 """[s] for drivers to end by themselves when nothing is left, and for their runs when the batch's time is up."""
 
 
@@ -120,20 +120,20 @@ class Follower:
             self.reap()
             if asked:
                 # after Ctrl-C a run may take its time, since a second one ends it; the time of the batch is a limit
-                goes_on = bool(alive and self.at_work) and self.halt.overdue < GRACE
+                goes_on = bool(alive and self.at_work) and self.halt.overdue < GRACE_TIME
             else:
                 self.report(faults)
                 goes_on = self.scale(alive)
             if not goes_on:
                 break
-            self.wait(max(TICK, (SHARE - 1) * (time.monotonic() - began)), asked)
+            self.wait(max(MIN_POLL_INTERVAL, (MIN_POLL_SPACING - 1) * (time.monotonic() - began)), asked)
         self.sweep(asked)
 
     def wait(self, seconds: float, asked: bool) -> None:
         """Wait for the next look, but not longer than until a new halt."""
         until = time.monotonic() + seconds
         while (rest := until - time.monotonic()) > 0 and (asked or not self.halt()):
-            time.sleep(min(TICK, rest))
+            time.sleep(min(MIN_POLL_INTERVAL, rest))
 
     def take_news(self) -> None:
         """Read the messages of the drivers."""
@@ -188,7 +188,7 @@ class Follower:
         missing = min(self.drivers, len(self.left)) - alive
         if missing <= 0:
             return True
-        if self.rounds >= MOST_ROUNDS:
+        if self.rounds >= MAX_ROUNDS:
             return alive > 0
         self.rounds += 1
         for _ in range(missing):
@@ -219,9 +219,9 @@ class Follower:
     def close(self) -> None:
         """Wait a little for drivers that find nothing more to do."""
         self.task.board.stop(self.halt.reason)
-        until = time.monotonic() + GRACE
+        until = time.monotonic() + GRACE_TIME
         while self.engine.poll()[0] and time.monotonic() < until:
-            time.sleep(TICK / 5)
+            time.sleep(MIN_POLL_INTERVAL / 5)
 
 
 def outcome(job: Job) -> Result:

@@ -16,11 +16,11 @@ from symphys.runs.inspection import file_stamp
 from symphys.runs.job import Job
 from symphys.solvers import TraceRow
 
-NOT_KEPT: Mapping[str, Any] = {
+DROPPED_FIELDS: Mapping[str, Any] = {
     **{key: {} for key in ("z", "guess", "costs", "outputs", "counts", "price", "versions", "provenance")},
     "stages": (),
 }
-"""Fields that a result loses in the memory of a batch; its folder has them."""
+"""Fields of a result that a batch drops from memory; its folder has them."""
 
 
 class Observer:
@@ -94,7 +94,7 @@ class Ledger:
                 write_table(out)
 
     def wait_for(self, indices: Collection[int]) -> None:
-        """Say, once, that the runs that are left are those that other commands are at."""
+        """Report, once, that the remaining runs are claimed by other commands."""
         if self.waited or not indices:
             return
         self.waited = True
@@ -117,4 +117,4 @@ def retried(job: Job, why: str, ledger: Ledger) -> Job:
 def slim(result: Result) -> Result:
     """Return a result without the fields that a batch does not use, so that ten thousand take little memory."""
     trust = {} if result.accepted else result.trust
-    return replace(result, **NOT_KEPT, trust=trust)
+    return replace(result, **DROPPED_FIELDS, trust=trust)

@@ -48,7 +48,7 @@ class Halt:
 
     @property
     def overdue(self) -> float:
-        """Time [s] since the budget was used up; 0 until then."""
+        """The time [s] since the budget was used up; 0 until then."""
         return max(monotonic() - self.began - self.budget, 0.0)
 
     def __call__(self) -> bool:

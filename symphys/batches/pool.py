@@ -24,21 +24,21 @@ from symphys import threads
 from symphys.batches.ledger import Ledger, retried
 from symphys.batches.limits import BatchLimits, Halt, timed_out
 from symphys.batches.queue import Queue
-from symphys.batches.worker import TICK, Begun, Ended, News, Order, Ready, Stopping, serve
+from symphys.batches.worker import REPORT_INTERVAL, Begun, Ended, News, Order, Ready, Stopping, serve
 from symphys.interrupts import ignoring_interrupts
 from symphys.results.result import Result
 from symphys.runs.execute import Transcribe, give_up, stop_at_limit
 from symphys.runs.job import Job
 from symphys.solvers import TraceRow
 
-GRACE = 1.0
-"""[s] for a run to stop by itself after its timeout; then its process is killed, and its compilers with it."""
+GRACE_TIME = 1.0
+"""[s] for a run to stop by itself after its timeout; then its process and its compilers are killed."""
 BUILDING, SOLVING = "building and compiling", "solving"
 """The phases of a run before and after its first iteration; judging announces its own parts."""
 PS_TIMEOUT = 1.0
 """[s] after which ``ps``, asked where there is no /proc, is not waited for."""
-MOST_STARTS = 3
-"""Workers in a row that end before they are ready, after which no more are tried."""
+MAX_FAILED_STARTS = 3
+"""Workers in a row that may end before they are ready; then no more are started."""
 
 
 class NoWorkers(Exception):
@@ -54,10 +54,10 @@ class WorkerSlot:
         ready: whether it accepts runs.
         index: of its job; None if it is idle.
         last: the subject of its last transcription.
-        until: [s] the deadline of its run.
-        doing: the phase of its run.
-        asked: whether its run was asked to stop.
-        why: the limit that its run has reached, in words; empty for none.
+        deadline: [s] of its run.
+        phase: the phase of its run.
+        stop_requested: whether its run was asked to stop.
+        stop_reason: the limit that its run has reached, in words; empty for none.
         ended: whether its process was killed for it.
     """
 
@@ -66,10 +66,10 @@ class WorkerSlot:
     ready: bool = False
     index: int | None = None
     last: Hashable = None
-    until: float = math.inf
-    doing: str = BUILDING
-    asked: bool = False
-    why: str = ""
+    deadline: float = math.inf
+    phase: str = BUILDING
+    stop_requested: bool = False
+    stop_reason: str = ""
     ended: bool = False
 
 
@@ -129,27 +129,32 @@ class Pool:
                 if not self.working:
                     self.ledger.wait_for(self.queue.claimed)
                 return
-            slot.index, slot.asked, slot.why, slot.doing = index, False, "", BUILDING
-            slot.until = time.monotonic() + self.limits.timeout
+            slot.index, slot.stop_requested, slot.stop_reason, slot.phase = index, False, "", BUILDING
+            slot.deadline = time.monotonic() + self.limits.timeout
             send(slot, (self.jobs[index],))
 
     def bound(self) -> None:
         """Ask runs to stop at a halt or timeout; kill a process that does not stop."""
         now, halt = time.monotonic(), self.halt()
         for slot in self.working:
-            if not slot.asked and (halt or now > slot.until):
-                slot.asked, slot.why = True, self.halt.reason if halt else timed_out(self.limits.timeout)
-                slot.until = now + GRACE if slot.why else math.inf
-                send(slot, Stopping(slot.why))
-            elif slot.asked and now > slot.until and slot.process.pid and not slot.ended:
+            if not slot.stop_requested and (halt or now > slot.deadline):
+                slot.stop_requested, slot.stop_reason = (
+                    True,
+                    self.halt.reason if halt else timed_out(self.limits.timeout),
+                )
+                slot.deadline = now + GRACE_TIME if slot.stop_reason else math.inf
+                send(slot, Stopping(slot.stop_reason))
+            elif slot.stop_requested and now > slot.deadline and slot.process.pid and not slot.ended:
                 slot.ended = True
                 end_tree(slot.process.pid)
 
     def listen(self) -> None:
         """Wait for messages and read them."""
-        waited = connection.wait([each for slot in self.slots for each in (slot.pipe, slot.process.sentinel)], TICK)
+        waited = connection.wait(
+            [each for slot in self.slots for each in (slot.pipe, slot.process.sentinel)], REPORT_INTERVAL
+        )
         if not self.slots:
-            time.sleep(TICK)
+            time.sleep(REPORT_INTERVAL)
         for slot in list(self.slots):
             if slot.pipe in waited or slot.process.sentinel in waited:
                 self.take_news(slot)
@@ -175,13 +180,13 @@ class Pool:
         elif isinstance(news, Begun):
             self.ledger.started(index, news.resumed)
         elif isinstance(news, TraceRow):
-            slot.doing = SOLVING
+            slot.phase = SOLVING
             self.ledger.advanced(index, news)
         elif isinstance(news, Ended):
             slot.last, slot.index = self.queue.done(index), None
             self.end(index, news.result)
         else:
-            slot.doing = news
+            slot.phase = news
             self.ledger.judging(index, news)
 
     def end(self, index: int, result: Result | None) -> None:
@@ -208,7 +213,7 @@ class Pool:
         cause = cause_of(slot.process.exitcode)
         if not slot.ready:
             self.failed_starts += 1
-            if self.failed_starts >= MOST_STARTS:
+            if self.failed_starts >= MAX_FAILED_STARTS:
                 raise NoWorkers(f"worker processes do not start: the last {cause}")
         index = slot.index
         if index is None:
@@ -217,10 +222,10 @@ class Pool:
         self.tries[index] += 1
         job = self.jobs[index]
         if slot.ended:
-            self.ledger.ended(index, stop_at_limit(job, f"{slot.why} (it was at: {slot.doing})"))
+            self.ledger.ended(index, stop_at_limit(job, f"{slot.stop_reason} (it was at: {slot.phase})"))
         elif self.tries[index] <= max(self.limits.retries, 1) and not self.halt():
             self.again(index, f"its process {cause}")
-        elif not slot.asked:
+        elif not slot.stop_requested:
             self.ledger.ended(index, give_up(job, f"the process of this run {cause}", again=True))
 
     def close(self) -> None:

@@ -8,8 +8,8 @@ from time import monotonic
 
 from symphys.runs.job import Job
 
-LOOK = 1.0
-"""[s] between two looks at a run that another command has claimed."""
+CLAIM_POLL_INTERVAL = 1.0
+"""[s] between two checks of a run that another command has claimed."""
 
 
 class Queue:
@@ -39,7 +39,7 @@ class Queue:
 
     def put_off(self, index: int) -> None:
         """Keep a run that another command has claimed, to look again whether it is over."""
-        self.claimed[index] = monotonic() + LOOK
+        self.claimed[index] = monotonic() + CLAIM_POLL_INTERVAL
 
     def take(self, last: Hashable = None) -> int | None:
         """Return the next run for a worker whose last subject was ``last``; None if there is none for the moment."""

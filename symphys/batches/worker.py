@@ -15,7 +15,7 @@ from symphys.runs.execute import Transcribe, TranscriptionCache, execute
 from symphys.runs.job import Job
 from symphys.solvers import TraceRow
 
-TICK = 0.1
+REPORT_INTERVAL = 0.1
 """[s] between two reported iterations."""
 
 
@@ -91,7 +91,7 @@ class Worker:
             if isinstance(order, Stopping):
                 raise KeyboardInterrupt(order.reason)
         now = time.monotonic()
-        if now - self.reported > TICK:
+        if now - self.reported > REPORT_INTERVAL:
             self.reported = now
             self.tell(row)
 

@@ -21,7 +21,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 REPORTS = Path("reports")
 INTERRUPTED = 130
 """The exit code after Ctrl-C: 128 + SIGINT."""
-MOST_MESSAGES = 100
+MAX_MESSAGES = 100
 """Most progress messages while a sweep is read."""
 settings_option = click.option(
     "--set",
@@ -161,8 +161,8 @@ def points_of(
 
     count = sum(len(sweep) for _, sweep in found if sweep is not None)
     seen = 0
-    shown = {f"point {k + 1:,} of {count:,}": 1.0 for k in range(0, count, max(count // MOST_MESSAGES, 1))}
-    with working("checking the sweep", shown) if count > MOST_MESSAGES else nullcontext(str) as tell:
+    shown = {f"point {k + 1:,} of {count:,}": 1.0 for k in range(0, count, max(count // MAX_MESSAGES, 1))}
+    with working("checking the sweep", shown) if count > MAX_MESSAGES else nullcontext(str) as tell:
         for problem, sweep in found:
             for point in [problem] if sweep is None else swept(problem, sweep):
                 yield point

@@ -41,7 +41,7 @@ def clear() -> int:
 
 
 def size(count: int) -> str:
-    """Bytes, in the unit that people read."""
+    """Write a number of bytes in a readable unit."""
     if count < 1000:
         return f"{count} bytes"
     return f"{count / 1e3:.0f} kB" if count < 1e6 else f"{count / 1e6:.1f} MB"

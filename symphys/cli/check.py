@@ -1,4 +1,4 @@
-"""``symphys check``: is the file valid, its gradient right, and how far do both reach?"""
+"""``symphys check``: validate a file, and examine gradient and motion at the guess."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from symphys.transcription import Transcription
 
 BUILDING, BUILDING_TAKES = "building the problem", 8.0
-"""The part before an examination, and about how long it takes relative to the examination's parts."""
+"""The part before an examination, and its time relative to the examination's parts."""
 
 
 @click.command()

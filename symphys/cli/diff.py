@@ -1,4 +1,4 @@
-"""``symphys diff``: what differs between two runs."""
+"""``symphys diff``: the differences between two runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from symphys.cli.run_tables import text
 @click.argument("first", metavar="RUN", type=click.Path(path_type=Path))
 @click.argument("second", metavar="RUN", type=click.Path(path_type=Path))
 def diff(first: Path, second: Path) -> None:
-    """Say what differs between two run folders.
+    """List the differences between two run folders.
 
     Settings, options, the problem's text, what was found, versions and machines. Times are left out.
     """

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from symphys.api.checking import IN_TABLES, WIDTH
+from symphys.api.checking import MAX_LINE_WIDTH, TABLE_SUBJECTS
 from symphys.api.checking import Examined as Examined
 from symphys.findings.advice import NO_SLOPE, VERDICTS, advice, answers, of_influence, slopes
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN
@@ -25,12 +25,12 @@ WORDS = {text: COLOURS[level] for words in (MARKS, VERDICTS) for level, text in 
 def print_examined(examined: Examined) -> None:
     """Print tables, findings and advice."""
     trust, judged = examined.trust, examined.judged
-    console = Console(width=None if sys.stdout.isatty() else WIDTH)
+    console = Console(width=None if sys.stdout.isatty() else MAX_LINE_WIDTH)
     if first := of_influence(trust):
         console.print(Text("\n" + printable(first, console)))
     print_table(console, *slopes(trust))
     print_table(console, *answers(trust, judged))
-    lines = [line for line in examined.findings if line.about not in IN_TABLES]
+    lines = [line for line in examined.findings if line.about not in TABLE_SUBJECTS]
     rows = [[line.what, line.number, MARKS[line.level], line.meaning] for line in lines]
     print_table(console, ["check", "value", "", "interpretation"], rows)
     for paragraph in (sliding(trust), advice(trust, judged)):

@@ -42,7 +42,7 @@ def identify(source: str, assignments: tuple[str, ...], threads: int | None, out
     from symphys.interrupts import Interrupts
     from symphys.prediction import identify as identified
     from symphys.report import write_identification_page
-    from symphys.results.case_name import case_name
+    from symphys.results.config import case_name
     from symphys.results.identification.summary import summary
 
     settings = read_settings(assignments)

@@ -47,7 +47,7 @@ def mpc(source: str, assignments: tuple[str, ...], threads: int, out: Path) -> i
     from symphys.interrupts import Interrupts
     from symphys.mpc import Controller, Plant, close_loop, write_closed_loop
     from symphys.report import write_closed_loop_page
-    from symphys.results.case_name import case_name
+    from symphys.results.config import case_name
 
     settings = read_settings(assignments)
     (problem,) = read_problems([source], settings)

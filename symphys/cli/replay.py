@@ -1,4 +1,4 @@
-"""``symphys replay``: does a run come out the same again?"""
+"""``symphys replay``: simulate a run again and compare bit for bit."""
 
 from __future__ import annotations
 

@@ -19,12 +19,13 @@ if TYPE_CHECKING:
     from symphys.report import WantedPages
     from symphys.report.making.batch import MadePages
 
-MOST_JOBS = 256
-MOST_PRINTED = 50
+MAX_JOBS = 256
+"""Largest number of processes."""
+MAX_PRINTED = 50
 """Number of pages up to which each is printed."""
 UNDRAWN = 3
 """The exit code where a page could not be made."""
-MOST_NAMED = 20
+MAX_NAMED = 20
 """Number of failed pages that are named."""
 
 pages_option = click.option(
@@ -44,7 +45,7 @@ pages_option = click.option(
 @click.option("--new", is_flag=True, hidden=True, help="Make only pages that are missing or out of date: the default.")
 @click.option(
     "--jobs",
-    type=click.IntRange(1, MOST_JOBS),
+    type=click.IntRange(1, MAX_JOBS),
     default=None,
     help="How many processes make pages.  [default: one for each processor]",
 )
@@ -71,7 +72,7 @@ def report(folder: Path, pages: str, remake: bool, new: bool, jobs: int | None) 
     if made.kept:
         click.echo(f"{several(made.kept, 'page')} of runs up to date; --all makes all again", err=True)
     printed = [page for page in made.runs if page != made.page]
-    if len(printed) > MOST_PRINTED:
+    if len(printed) > MAX_PRINTED:
         kind = ", light ones; --pages full makes full ones" if made.light else ""
         click.echo(f"{len(printed)} pages of runs{kind}")
         printed = []
@@ -95,10 +96,10 @@ def make_shown(wanted: WantedPages, kind: str, jobs: int, silent: bool = False, 
         again = shlex.join(["symphys", "report", str(wanted.root)])
         click.echo(f"symphys: {progress.over} of {progress.runs} pages were made; `{again}` makes the others", err=True)
         raise
-    for fault in made.faults[:MOST_NAMED]:
+    for fault in made.faults[:MAX_NAMED]:
         click.echo(f"symphys: {fault}", err=True)
-    if len(made.faults) > MOST_NAMED:
-        click.echo(f"symphys: {len(made.faults) - MOST_NAMED} more pages could not be made", err=True)
+    if len(made.faults) > MAX_NAMED:
+        click.echo(f"symphys: {len(made.faults) - MAX_NAMED} more pages could not be made", err=True)
     return made
 
 

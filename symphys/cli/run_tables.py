@@ -21,15 +21,18 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 SHOWN = ("run", "verdict", "objective", "worst", "OUTPUTS", "equivalents", "solve_seconds", "why")
 """Columns of a table on the terminal; OUTPUTS stands for outputs, if there are few."""
-MOST_OUTPUTS = 3
+MAX_OUTPUTS = 3
+"""Largest number of outputs that are columns."""
 GAP = "  "
-LONGEST_TEXT = 100
+MAX_TEXT = 100
 """Characters of the last column where the output is no terminal."""
-SHORTEST_TEXT = 20
-MOST_FAULTS = 10
+MIN_TEXT = 20
+"""Least characters of the last column."""
+MAX_FAULTS = 10
+"""Largest number of printed faults."""
 STYLES = {"solved": "green", "best_found": "yellow", "doubted": "red", "not_solved": "red", "unreadable": "red"}
 """Colours of verdicts on a terminal."""
-QUIET, EVERY = 1.0, 10.0
+QUIET_TIME, LINE_INTERVAL = 1.0, 10.0
 """[s] before progress is shown, and between lines where the output is no terminal."""
 
 
@@ -93,7 +96,7 @@ def usual_columns(rows: Sequence[Row]) -> list[str]:
     from symphys.results.table.columns import OUTPUT, columns
 
     outputs = [name for name in columns(rows) if name.startswith(OUTPUT)]
-    few = outputs if len(outputs) <= MOST_OUTPUTS else []
+    few = outputs if len(outputs) <= MAX_OUTPUTS else []
     names = [each for name in SHOWN for each in (few if name == "OUTPUTS" else [name])]
     return [name for name in names if any(name in row for row in rows)]
 
@@ -114,8 +117,8 @@ def lines(rows: Sequence[Row], names: Sequence[str]) -> Iterator[str]:
 def room(taken: int) -> int:
     """Return the width of the last column."""
     if not sys.stdout.isatty():
-        return LONGEST_TEXT
-    return max(shutil.get_terminal_size().columns - taken, SHORTEST_TEXT)
+        return MAX_TEXT
+    return max(shutil.get_terminal_size().columns - taken, MIN_TEXT)
 
 
 def text(value: object) -> str:
@@ -152,10 +155,10 @@ def summary(rows: Sequence[Row]) -> str:
 def print_faults(found: Rows) -> None:
     """Print on stderr which files and folders could not be read."""
     faults = [*found.faults, *(f"{row['run']}: {row['fault']}" for row in found.rows if row.get("fault"))]
-    for fault in faults[:MOST_FAULTS]:
+    for fault in faults[:MAX_FAULTS]:
         click.echo(f"symphys: {files.printable(text(fault))}", err=True)
-    if len(faults) > MOST_FAULTS:
-        click.echo(f"symphys: and {len(faults) - MOST_FAULTS} more; --columns run,fault lists them", err=True)
+    if len(faults) > MAX_FAULTS:
+        click.echo(f"symphys: and {len(faults) - MAX_FAULTS} more; --columns run,fault lists them", err=True)
 
 
 class ReadingProgress:
@@ -171,7 +174,7 @@ class ReadingProgress:
         if done % 50 and done < total:
             return
         now, terminal = time.monotonic(), sys.stderr.isatty()
-        if now - self.began < QUIET or (now - self.said < EVERY and not terminal):
+        if now - self.began < QUIET_TIME or (now - self.said < LINE_INTERVAL and not terminal):
             return
         self.said, self.shown = now, terminal
         click.echo(f"{chr(13) * terminal}reading run folders: {done:,} of {total:,}", nl=not terminal, err=True)

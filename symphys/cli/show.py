@@ -1,4 +1,4 @@
-"""``symphys show``: look at a problem's guess."""
+"""``symphys show``: draw a problem's guess."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def show(
 
 
 def tell_losses(path: Path, include: Mapping[str, Any]) -> None:
-    """Say how much of a model was approximated or left out."""
+    """Report how much of a model was approximated or left out."""
     from symphys.api.robot import load_robot
 
     found = [finding.kind for finding in load_robot(path, **include).findings]

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 """[s] of each unit."""
-MOST_RETRIES, MOST_SEEDS, MOST_JOBS = 1000, 10_000, 256
+MAX_RETRIES, MAX_SEEDS, MAX_JOBS = 1000, 10_000, 256
 MIN_PAGE_TIMEOUT = 60.0
 """[s] Least timeout of a page where runs have a timeout."""
 
@@ -74,7 +74,7 @@ def read_time(_context: click.Context | None, option: click.Parameter, text: str
 )
 @click.option(
     "--seeds",
-    type=click.IntRange(1, MOST_SEEDS),
+    type=click.IntRange(1, MAX_SEEDS),
     default=1,
     show_default=True,
     help="How many seeds; seed 0 starts from the guess as it is, the others from one perturbed by its spread.",
@@ -91,7 +91,7 @@ def read_time(_context: click.Context | None, option: click.Parameter, text: str
 @sweep_options
 @click.option(
     "--jobs",
-    type=click.IntRange(1, MOST_JOBS),
+    type=click.IntRange(1, MAX_JOBS),
     default=1,
     show_default=True,
     help="How many runs go on at once; with --on, how many drivers.",
@@ -116,7 +116,7 @@ def read_time(_context: click.Context | None, option: click.Parameter, text: str
 @out_option
 @click.option(
     "--retries",
-    type=click.IntRange(0, MOST_RETRIES),
+    type=click.IntRange(0, MAX_RETRIES),
     default=0,
     show_default=True,
     help="How often a run that fails is tried again; one whose process dies is so once in any case.",

@@ -29,11 +29,11 @@ MIN_WIDTH = 120
 NUMBERS = ("solved", "objective", "worst", "iterations", "work", "seconds", "ended")
 OPTIONAL = ("work", "iterations", "seconds", "objective", "ended")
 """Columns that are left out on narrow terminals, in this order; no number is cut."""
-MOST_ROWS = 30
+MAX_ROWS = 30
 """Rows of the table; if there are more, the best and the worst are shown."""
-MOST_ADVICE = 10
+MAX_ADVICE = 10
 """Lines of advice below a table of the best and the worst."""
-MOST_MISSED = 3
+MAX_MISSED = 3
 """Missed checks of a run that are named."""
 
 
@@ -57,10 +57,10 @@ def print_summary(jobs: list[Job], batch: BatchResult) -> None:
 
 def best_and_worst(groups: Groups) -> Groups:
     """Return all groups, or, if they do not fit into a table, the best and the worst ones, sorted."""
-    if len(groups) <= MOST_ROWS:
+    if len(groups) <= MAX_ROWS:
         return groups
     ranked = sorted(groups, key=lambda name: rank(groups[name]))
-    half = MOST_ROWS // 2
+    half = MAX_ROWS // 2
     return {name: groups[name] for name in (*ranked[:half], *ranked[-half:])}
 
 
@@ -164,8 +164,8 @@ def advice_together(groups: Groups) -> list[str]:
         f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {line}"
         for line, names in sorted(examples.items(), key=lambda item: -len(item[1]))
     ]
-    more = [f"and {len(lines) - MOST_ADVICE} more such lines"] if len(lines) > MOST_ADVICE else []
-    return lines[:MOST_ADVICE] + more
+    more = [f"and {len(lines) - MAX_ADVICE} more such lines"] if len(lines) > MAX_ADVICE else []
+    return lines[:MAX_ADVICE] + more
 
 
 def held_back(group: list[Result]) -> list[str]:
@@ -202,5 +202,5 @@ def missed(result: Result) -> str:
         f'"{each.name}" by {measured(each.error, each.unit)} (tolerance {measured(each.tolerance, each.unit)})'
         for each in found
     ]
-    more = f" and {len(found) - MOST_MISSED} more" if len(found) > MOST_MISSED else ""
-    return f"missed: {', '.join(named[:MOST_MISSED])}{more}"
+    more = f" and {len(found) - MAX_MISSED} more" if len(found) > MAX_MISSED else ""
+    return f"missed: {', '.join(named[:MAX_MISSED])}{more}"

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from symphys.solvers.core.budget import BudgetUse
 
 MANY_PAIRS = 50
+"""Pairs of surfaces above which a warning is printed."""
 SECONDS_PER_PAIR = 0.3
 """[s] to build a problem, for each pair of surfaces; measured with heaps of 8 and 16 spheres."""
 LAST_LINES = 5

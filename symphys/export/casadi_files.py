@@ -10,8 +10,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.export import words
-from symphys.export.slopes import slopes_function
-from symphys.export.sources import dense_step, tangent_of
+from symphys.export.sources import dense_step, slopes_function, tangent_of
 from symphys.transcription import Transcription
 
 RESULTS = {

@@ -9,14 +9,14 @@ from pathlib import Path
 from symphys import files
 from symphys.errors import SymphysError
 
-LIST = "symphys-export.json"
+LIST_FILE = "symphys-export.json"
 """Name of the file in each folder that lists the exported files with their SHA-256 sums."""
 
 Files = Mapping[str, bytes]
 
 
 class ExportError(SymphysError):
-    """A problem that cannot be exported, or a file in the way."""
+    """Raised for a problem that cannot be exported, or a file in the way."""
 
 
 def write_folders(folders: Mapping[Path, Files]) -> list[Path]:
@@ -38,15 +38,15 @@ def write_folders(folders: Mapping[Path, Files]) -> list[Path]:
         new = {name: [_sum(content)] for name, content in contents.items()}
         # both while files are replaced, so that an interrupted export can be done again
         both = {name: [*known.get(name, ()), *sums] for name, sums in new.items()}
-        files.write_json(folder / LIST, {"files": known | both})
+        files.write_json(folder / LIST_FILE, {"files": known | both})
         for name, content in contents.items():
             files.write_bytes(folder / name, content)
-        files.write_json(folder / LIST, {"files": known | new})
+        files.write_json(folder / LIST_FILE, {"files": known | new})
     return [folder / name for folder, contents in folders.items() for name in contents]
 
 
 def _known(folder: Path) -> dict[str, list[str]]:
-    path = folder / LIST
+    path = folder / LIST_FILE
     if not path.exists():
         return {}
     content = files.read_json(path)

@@ -15,7 +15,7 @@ For other parts MuJoCo has different laws:
   its torque. The nearest actuator is a position actuator with kp = gain kv and the same bound of force. It drives at
   gain (command - angle), without a bound on velocity, and needs a velocity error of torque / kv for its full torque, so
   that it sags under load. kv is 100 torque / velocity, or the largest at which the time step is stable
-  (``mjcf_actuation``).
+  (``steepness``).
 - A velocity motor becomes a velocity actuator with the same kv.
 - The time step is cut into parts where motors, springs or compliant contacts need it.
 - A compliant contact has the same frequency and damping ratio, with MuJoCo's estimate of the mass behind it.
@@ -29,8 +29,12 @@ model; commands are its ctrl, 0 at the start.
 
 from __future__ import annotations
 
+import json
+import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import inf
 from types import MappingProxyType
 from typing import Any
 from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
@@ -39,20 +43,290 @@ import casadi as ca
 import numpy as np
 
 from symphys.dynamics.motion import inertia_matrix
-from symphys.export.mjcf_actuation import actuators, inertias, parts
-from symphys.export.mjcf_bodies import NestedBody, StartState, nested_bodies, relative
+from symphys.dynamics.observation import named_sensors
+from symphys.export.mjcf_bodies import NestedBody, StartState, links_of, nested_bodies, relative
 from symphys.export.mjcf_departures import Departure, departures, require_expressible, shorter_step
-from symphys.export.mjcf_equality import equalities
-from symphys.export.mjcf_joints import freedoms
-from symphys.export.mjcf_sensors import sensor_elements, site_elements
-from symphys.export.mjcf_surfaces import APART, FRICTION_RATIO, geoms, meshes, pairs, text
-from symphys.export.mjcf_terrain import height_field, middle
+from symphys.export.mjcf_joints import equalities, freedoms, names
+from symphys.export.mjcf_surfaces import FRICTION_RATIO, PAIRS_ONLY, geoms, height_field, meshes, middle, pairs, text
 from symphys.model.body import Body
+from symphys.model.joints import AffineMotor, Joint, Motor, Servo, TorqueMotor, VelocityMotor, kinematic_trees
+from symphys.model.scalar import is_zero
 from symphys.model.shapes import Terrain
 from symphys.model.site import Site
 from symphys.model.world import World
 from symphys.problem import Problem
 from symphys.problem.feedback import Sensor
+from symphys.types import Array
+
+NUMBERS = r"(\[[^\[\]]*\])"
+AT_A_POINT = {
+    "framepos": re.compile(rf"(\w+)\.position \+ rotate\(\1\.orientation, {NUMBERS}\)"),
+    "framelinvel": re.compile(
+        rf"(\w+)\.velocity \+ cross\(\1\.angular_velocity, rotate\(\1\.orientation, {NUMBERS}\)\)"
+    ),
+}
+"""Formulas of a point (3,) in a body's frame."""
+ROTATED = re.compile(rf"rotate\({NUMBERS}, ([\w.]+)\)")
+"""Formula of a vector in the axes to which the quaternion rotates those of the vector."""
+SITE_TOLERANCE = 1e-9
+"""Distance [m], or of quaternions, below which two sites are one."""
+
+
+@dataclass
+class SensorElements:
+    """Sensors and sites of a model.
+
+    Attributes:
+        elements: of the sensors.
+        sites: additional ones that sensors need.
+        left_out: names of sensors without counterpart.
+    """
+
+    elements: list[Element] = field(default_factory=list)
+    sites: list[Site] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+
+def sensor_elements(world: World, sensors: Sequence[Sensor]) -> SensorElements:
+    """Return all sensors with a counterpart; those of several formulas become several, with numbers."""
+    found = SensorElements()
+    for sensor in sensors:
+        for k, formula in enumerate(sensor.formulas):
+            name = sensor.name if len(sensor.formulas) == 1 else f"{sensor.name}_{k}"
+            element = reading(world, name, formula.text.strip(), found.sites)
+            if element is None:
+                found.left_out.append(name)
+            else:
+                found.elements.append(element)
+    return found
+
+
+def reading(world: World, name: str, formula: str, sites: list[Site]) -> Element | None:
+    """Return the sensor of a formula that is one name; None without one. Adds the site that it needs to ``sites``."""
+    if formula == "time":
+        return Element("clock", name=name)
+    geared = {
+        f"{joint.name}.torque / {joint.motor.gear}": joint.name
+        for joint in world.joints
+        if isinstance(joint.motor, AffineMotor) and len(joint.kind.coordinates) == 1
+    }
+    if formula in geared:
+        return Element("actuatorfrc", name=name, actuator=geared[formula])
+    bodies = {body.name: k for k, body in enumerate(world.bodies) if not body.massless}
+    for kind, pattern in AT_A_POINT.items():
+        if (found := pattern.fullmatch(formula)) and found[1] in bodies:
+            site = site_at(world, sites, bodies[found[1]], position=json.loads(found[2]))
+            return Element(kind, name=name, objtype="site", objname=site.name)
+    turned = ROTATED.fullmatch(formula)
+    return same_reading(world, name, turned[2] if turned else formula, turned[1] if turned else None, sites)
+
+
+def same_reading(world: World, name: str, sensed: str, turn: str | None, sites: list[Site]) -> Element | None:
+    """Return MuJoCo's counterpart of a sensor, after ``turn`` (4,) as text; None without one."""
+    sensor = named_sensors(world).get(sensed)
+    if sensor is None or sensor.kind.mjcf is None:
+        return None
+    word, at, owner = sensor.kind.mjcf.word, sensor.kind.mjcf.at, sensor.owner
+    if at in ("axes", "frame"):
+        mount = mount_of(world, owner)
+        if mount is None:
+            return None
+        w, x, y, z = json.loads(turn or "[1, 0, 0, 0]")
+        place = mount[1] if at == "frame" else None
+        return Element(word, name=name, site=site_at(world, sites, mount[0], place, (w, -x, -y, -z)).name)
+    if turn is not None or (isinstance(owner, Body) and owner.massless):
+        return None
+    if at == "joint":
+        return Element(word, name=name, joint=owner.name) if len(owner.kind.coordinates) == 1 else None
+    return Element(word, name=name, objtype=at, objname=owner.name)
+
+
+def mount_of(world: World, owner: Any) -> tuple[int, Sequence[float]] | None:
+    """Return the body whose axes a sensor has, and the sensor's point (3,) on it; None where MuJoCo has none.
+
+    A joint's is the body that hangs on it: MuJoCo reads what a body's parent exerts on it.
+    """
+    if isinstance(owner, Joint):
+        hanging = {link.joint for tree in kinematic_trees(world.joints) for link in tree.links if link.sign > 0}
+        if [joint.name for joint in world.joints].index(owner.name) not in hanging:
+            return None
+        body, point = owner.first, owner.frames[0].point
+    else:
+        body, point = [each.name for each in world.bodies].index(owner.name), (0.0, 0.0, 0.0)
+    return None if world.bodies[body].massless else (body, point)
+
+
+def site_at(
+    world: World,
+    sites: list[Site],
+    body: int,
+    position: Sequence[float] | None = None,
+    orientation: Sequence[float] | None = None,
+) -> Site:
+    """Return a site of a body at a position and orientation, of which either may be None: any.
+
+    It is made and put into ``sites`` where there is none.
+    """
+    for site in (*world.sites, *sites):
+        near = position is None or np.allclose(np.array(site.position, float), position, atol=SITE_TOLERANCE)
+        alike = orientation is None or abs(np.dot(np.array(site.orientation, float), orientation)) > 1 - SITE_TOLERANCE
+        if site.body == body and near and alike:
+            return site
+    name = f"{world.bodies[body].name}_sensor{len(sites) or ''}"
+    sites.append(Site(name, body, position or (0.0, 0.0, 0.0), orientation or (1.0, 0.0, 0.0, 0.0)))
+    return sites[-1]
+
+
+def site_elements(sites: Sequence[Site], body: int | None) -> list[Element]:
+    """Return the sites of a body in its frame; those of the world for None."""
+    return [
+        Element("site", name=site.name, pos=text(site.position), quat=text(site.orientation))
+        for site in sites
+        if site.body == body
+    ]
+
+
+Inertias = Mapping[tuple[str, int], float]
+"""The inertia of each coordinate of the trees [kg m^2] or [kg], by the joint's name and the number there."""
+WANTED_SPEED_ERROR, MAX_SPEED_ERROR = 0.01, 0.1
+"""Velocity error at full torque, as a share of a motor's largest velocity: desired, and allowed."""
+MAX_STEP_PHASE, MAX_STEP_PHASE_CONTACT = 1.0, 0.125
+"""Largest h omega of a spring, and of a compliant contact: the damping of several adds up."""
+MAX_PARTS = 50
+"""Largest number of parts of a time step."""
+UNBOUNDED = 1e10
+"""Bound of a force or a command where one of two is missing, in the unit of either."""
+
+
+def parts(start: StartState, found: Inertias, dt: float) -> int:
+    """Return the number of parts into which a step of ``dt`` [s] is cut."""
+    longest = min(_longest(start, found), default=inf)
+    return max(1, min(MAX_PARTS, math.ceil(dt / longest - 1e-9))) if longest > 0 else MAX_PARTS
+
+
+def steepness(motor: Servo | VelocityMotor, inertia: float, step: float) -> float:
+    """Return kv on a coordinate of this inertia [N m s/rad] or [N s/m], at a time step [s].
+
+    MuJoCo takes the forces of motors at their bounds as they are at the beginning of a step. All of a motor's torque T
+    over a step h changes the rate of a coordinate of inertia I by T h / I. Where that is more than twice the speed
+    error at which the motor leaves its bound, T / kv, it oscillates between its bounds. So kv is at most 2 I / h, and
+    the step is cut into parts until the motor gives all of its torque at a speed error of at most a tenth of its
+    largest velocity. I is the inertia at the start while all other coordinates are free: 1 / (M^-1) of the trees' mass
+    matrix M.
+    """
+    return float(min(motor.torque / (WANTED_SPEED_ERROR * motor.velocity), 2 * inertia / step))
+
+
+def inertias(start: StartState) -> Inertias:
+    """Compute the inertia of each coordinate at the start while all others are free."""
+    world, links = start.world, links_of(start.world)
+    columns: list[Array] = []
+    """Twists (6,) of the coordinates at the world's origin: velocity and angular velocity at a rate of 1."""
+    owners: dict[int, tuple[str, int]] = {}
+    above: dict[int | None, frozenset[int]] = {None: frozenset()}
+    for link in links:
+        held = above[link.parent]
+        for name, number, twist in _freedoms(start, link.joint, link.body):
+            if name:
+                owners[len(columns)] = name, number
+            held |= {len(columns)}
+            columns.append(twist)
+        above[link.body] = held
+    mass = np.diag([_armature(world.joints, owners.get(k)) for k in range(len(columns))])
+    for link in links:
+        body, moving = world.bodies[link.body], sorted(above[link.body])
+        if moving and not body.massless:
+            centre = start.of(link.body, "position")
+            turning = np.array([columns[k][3:] for k in moving]).T
+            shifting = np.array([columns[k][:3] + np.cross(columns[k][3:], centre) for k in moving]).T
+            axes = start.axes(link.body)
+            tensor = axes @ np.array(ca.DM(inertia_matrix(body.inertia))) @ axes.T
+            mass[np.ix_(moving, moving)] += body.mass * shifting.T @ shifting + turning.T @ tensor @ turning
+    give = np.diag(np.linalg.pinv(mass, hermitian=True)) if columns else np.zeros(0)
+    return {owner: 1 / max(float(give[k]), 1e-300) for k, owner in owners.items()}
+
+
+def _freedoms(start: StartState, joint: int | None, body: int) -> Iterator[tuple[str, int, Array]]:
+    """Yield name, number and twist (6,) at the world's origin of each coordinate; free motions have no name."""
+    if joint is None:
+        yield from (("", k, row) for k, row in enumerate(np.eye(6)))
+        return
+    made = start.world.joints[joint]
+    side, frame = made.bodies[0], made.frames[0]
+    point = start.of(side, "position") + start.axes(side) @ np.array(frame.point, float)
+    if made.kind.name == "ball":
+        yield from (("", k, np.concatenate([np.cross(point, row), row])) for k, row in enumerate(np.eye(3)))
+        return
+    for number, (slide, turn) in enumerate(start.motions(made)):
+        yield made.name, number, np.concatenate([slide + np.cross(point, turn), turn])
+
+
+def _armature(joints: tuple[Joint, ...], owner: tuple[str, int] | None) -> float:
+    """Return the armature of a coordinate's joint [kg m^2] or [kg]."""
+    return next((float(joint.armature) for joint in joints if owner and joint.name == owner[0]), 0.0)
+
+
+def _longest(start: StartState, found: Inertias) -> Iterator[float]:
+    """Yield the longest stable step of each motor, spring and compliant contact [s]."""
+    joints = {joint.name: joint for joint in start.world.joints}
+    for (name, _), inertia in found.items():
+        motor, stiffness = joints[name].motor, _stiffness(joints[name])
+        if isinstance(motor, Servo | VelocityMotor):
+            yield 2 * MAX_SPEED_ERROR * motor.velocity * inertia / motor.torque
+        if stiffness > 0:
+            yield MAX_STEP_PHASE * math.sqrt(inertia / stiffness)
+    for pair in start.world.pairs:
+        if pair.law.soft:
+            yield MAX_STEP_PHASE_CONTACT / (2 * math.pi * float(pair.law.frequency) * max(1.0, float(pair.law.damping)))
+
+
+def _stiffness(joint: Joint) -> float:
+    """Return the stiffness of a joint's spring and affine motor along each coordinate [N m/rad] or [N/m]."""
+    spring = 0.0 if joint.spring is None else float(joint.spring.stiffness)
+    motor = joint.motor
+    return spring + (float(motor.kp) * float(motor.gear) ** 2 if isinstance(motor, AffineMotor) else 0.0)
+
+
+def actuators(joint: Joint, inertias: Inertias, step: float) -> list[Element]:
+    """Write an actuator for each coordinate of a joint with a motor, for a time step [s]."""
+    if joint.motor is None:
+        return []
+    found = []
+    for number, name in enumerate(names(joint)):
+        kind, attributes = actuator(joint.motor, inertias.get((joint.name, number), inf), step)
+        found.append(Element(kind, {"name": name, "joint": name, **attributes}))
+    return found
+
+
+def actuator(motor: Motor, inertia: float, step: float) -> tuple[str, dict[str, str]]:
+    """Return the kind and the attributes of the nearest actuator for a motor on a coordinate of this inertia."""
+    if isinstance(motor, AffineMotor):
+        return affine(motor)
+    bound = text((-motor.torque, motor.torque))
+    if isinstance(motor, TorqueMotor):
+        return "motor", {"ctrlrange": bound}
+    kv = steepness(motor, inertia, step)
+    attributes = {"kv": text([kv]), "forcerange": bound}
+    if isinstance(motor, Servo):
+        held = {} if motor.range is None else {"ctrlrange": text((-motor.range, motor.range))}
+        return "position", {"kp": text([kv * motor.gain]), **attributes, **held}
+    return "velocity", {**attributes, "ctrlrange": text((-motor.velocity, motor.velocity))}
+
+
+def affine(motor: AffineMotor) -> tuple[str, dict[str, str]]:
+    """Return the exact actuator: "motor" if the force is the command, "general" otherwise."""
+    ranges = {"ctrlrange": motor.command_range, "forcerange": motor.force_range}
+    found = {"gear": text([motor.gear])}
+    found |= {key: text(bounded(ends)) for key, ends in ranges.items() if ends is not None and ends != (-inf, inf)}
+    if motor.passive and is_zero(motor.offset) and is_zero(motor.gain - 1):
+        return "motor", found
+    bias = text([motor.offset, -motor.kp, -motor.kv])
+    return "general", {**found, "gainprm": text([motor.gain]), "biastype": "affine", "biasprm": bias}
+
+
+def bounded(ends: tuple[float, float]) -> tuple[float, float]:
+    """Replace infinite bounds by numbers that MuJoCo takes."""
+    return max(ends[0], -UNBOUNDED), min(ends[1], UNBOUNDED)
 
 
 @dataclass(frozen=True)
@@ -160,7 +434,7 @@ def one_line(words: str) -> str:
 def ground(start: StartState, terrain: Terrain) -> Element:
     """Write the geom of a height field."""
     place = {"pos": text(middle(start, terrain))}
-    return Element("geom", {"name": terrain.name, "type": "hfield", "hfield": terrain.name, **place, **APART})
+    return Element("geom", {"name": terrain.name, "type": "hfield", "hfield": terrain.name, **place, **PAIRS_ONLY})
 
 
 class Keyframe:

@@ -22,15 +22,15 @@ from symphys.model.world import World
 from symphys.problem.joint_tables import placed_joint, whole_state
 from symphys.types import Array
 
-APART = 1e-5
+MAX_JOINT_GAP = 1e-5
 """Largest gap between the frames of a joint [m], [rad]."""
-RESIDUE = 1e-15
+ROUNDING = 1e-15
 """Largest rounding error, of lengths [m] or of components of unit vectors."""
 
 
 @dataclass(frozen=True)
 class StartState:
-    """A world in a state: at the start, or as the file of its model has it.
+    """A world in a state: at the start, or at the reference pose of its model file.
 
     Attributes:
         world: a world of numbers, without symbols.
@@ -77,7 +77,7 @@ class StartState:
         """The poses that the file has: all coordinates 0, or the start if that would open a loop."""
         world, state = self.world, whole_state(self.world, self.initial)
         zero = StartState(world, moved_to_zero([placed_joint(world, joint, state) for joint in world.joints], state))
-        closed = all(zero.gap(joint) <= APART for joint in world.joints if not joint.soft)
+        closed = all(zero.gap(joint) <= MAX_JOINT_GAP for joint in world.joints if not joint.soft)
         return zero if closed else self
 
     def motions(self, joint: Joint) -> list[tuple[Array, Array]]:
@@ -89,7 +89,7 @@ class StartState:
 
 def tidy(numbers: Array) -> Array:
     """Replace rounding errors by 0."""
-    return np.where(np.abs(numbers) < RESIDUE, 0.0, numbers)
+    return np.where(np.abs(numbers) < ROUNDING, 0.0, numbers)
 
 
 def plain(expression: Any) -> Array:

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 from symphys.export.folder import ExportError
-from symphys.export.mjcf_bodies import APART, StartState, loose_frames, nesting_joints
-from symphys.export.mjcf_equality import expressible_loop
-from symphys.export.mjcf_joints import joint_equalities
-from symphys.export.mjcf_surfaces import normal_of
-from symphys.export.mjcf_terrain import deviation, window
+from symphys.export.mjcf_bodies import MAX_JOINT_GAP, StartState, loose_frames, nesting_joints
+from symphys.export.mjcf_joints import expressible_loop, joint_equalities
+from symphys.export.mjcf_surfaces import deviation, normal_of, window
 from symphys.model.heightfield import Heightfield
 from symphys.model.joints import Servo, VelocityMotor
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Terrain
 
-LISTED = 5
+MAX_LISTED = 5
 """Largest number of names in a message."""
 Kind = Literal["approximated", "left out", "refused", "measured"]
 
@@ -30,7 +28,7 @@ class Departure:
         kind: ``approximated`` by the nearest element; ``left out``, which is refused unless approximations are allowed;
             ``refused``; ``measured`` by a trial.
         what: names of joints, contacts, surfaces or sensors.
-        how: what is written instead, or a remedy.
+        how: the replacement, or a remedy.
     """
 
     kind: Kind
@@ -44,8 +42,8 @@ class Departure:
 
 def listed(names: Sequence[str]) -> str:
     """Join the first few names."""
-    more = len(names) - LISTED
-    return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MAX_LISTED
+    return ", ".join(names[:MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def require_expressible(departures: Iterable[Departure], name: str, approximate: bool) -> None:
@@ -83,7 +81,7 @@ def shorter_step(dt: float, count: int) -> Iterator[Departure]:
 def joint_departures(start: StartState) -> Iterator[Departure]:
     """Yield the departures of joints and motors."""
     world, trees = start.world, nesting_joints(start.world)
-    apart = [world.joints[k].name for k in sorted(trees) if start.gap(world.joints[k]) > APART]
+    apart = [world.joints[k].name for k in sorted(trees) if start.gap(world.joints[k]) > MAX_JOINT_GAP]
     text = "a joint that does not fit its bodies at the start; move them until its frames meet"
     yield Departure("refused", tuple(apart), text)
     frames = tuple(world.bodies[k].name for k in loose_frames(world))

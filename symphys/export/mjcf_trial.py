@@ -18,9 +18,9 @@ from symphys.problem import Problem
 from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription import transcribe
 
-SECONDS = 1.0
+MAX_DURATION = 1.0
 """Largest duration of the comparison [s]."""
-MOST_WORK = 20_000
+MAX_WORK = 20_000
 """Largest product of bodies and steps. Of larger models, which take minutes here, only MuJoCo's motion is checked."""
 
 
@@ -69,9 +69,9 @@ def trial(problem: Problem, text: str) -> Departure:
     import mujoco
 
     work = len(problem.world().bodies) * problem.simulation.steps
-    motion = own_motion(problem) if work <= MOST_WORK else None
+    motion = own_motion(problem) if work <= MAX_WORK else None
     replayed = MujocoReplay(mujoco, problem.world(), text, motion)
-    seconds, dt = min(SECONDS, problem.simulation.duration), problem.simulation.dt
+    seconds, dt = min(MAX_DURATION, problem.simulation.duration), problem.simulation.dt
     place, turn = (0.0, ""), (0.0, "")
     for k in range(round(seconds / dt)):
         replayed.advance(k, dt)

@@ -29,7 +29,7 @@ def export_problem(
     """Write a problem as files that other programs use without symphys.
 
     Args:
-        problem: what ``symphys.load`` takes.
+        problem: any argument of ``symphys.load``.
         c: folder for C sources: step, rollout and gradient.
         casadi: folder for functions that plain casadi loads.
         mjcf: folder for a model file of MuJoCo: bodies, joints, the start.

@@ -1,4 +1,4 @@
-"""The numbers of identification: fits of recordings, and what one may believe of them; no physics.
+"""Identification: fits of recordings and their uncertainty, without physics.
 
 ``interface`` has the problem, ``identify`` the way through.
 """

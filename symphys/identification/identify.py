@@ -1,4 +1,4 @@
-"""From recorded residuals to an Identification: fit, uncertainty, bootstrap, residual analysis, and why to doubt it."""
+"""From recorded residuals to an Identification: fit, uncertainty, bootstrap, residual analysis, doubts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from symphys.suggest import hint
 from symphys.types import Array, Ints
 
 STARTS = ("guess", "before impact", "whole")
-"""Where own numbers of recordings that are held back come from."""
+"""Sources of the own numbers of recordings that are held back."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class IdentificationOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """IdentificationError names the option and what would be valid."""
+        """Raise IdentificationError, which names the option and what would be valid."""
         if self.held_back_starts not in STARTS:
             raise IdentificationError(
                 f"held_back_starts is {self.held_back_starts!r}: {hint(self.held_back_starts, STARTS)}"
@@ -70,7 +70,7 @@ class Clock:
 
     @contextmanager
     def of(self, part: str) -> Iterator[None]:
-        """Count the block."""
+        """Add the time of the block to a part."""
         began = time.perf_counter()
         yield
         self.seconds[part] = self.seconds.get(part, 0.0) + time.perf_counter() - began
@@ -196,7 +196,7 @@ def arrays(
 def resampled(
     fitted: FittedRecordings, which: Ints, options: IdentificationOptions, stop: Callable[[], bool] | None
 ) -> Bootstrap:
-    """Return the bootstrap, with some draws fitted in full where that is asked for."""
+    """Return the bootstrap, with some draws fitted in full if requested."""
     problem, outcome, known = fitted.problem, fitted.outcome, fitted.uncertainty
     assert known is not None
     state = outcome.state
@@ -212,15 +212,15 @@ def resampled(
 
 
 DOUBTED_RATIO = 1.5
-"""Ratio of residuals to a given noise, or of both intervals, above which those of the Jacobian are doubted."""
+"""Ratio of residuals to a given noise, or of both intervals, above which the Jacobian's are doubted."""
 DOUBTED_DIFFERENCE = 0.5
-"""Difference of a refitted draw from its step, in standard deviations of the draws, above which steps are doubted."""
+"""Difference of a refitted draw from its step, in standard deviations, above which steps are doubted."""
 
 
 def estimates(
     problem: RecordedResiduals, outcome: FitOutcome, known: Uncertainty, drawn: Bootstrap
 ) -> tuple[ParameterEstimate, ...]:
-    """Return the shared numbers with both intervals; at a kink that of the Jacobian reaches to that of its side."""
+    """Return the shared numbers with both intervals; at a kink the Jacobian's interval reaches to that of its side."""
     parameters, shared = problem.shared, outcome.state.shared
     away = outcome.one_sided if outcome.one_sided.size else np.zeros(len(shared))
     interval = known.interval(shared) + np.stack([np.minimum(away, 0), np.maximum(away, 0)], axis=1)
@@ -285,6 +285,6 @@ def doubts(
 
 
 def bootstrap_share(each: ParameterEstimate) -> float:
-    """Return the bootstrap's interval by that of the Jacobian; nan where either is not known."""
+    """Return the ratio of the bootstrap's interval to the Jacobian's; nan where either is unknown."""
     width = each.upper - each.lower
     return (each.bootstrap_upper - each.bootstrap_lower) / width if width > 0 else np.nan

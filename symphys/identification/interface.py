@@ -1,4 +1,4 @@
-"""What identification needs of a problem: residuals of recordings as functions of shared and own numbers.
+"""The problem of identification: residuals of recordings as functions of shared and own numbers.
 
 K recordings have s shared numbers together (friction, a mass) and o own numbers each (a start, a time offset). The
 Jacobian of all residuals then is an arrow: a recording's residuals depend on the shared numbers and on its own alone.
@@ -16,11 +16,11 @@ from symphys.errors import SymphysError
 from symphys.types import Array, Bools, Ints
 
 Rows = list[tuple[Array, Array, Array]]
-"""Of each recording: (m,) residuals, (m, s) and (m, o) their derivatives by the shared and by the own numbers."""
+"""For each recording (m,) residuals, (m, s) and (m, o) their derivatives by the shared and the own numbers."""
 
 
 class IdentificationError(SymphysError):
-    """Recordings or options from which nothing can be identified; names what is wrong and what would be valid."""
+    """Raised for recordings or options that allow no identification; names fault and valid values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class FitParameters:
         names: (n,) as reports show them.
         guess, lower, upper: where the fit starts, and between which bounds it stays; -inf and inf are none.
         scale: by how much each changes sensibly; above 0.
-        prior_mean, prior_deviation: what is known beforehand, with its standard deviation; a deviation of inf is none.
+        prior_mean, prior_deviation: prior mean and standard deviation; inf: no prior.
         quantities: (n,) what each sets, ``cube.mass``; advice depends on the last word. Empty: the names.
         units: (n,) as reports show them; empty: none.
     """
@@ -47,7 +47,7 @@ class FitParameters:
     units: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """IdentificationError names the first number that cannot be fitted."""
+        """Raise IdentificationError, which names the first number that cannot be fitted."""
         for each in ("lower", "upper", "scale", "prior_mean", "prior_deviation"):
             if getattr(self, each).shape != self.guess.shape:
                 raise IdentificationError(f"{each} has the shape {getattr(self, each).shape}, not {self.guess.shape}")
@@ -65,7 +65,7 @@ class FitParameters:
 
     @property
     def sets(self) -> tuple[str, ...]:
-        """Return (n,) what each number sets."""
+        """Return (n,) the quantity that each number sets."""
         return self.quantities or self.names
 
 
@@ -80,7 +80,7 @@ def fit_parameters(
     quantities: Sequence[str] = (),
     units: Sequence[str] = (),
 ) -> FitParameters:
-    """Parameters from whatever broadcasts to the guess, (n,) or (K, n); the default scale is |guess|, 1 for 0."""
+    """Broadcast arguments to the guess, (n,) or (K, n); the default scale is |guess|, 1 for 0."""
     start = np.array(guess, float)
     sizes = np.where(start == 0, 1.0, np.abs(start)) if scale is None else scale
 
@@ -119,7 +119,7 @@ class ResidualRows:
     impact: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        """Take times since impacts as unknown where none are given."""
+        """Set unknown times since impacts to nan."""
         if not self.impact.size:
             object.__setattr__(self, "impact", np.full(self.time.shape, np.nan))
 
@@ -147,7 +147,7 @@ class RecordedResiduals(Protocol):
     """Of the quantities: False where ``noise`` is a guess, whose scale is estimated."""
 
     def rows(self, recording: int) -> ResidualRows:
-        """Describe the residuals of a recording; called often, so worth keeping."""
+        """Describe the residuals of a recording; called often, so implementations cache it."""
 
     def residuals(self, shared: Array, own: Array, which: Ints) -> list[Array]:
         """Return the residuals (m_k,) of each recording in ``which``; shared (s,), own (K, o)."""
@@ -157,10 +157,10 @@ class RecordedResiduals(Protocol):
 
 
 class DerivedResiduals:
-    """A problem made from another one, with the same recordings, numbers and quantities."""
+    """A problem derived from another one, with the same recordings, numbers and quantities."""
 
     def __init__(self, problem: RecordedResiduals) -> None:
-        """Take all but the residuals from ``problem``."""
+        """Copy everything but the residuals from ``problem``."""
         self.problem = problem
         self.recordings, self.held_back = problem.recordings, problem.held_back
         self.shared, self.own = problem.shared, problem.own

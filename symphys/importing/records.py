@@ -13,7 +13,7 @@ from symphys.errors import SymphysError
 from symphys.types import Array
 
 Kind = Literal["taken", "approximated", "left out", "recovered"]
-LISTED = 6
+MAX_LISTED = 6
 """Names that a message lists at most."""
 
 
@@ -31,9 +31,9 @@ class ImportFinding:
     """The fate of one part of a model, or of several alike.
 
     Attributes:
-        kind: what was done with it.
+        kind: its fate.
         what: the part, as the file calls it.
-        how: what was done instead, or why it was left out; one sentence.
+        how: the replacement, or why it was left out; one sentence.
         amount: how far off, with its unit; empty where that has no sense.
     """
 
@@ -66,8 +66,8 @@ def joined(head: str, several: Sequence[Finding]) -> Finding:
 
 def listed(names: Sequence[str]) -> str:
     """Return the first few names, and how many more there are."""
-    more = len(names) - LISTED
-    return ", ".join(names[:LISTED]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MAX_LISTED
+    return ", ".join(names[:MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def counted(count: int, one: str, many: str = "") -> str:
@@ -123,12 +123,12 @@ class CompiledModel:
     """A compiled model.
 
     Attributes:
-        file: that was read.
+        file: the model file.
         kind: "mjcf" or "urdf".
         model: MjModel.
         inertials: by the names of bodies, where the model's numbers are not those of the file.
         motors: by the names of joints, of a URDF.
-        findings: what MuJoCo loses, and what was recovered.
+        findings: losses of MuJoCo, and recovered parts.
         files: all files that were read: the model, included files, meshes and height fields.
     """
 

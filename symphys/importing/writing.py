@@ -12,7 +12,8 @@ from typing import Any
 from symphys.importing.records import Finding, counted
 from symphys.importing.robot import KINDS, Imported
 
-WIDTH = 116
+LINE_WIDTH = 116
+"""Largest number of characters in a line."""
 BARE = re.compile(r"[A-Za-z0-9_-]+")
 HEADINGS = {
     "taken": "Taken over",
@@ -21,7 +22,7 @@ HEADINGS = {
     "recovered": "Recovered from the file, as MuJoCo loses it",
 }
 UNITS = "Units are m, kg, s, rad, N and N m. Positions are in the world, with all joint coordinates 0."
-MOST_NOTES = 4
+MAX_NOTES = 4
 """Findings that are repeated beside one table, at most."""
 
 
@@ -67,7 +68,7 @@ def sentence(finding: Finding) -> str:
 def comment(text: str, first: str = "# ", later: str = "# ") -> list[str]:
     """Return a text as lines of comment."""
     return textwrap.wrap(
-        text, WIDTH, initial_indent=first, subsequent_indent=later, break_long_words=False, break_on_hyphens=False
+        text, LINE_WIDTH, initial_indent=first, subsequent_indent=later, break_long_words=False, break_on_hyphens=False
     )
 
 
@@ -78,7 +79,7 @@ def notes(table: Mapping[str, Any], findings: Sequence[Finding]) -> list[str]:
         return []
     mention = re.compile(rf"(?<![\w.]){re.escape(name)}(?![\w.])")
     found = [finding for finding in findings if mention.search(finding.what)]
-    return [line for finding in found[:MOST_NOTES] for line in comment(sentence(finding))]
+    return [line for finding in found[:MAX_NOTES] for line in comment(sentence(finding))]
 
 
 def entries(table: Mapping[str, Any]) -> list[str]:
@@ -90,7 +91,7 @@ def text_of(value: Any, before: int = 0, indent: str = "") -> str:
     """Return a value as TOML; one that is wider than a line has a line for each entry of its longest list."""
     value = value.tolist() if hasattr(value, "tolist") else value
     plain = one_line(value)
-    if before + len(indent) + len(plain) <= WIDTH:
+    if before + len(indent) + len(plain) <= LINE_WIDTH:
         return plain
     deeper = indent + "    "
     if isinstance(value, Mapping) and value:
@@ -108,7 +109,7 @@ def rows(values: Sequence[Any], indent: str) -> Iterable[str]:
     for value in values:
         text = text_of(value, 1, indent)
         short = not isinstance(value, Mapping) and "\n" not in text
-        if line and short and len(indent) + len(line) + len(text) + 3 <= WIDTH:
+        if line and short and len(indent) + len(line) + len(text) + 3 <= LINE_WIDTH:
             line = f"{line}, {text}"
             continue
         if line:

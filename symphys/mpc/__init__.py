@@ -1,9 +1,8 @@
-"""Model predictive control: a plan at every tick from what is measured, and the closed loop with a plant."""
+"""Model predictive control: a plan at every tick from the measured state, and the closed loop with a plant."""
 
-from symphys.mpc.closed_loop import ClosedLoop, close_loop
+from symphys.mpc.closed_loop import ClosedLoop, close_loop, record_of, write_closed_loop
 from symphys.mpc.controller import Controller
 from symphys.mpc.planner import RecedingPlan
 from symphys.mpc.plant import Plant
-from symphys.mpc.recording import record_of, write_closed_loop
 
 __all__ = ["ClosedLoop", "Controller", "Plant", "RecedingPlan", "close_loop", "record_of", "write_closed_loop"]

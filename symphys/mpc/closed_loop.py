@@ -1,4 +1,4 @@
-"""The closed loop in simulated time: a controller measures a plant at every tick, and plans act when they are ready.
+"""The closed loop in simulated time, and its record: a controller measures a plant at every tick, plans act once ready.
 
 A plan that is asked for at t acts from t + latency on. Until then the plan before goes on. The solver works on one plan
 at a time: ticks that come while it works are missed.
@@ -8,32 +8,42 @@ from __future__ import annotations
 
 import gc
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys import files
+from symphys.dynamics.observation import reading_function
 from symphys.errors import SymphysError
+from symphys.model.state_layout import Layout
 from symphys.mpc.controller import Controller
 from symphys.mpc.planner import RecedingPlan
 from symphys.mpc.plant import Plant
+from symphys.problem import PlantSettings, Target
+from symphys.results.closed_loop import ClosedLoopRecord, TargetRecord
+from symphys.results.file_names import PROBLEM, SCENE, TRAJECTORY
+from symphys.results.scene_of_problem import make_scene
+from symphys.trajectory import Trajectory
+from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 
-Tell = Callable[[float], None]
-"""Is called with the simulated time [s]."""
-KEPT = 12
-"""Plans that are kept for pictures, at equal distances."""
+OnTick = Callable[[float], None]
+"""A function of the simulated time [s]."""
+MAX_KEPT_PLANS = 12
+"""Largest number of plans that are kept for pictures, at equal distances."""
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """What happened.
+    """The states, inputs, plans and latencies of a closed loop.
 
     Attributes:
-        plant: that was controlled.
-        controller: that did.
+        plant: the controlled plant.
+        controller: of the plant.
         time: (K + 1,) [s] of the plant's states.
         x: (K + 1, nx) states of the plant.
         u: (K, m) inputs that acted.
@@ -65,7 +75,7 @@ class ClosedLoop:
 
     @property
     def share(self) -> float:
-        """Of the ticks whose plan was ready before the next one."""
+        """The share of ticks whose plan was ready before the next tick."""
         return self.in_time / max(self.ticks, 1)
 
 
@@ -73,7 +83,7 @@ class Loop:
     """A closed loop, tick by tick."""
 
     def __init__(self, controller: Controller, plant: Plant) -> None:
-        """RecedingPlan once from the first state, before time begins."""
+        """Plan once from the first state, before time begins."""
         self.controller, self.plant = controller, plant
         self.horizon, self.settings = controller.horizon, controller.horizon.plant
         self._rng = np.random.default_rng([self.settings.seed, 1])
@@ -90,7 +100,7 @@ class Loop:
         self.states, self.inputs = [self.x], list[Array]()
 
     def tick(self, number: int, keep: bool) -> None:
-        """One tick: a plan is asked for unless the solver is busy; then the plant goes on to the next."""
+        """Advance by one tick: request a plan unless the solver is busy, then simulate to the next tick."""
         now = number * self.horizon.tick
         if now >= self.ready - 1e-12:
             self._ask(now, keep)
@@ -133,7 +143,7 @@ class Loop:
         return self.controller.reader.noisy(self.x, settings.noise, settings.rate_noise, self._rng)
 
     def result(self, ticks: int, stopped: str) -> ClosedLoop:
-        """What happened in so many ticks."""
+        """Return the closed loop after so many ticks."""
         columns = {key: np.array(values, float) for key, values in self.log.items()}
         gained = columns.pop("gained") > 0
         return ClosedLoop(
@@ -154,7 +164,7 @@ class Loop:
 def close_loop(
     controller: Controller,
     plant: Plant,
-    tell: Tell = lambda time: None,
+    tell: OnTick = lambda time: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> ClosedLoop:
     """Run the closed loop for the duration of [mpc].
@@ -169,7 +179,7 @@ def close_loop(
     """
     loop = Loop(controller, plant)
     count = max(round(controller.horizon.duration * controller.horizon.rate), 1)
-    keep = set(np.linspace(0, count, KEPT, endpoint=False).round().astype(int).tolist())
+    keep = set(np.linspace(0, count, MAX_KEPT_PLANS, endpoint=False).round().astype(int).tolist())
     resting = gc.isenabled()
     gc.collect()
     gc.disable()
@@ -186,3 +196,104 @@ def close_loop(
         if resting:
             gc.enable()
     return loop.result(count, "")
+
+
+MAX_VALUES = 24
+"""Largest number of recorded quantities of a plan."""
+
+
+def record_of(loop: ClosedLoop) -> ClosedLoopRecord:
+    """Return the record of a closed loop."""
+    controller, horizon = loop.controller, loop.controller.horizon
+    settings = horizon.plant
+    kind = settings.latency if isinstance(settings.latency, str) else f"{settings.latency:g}"
+    counted = {"measured": loop.latency, "cpu": loop.work}.get(kind, np.full(len(loop.asked), _number(kind)))
+    floating = controller.reader.floating
+    names, actual = quantities(loop.plant.rollout, floating, loop.x, loop.plant.p)
+    model, p = controller.planner.rollout, controller.planner.p
+    return ClosedLoopRecord(
+        problem=controller.problem.name,
+        title=controller.problem.title,
+        rate=horizon.rate,
+        horizon=horizon.horizon,
+        dt=horizon.dt,
+        plant_dt=loop.plant.dt,
+        duration=float(loop.time[-1]),
+        iterations=horizon.iterations,
+        feedback=horizon.feedback,
+        plant=differences(settings),
+        latency_kind=kind,
+        ticks=loop.ticks,
+        in_time=loop.in_time,
+        median=float(np.median(counted)) if len(counted) else np.nan,
+        p99=float(np.quantile(counted, 0.99)) if len(counted) else np.nan,
+        worst=float(np.max(counted, initial=0.0)),
+        targets=tuple(target_record(loop, target) for target in loop.plant.problem.targets),
+        evaluator=controller.planner.description,
+        threads=controller.planner.threads,
+        stopped=loop.stopped,
+        command_names=controller.inputs,
+        value_names=names,
+        asked=loop.asked,
+        latency=loop.latency,
+        work=loop.work,
+        cost=loop.cost,
+        gained=loop.gained.astype(float),
+        command_time=loop.time[:-1],
+        command=loop.u,
+        plan_time=np.array([plan.time + plan.dt * np.arange(len(plan.x)) for plan in loop.plans]),
+        plan_value=np.array([quantities(model, floating, plan.x, p)[1] for plan in loop.plans]),
+        plan_command=np.array([plan.v @ controller.planner.weights.T for plan in loop.plans]),
+        actual_time=loop.time,
+        actual=actual,
+    )
+
+
+def _number(kind: str) -> float:
+    return np.nan if kind in ("measured", "cpu") else float(kind)
+
+
+def differences(settings: PlantSettings) -> str:
+    """Return the differences of the plant from the model, except for its step, in words."""
+    parts = [f"masses times {settings.masses:g}"] if settings.masses != 1 else []
+    parts += [f"{key} = {value}" for key, value in settings.set.items()]
+    if settings.noise or settings.rate_noise:
+        parts.append(f"noise {settings.noise:g} m or rad and {settings.rate_noise:g} m/s or rad/s")
+    if settings.delay:
+        parts.append(f"commands {settings.delay:g} s late")
+    return ", ".join(parts)
+
+
+def target_record(loop: ClosedLoop, target: Target) -> TargetRecord:
+    """Return the error of a target at the end, and how long it has been within its tolerance."""
+    rollout, count = loop.plant.rollout, len(loop.x)
+    u = np.concatenate([loop.u, loop.u[-1:]])
+    p, z = np.tile(loop.plant.p[:, None], count), np.zeros((int(rollout.z.shape[0]), count))
+    found = np.array(rollout.compiled(target.formula).map(count)(loop.x.T, u.T, p, loop.time[None], z))
+    errors = np.linalg.norm(found, axis=0)
+    missed = np.flatnonzero(~(errors <= target.tolerance))
+    since = 0.0 if not len(missed) else float(loop.time[missed[-1]])
+    return TargetRecord(target.name, float(errors[-1]), target.tolerance, float(loop.time[-1]) - since)
+
+
+def quantities(rollout: Rollout, floating: Sequence[str], x: Array, p: Array) -> tuple[tuple[str, ...], Array]:
+    """Return names and values (K, q) of drawn quantities: joint coordinates, positions of floating bodies."""
+    world, layout = rollout.world, Layout(rollout.world)
+    read = reading_function(world, rollout.parameters.symbols).map(len(x))
+    coordinates = np.array(read(x[:, : layout.size].T, np.tile(p[:, None], len(x)))[0]).T.reshape(len(x), -1)
+    names = [f"{joint.name}.{each.name}" for joint in world.joints for each in joint.kind.coordinates]
+    columns = [x[:, layout[f"{name}.position"]] for name in floating]
+    names += [f"{name}.position.{axis}" for name in floating for axis in "xyz"]
+    return tuple(names[:MAX_VALUES]), np.concatenate([coordinates, *columns], axis=1)[:, :MAX_VALUES]
+
+
+def write_closed_loop(loop: ClosedLoop, folder: Path) -> tuple[ClosedLoopRecord, Trajectory]:
+    """Write the files of a run folder, each atomically, the record last."""
+    problem = loop.plant.problem
+    motion, record = loop.plant.motion(loop.time, loop.x, loop.u), record_of(loop)
+    files.make_folder(folder)
+    files.write_text(folder / PROBLEM, loop.controller.problem.to_toml())
+    files.write_npz(folder / TRAJECTORY, motion.arrays())
+    files.write_json(folder / SCENE, make_scene(problem, {}, motion).to_json())
+    record.write(folder)
+    return record, motion

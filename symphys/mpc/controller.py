@@ -13,7 +13,7 @@ from symphys.model.state_layout import input_columns
 from symphys.mpc.planner import Planner, RecedingPlan
 from symphys.problem import Problem, RecedingHorizon
 from symphys.problem.loading import Source, load
-from symphys.transcription.feedback.state_reader import StateReader
+from symphys.transcription.state_reader import StateReader
 from symphys.types import Array
 
 State = ArrayLike | Mapping[str, ArrayLike]
@@ -46,7 +46,7 @@ class Controller:
         """Compile the model.
 
         Args:
-            problem: what ``load`` takes.
+            problem: any argument of ``load``.
             threads: number of threads that share the steps of a plan; None: one for each processor.
 
         Raises:

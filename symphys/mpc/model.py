@@ -15,7 +15,7 @@ from symphys.types import Array
 
 
 def horizon_of(problem: ProblemData) -> RecedingHorizon:
-    """What its [mpc] says; ProblemError where it has none."""
+    """Return the problem's [mpc] settings; ProblemError without any."""
     if problem.mpc is None:
         example = "write [mpc] and below it, for instance, rate = 100, horizon = 1.0 and dt = 0.05"
         raise ProblemError(problem.file, [Issue("mpc", f"there is no such table; {example}")])
@@ -23,7 +23,7 @@ def horizon_of(problem: ProblemData) -> RecedingHorizon:
 
 
 def receding_model(problem: Problem) -> Problem:
-    """The problem over one horizon: its costs and constraints from now on, its targets at the end of the plan.
+    """Return the problem over one horizon: costs and constraints along it, targets at its end.
 
     Every control has a knot for each step of the model, which holds over it; its name is its value at that step.
 
@@ -48,7 +48,7 @@ def receding_model(problem: Problem) -> Problem:
 
 
 def fixed_times(problem: ProblemData) -> list[Issue]:
-    """Costs, targets and constraints that are bound to a time of the problem's own."""
+    """Return costs, targets and constraints at a fixed time of the problem."""
     moving = 'a horizon moves on; take "always" or "end", or name `time` in the formula'
     found = [
         Issue(f'phase "{phase.name}".sets', f"holds in a phase, but {moving}") for phase in problem.phases if phase.sets
@@ -76,7 +76,7 @@ def fixed_times(problem: ProblemData) -> list[Issue]:
 
 
 def static_variables(problem: ProblemData) -> list[Issue]:
-    """Variables that are no controls, and controls whose bounds change over time."""
+    """Return variables that are no controls, and controls whose bounds change over time."""
     found = []
     for each in problem.variables:
         if each.kind != "control":
@@ -93,12 +93,12 @@ def static_variables(problem: ProblemData) -> list[Issue]:
 
 
 def rows(variable: Variable, values: Array) -> Array:
-    """(knots, components)."""
+    """Return values (knots, components)."""
     return values.reshape(variable.knots, -1)
 
 
 def resampled(variable: Variable, problem: ProblemData, horizon: RecedingHorizon) -> Variable:
-    """The control with a knot for each step of the model; its guess as it was at the middle of the step, or last."""
+    """Return the control with a knot for each step of the model; the guess at mid-step, constant after the end."""
     steps, knots = horizon.steps, variable.knots
     share = np.minimum((np.arange(steps) + 0.5) * horizon.dt / problem.simulation.duration, 1.0)
     guess = rows(variable, variable.guess)

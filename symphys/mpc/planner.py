@@ -1,4 +1,4 @@
-"""Plans from measured states: the last plan shifted to now, then iterations of iLQR from there."""
+"""Plans from measured states: the last plan shifted to the present time, then iterations of iLQR from there."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.staged.staged_problem import RolloutStages
 from symphys.types import Array
 
-SHARES = np.array([1.0, 0.5, 0.0])
-"""Of the feedback with which a shifted plan is followed: the cheapest counts. Gains may fail across an impact."""
-GROWTH, SHRINK, STIFFEST = 8.0, 0.5, 1e8
-"""Factors on the damping after a tick that gained nothing and after one that did, and its largest value."""
+FEEDBACK_SHARES = np.array([1.0, 0.5, 0.0])
+"""Shares of the feedback with which a shifted plan is simulated; the best is taken, as gains may fail at impacts."""
+DAMPING_GROWTH, DAMPING_SHRINK, MAX_DAMPING = 8.0, 0.5, 1e8
+"""Factors on the damping after a tick without and with a gain, and its largest value."""
 
 
 class PlanPolicy(NamedTuple):
@@ -44,7 +44,7 @@ class PlanPolicy(NamedTuple):
 
 @dataclass(frozen=True)
 class RecedingPlan:
-    """What a controller intends.
+    """A planned motion with feedback.
 
     Attributes:
         time: [s] when it begins.
@@ -65,12 +65,12 @@ class RecedingPlan:
     gained: bool
 
     def step(self, time: float) -> int:
-        """The number of the step that holds at a time [s]."""
+        """Return the number of the step at a time [s]."""
         return min(max(math.floor((time - self.time) / self.dt + 1e-9), 0), len(self.v) - 1)
 
 
 class Planner:
-    """One problem over the horizon, whose first state is what the plant measures.
+    """One problem over the horizon, whose first state is the measured one.
 
     Attributes:
         problem: of the file.
@@ -82,12 +82,12 @@ class Planner:
         weights: (m, w): inputs of a step are weights @ v.
         lower, upper, scale: (w,) of the decisions.
         damping: of the next iteration.
-        threads: that share the steps of a plan.
-        description: what evaluates, in words.
+        threads: their number for the steps of a plan.
+        description: of the evaluator.
     """
 
     def __init__(self, problem: Problem, threads: int | None = None) -> None:
-        """Compile the model; ProblemError where a receding horizon makes no sense for the problem."""
+        """Compile the model; ProblemError if the problem has no receding horizon."""
         self.problem, self.horizon = problem, horizon_of(problem)
         self.model = receding_model(problem)
         self.rollout = symbolic_rollout(self.model)
@@ -116,7 +116,7 @@ class Planner:
         self.threads = processors() if threads is None else threads
 
     def first(self, x: Array, time: float) -> RecedingPlan:
-        """A plan from the guess, after the iterations that come before the first tick."""
+        """Return a plan from the guess, after the iterations before the first tick."""
         self.damping = self.horizon.damping
         guess = self._z[self._aligned.new]
         gains = np.zeros((*guess.shape, self.tangent.size))
@@ -124,16 +124,17 @@ class Planner:
         return self._improved(policy, x, time, self.horizon.first_iterations)
 
     def next(self, plan: RecedingPlan, x: Array, time: float) -> RecedingPlan:
-        """The plan from a measured state (nx,) at a time [s]: the last one shifted to then, and improved."""
+        """Return the plan from a measured state (nx,) at a time [s]: the last plan shifted and improved."""
         return self._improved(shifted(plan, time), x, time, self.horizon.iterations)
 
     def follow(
         self, x: Array, policy: PlanPolicy, lengths: Array, time: float, shares: Array | float = 1.0
     ) -> tuple[Array, Array, Array]:
-        """From a state (nx,) at a time [s]: states (B, N + 1, nx), decisions (B, N, w) and costs (B,).
+        """Simulate from a state (nx,) at a time [s]: states (B, N + 1, nx), decisions (B, N, w), costs (B,).
 
         ``lengths``, ``shares``: (B,) of the steps and of the feedback.
         """
+        # Simulate the policy from the measured state, then evaluate the objective.
         self.stages.begin(x, time)
         knots, z = self._knots, np.repeat(self._z[None], len(lengths), axis=0)
         none, bounds = np.zeros(knots.old.shape), knots.bounds
@@ -145,35 +146,36 @@ class Planner:
         return states, new, self._costs(MotionBatch(z, states, inputs, merit))
 
     def _improved(self, policy: PlanPolicy, x: Array, time: float, iterations: int) -> RecedingPlan:
-        """Follow the policy from the state, then iterate."""
-        none = np.zeros(len(SHARES))
-        states, decisions, costs = self.follow(x, policy, none, time, SHARES)
+        """Simulate the policy from the state, then iterate."""
+        none = np.zeros(len(FEEDBACK_SHARES))
+        states, decisions, costs = self.follow(x, policy, none, time, FEEDBACK_SHARES)
         best = int(np.where(np.isfinite(costs), costs, math.inf).argmin())
         plan = RecedingPlan(
             time, self.horizon.dt, states[best], decisions[best], policy.back, float(costs[best]), False
         )
         for _ in range(iterations):
             plan = self._iterate(plan)
-            if self.damping >= STIFFEST:
+            if self.damping >= MAX_DAMPING:
                 break
         return plan
 
     def _iterate(self, plan: RecedingPlan) -> RecedingPlan:
-        """One iteration of iLQR; the plan as it was, with gains about it and more damping, where nothing is cheaper."""
+        """Make one iteration of iLQR; without a gain, keep the plan with gains about it and more damping."""
+        # Expand about the plan, compute the policy, and search along it.
         about = LocalExpansion(self.stages, self._motion(plan), self._limits, self._knots, self._scale)
         policy = about.policy(self.damping, gradient=False)
         if policy is not None and all(np.isfinite(each).all() for each in policy.aligned):
             best, back = about.search(policy, self._costs), policy.aligned[1]
             if best.value < plan.cost:
-                self.damping = max(self.horizon.damping, self.damping * SHRINK)
+                self.damping = max(self.horizon.damping, self.damping * DAMPING_SHRINK)
                 decisions = best.motion.z[self._aligned.new]
                 return RecedingPlan(plan.time, plan.dt, best.motion.x, decisions, back, best.value, True)
             plan = replace(plan, back=back)
-        self.damping = min(self.damping * GROWTH, STIFFEST)
+        self.damping = min(self.damping * DAMPING_GROWTH, MAX_DAMPING)
         return replace(plan, gained=False)
 
     def _motion(self, plan: RecedingPlan) -> StagedMotion:
-        """The motion of a plan."""
+        """Return the motion of a plan."""
         self.stages.begin(plan.x[0], plan.time)
         z = self._z.copy()
         z[self._aligned.new] = plan.v
@@ -181,7 +183,7 @@ class Planner:
         return StagedMotion(z, plan.x, u, self.horizon.smoothing, gapless=True)
 
     def _costs(self, motions: MotionBatch) -> Array:
-        """(B,) of the objective, with the penalty of constraints."""
+        """Return the objective (B,) with the penalty of constraints."""
         if motions.merit is not None:
             return motions.merit
         stages = self.stages
@@ -191,7 +193,7 @@ class Planner:
 
 
 def shifted(plan: RecedingPlan, time: float) -> PlanPolicy:
-    """What a plan says from a later time [s] on, step by step: between its steps linearly, after its end as last.
+    """Return a plan from a later time [s] on: linear between its steps, constant after its end.
 
     States between two steps are means of both; they are only what feedback refers to.
     """

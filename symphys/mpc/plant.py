@@ -1,4 +1,4 @@
-"""The plant that a controller is tried on: the problem with another step, masses and values, step by step."""
+"""The simulated plant of a controller: the problem with other time step, masses and values."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Plant:
     """
 
     def __init__(self, problem: Problem) -> None:
-        """Compile its step; ProblemError where [mpc.plant] sets what cannot be."""
+        """Compile its step; ProblemError for invalid settings in [mpc.plant]."""
         horizon = horizon_of(problem)
         self.substeps = max(math.ceil(horizon.tick / horizon.plant.dt - 1e-9), 1)
         self.dt = horizon.tick / self.substeps
@@ -50,7 +50,7 @@ class Plant:
             self._kernel = compile_program(step_program(arguments, True, False), threads=1, rows=1)
 
     def step(self, x: Array, u: Array, time: float) -> Array:
-        """(nx,) the state a step after x (nx,), with the inputs u (m,) at a time [s]."""
+        """Return the state (nx,) a step after x (nx,), with the inputs u (m,) at a time [s]."""
         if self._kernel is None:
             put = u if self.rollout.feedback is None else np.append(u, time)
             return np.array(call(self.rollout.closed, x, put, self.p, 0.0)[0]).ravel()
@@ -59,12 +59,12 @@ class Plant:
         return np.array(self._kernel.forward(self._varying, self._given)["after"][0])
 
     def motion(self, time: Array, x: Array, u: Array) -> Trajectory:
-        """All that is recorded of states (K + 1, nx) and inputs (K, m) at times (K + 1,)."""
+        """Return the recorded motion of states (K + 1, nx) and inputs (K, m) at times (K + 1,)."""
         return motion_of(self.rollout, time, x, u, self.p)
 
 
 def plant_problem(problem: Problem, dt: float) -> Problem:
-    """The problem of the plant, over one of its steps."""
+    """Return the problem of the plant, over one of its steps."""
     settings = horizon_of(problem).plant
     changed = problem.set(dict(settings.set)) if settings.set else problem
     if settings.masses != 1:

@@ -1,4 +1,4 @@
-"""What problems predict for their recordings, as the residuals of identification."""
+"""Predictions of problems for their recordings, as the residuals of identification."""
 
 from symphys.prediction.identifying import identify
 from symphys.prediction.predictor import Predictor

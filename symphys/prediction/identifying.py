@@ -1,4 +1,4 @@
-"""``symphys.identify``: what recordings say about the variables of a problem; replays of the worst recordings."""
+"""``symphys.identify``: estimates of a problem's variables from recordings; replays of the worst recordings."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from symphys.threads import limited
 from symphys.trajectory import Trajectory, shapes
 from symphys.types import Array
 
-STATE = "identification_state.json"
-"""Of a folder: where an interrupted fit goes on."""
-DAMPING = 1e-6
-"""The first of the fit. Of 285 tosses of a cube 25 steps from it bring the merit to 0.055e6; from 1e-3 15 to 0.30e6."""
+STATE_FILE = "identification_state.json"
+"""The file of an output folder from which an interrupted fit resumes."""
+FIRST_DAMPING = 1e-6
+"""First damping of the fit: for 285 tosses of a cube 1e-6 gives 0.055e6 in 25 steps, 1e-3 0.30e6 in 15."""
 CHOICES = {"loss": ("squares", "huber"), "check": ("none", "cma")}
-"""Settings that have one of some values."""
+"""Settings with a fixed set of values."""
 Monitor = Callable[[FitStep], None]
 
 
@@ -46,12 +46,12 @@ def identify(
     stop: Callable[[], bool] | None = None,
     **settings: Any,
 ) -> Identification:
-    """Estimate a problem's variables from its recordings, and say what one may believe of the estimates.
+    """Estimate a problem's variables from its recordings, with uncertainty and residual analysis.
 
     Args:
-        problem: what ``load`` takes, with [[recording]] tables.
+        problem: any argument of ``load``, with [[recording]] tables.
         folder: gets identification.json and identification.npz, and what an interrupted fit goes on from; None: none.
-        threads: that share the simulations; None: one for each processor.
+        threads: their number for the simulations; None: one for each processor.
         monitor: is called with each iteration.
         stop: is called after each iteration; True ends the fit there.
         settings: in place of those in [identify]: ``loss="huber"``, ``bootstrap=200``, ``check="cma"``,
@@ -81,7 +81,7 @@ def identify(
 
         def save_step(step: FitStep, state: FitState) -> None:
             if place is not None:
-                files.write_json(place / STATE, {"key": key, **state.plain()})
+                files.write_json(place / STATE_FILE, {"key": key, **state.plain()})
             if monitor is not None:
                 monitor(step)
 
@@ -92,12 +92,12 @@ def identify(
         write_replays(place, *worst_replays(loaded, residuals, found))
         found.write(place)
         if found.status != numbers.FitStatus.INTERRUPTED.value:
-            files.remove(place / STATE)
+            files.remove(place / STATE_FILE)
     return found
 
 
 def with_settings(given: IdentifySettings, settings: dict[str, Any]) -> IdentifySettings:
-    """Replace settings of the file; SymphysError names one that there is not, or that has no such value."""
+    """Replace settings of the file; SymphysError names an unknown setting or an invalid value."""
     for name in settings:
         if name not in vars(given):
             raise SymphysError(f"identify has no setting {name!r}; {hint(name, vars(given))}")
@@ -111,7 +111,7 @@ def options_of(settings: IdentifySettings) -> IdentificationOptions:
     threshold = settings.threshold if settings.loss == "huber" else math.inf
     search = SearchOptions(settings.check_evaluations, seed=settings.seed) if settings.check == "cma" else None
     horizons = tuple(map(float, settings.horizons))
-    fit = FitOptions(settings.iterations, DAMPING, settings.tolerance, threshold=threshold, horizons=horizons)
+    fit = FitOptions(settings.iterations, FIRST_DAMPING, settings.tolerance, threshold=threshold, horizons=horizons)
     draws, starts, seed = settings.bootstrap, settings.held_back_starts, settings.seed
     return IdentificationOptions(fit, draws=draws, search=search, held_back_starts=starts, seed=seed)
 
@@ -122,24 +122,24 @@ def state_key(problem: Problem, settings: IdentifySettings) -> str:
 
 
 def saved_state(folder: Path, key: str, residuals: RecordingResiduals) -> FitState | None:
-    """Read where an interrupted fit of the same problem stopped; None where there is none."""
-    if not (folder / STATE).exists():
+    """Read the state of an interrupted fit of the same problem; None without one."""
+    if not (folder / STATE_FILE).exists():
         return None
-    saved = files.read_json(folder / STATE)
+    saved = files.read_json(folder / STATE_FILE)
     return revive_state(saved, residuals) if isinstance(saved, dict) and saved.get("key") == key else None
 
 
-MOST = 3
-"""Recordings that are replayed."""
+MAX_REPLAYS = 3
+"""Largest number of replayed recordings."""
 POSE = re.compile(r"(?P<body>[^.]+)\.(?P<field>position|orientation)(\[(?P<component>[0-9])\])?")
-"""A quantity that is a pose, or one number of it."""
+"""Pattern of a quantity that is a pose, or one number of it."""
 
 
 def worst_replays(
     problem: Problem, residuals: RecordingResiduals, found: Identification
 ) -> tuple[tuple[RecordingReplay, ...], Scene]:
     """Return the recordings with the largest residuals, and the world of the first of them."""
-    names = [name for name, _ in found.worst(MOST)]
+    names = [name for name, _ in found.worst(MAX_REPLAYS)]
     shared = np.array([each.value for each in found.parameters])
     replays = tuple(_replay(residuals, found, shared, found.recordings.index(name)) for name in names)
     predictor = residuals.predictor

@@ -1,4 +1,4 @@
-"""The numbers that are identified: of variables, shared by all recordings or own to each."""
+"""The identified numbers: of variables, shared by all recordings or own to each."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from symphys.problem.units import formula_units
 from symphys.types import Array, Ints
 
 JOINT_FRICTION = "dry_friction"
-"""What advice calls the friction of a joint, which another recording determines than that of a surface."""
+"""The name of joint friction in advice: other recordings determine it than the friction of a surface."""
 ORIENTATION_SCALE = 0.1
-"""[rad] a sensible change of an orientation."""
+"""Scale of changes of an orientation [rad]."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class NumberBlock:
 
     @cached_property
     def turns(self) -> bool:
-        """Whether they are a rotation vector (3,) [rad], in the body's frame, from where an orientation begins."""
+        """Whether the numbers are a rotation vector (3,) [rad] from the start orientation, in the body's frame."""
         return self.variable.slots[0].name.endswith(".orientation") and self.variable.components == 4
 
     @cached_property
@@ -47,7 +47,7 @@ class NumberBlock:
 
     @cached_property
     def part(self) -> slice:
-        """Their places among shared or own numbers."""
+        """Return the slice of the numbers among shared or own ones."""
         return slice(self.first, self.first + self.count)
 
 
@@ -98,7 +98,7 @@ def fit_numbers(problem: Problem, blocks: Sequence[NumberBlock], guess: Array) -
 
 
 def numbers_of(block: NumberBlock) -> dict[str, Array]:
-    """Bounds, scale and prior of the numbers of a block."""
+    """Return bounds, scale and prior of the numbers of a block."""
     variable, free = block.variable, np.full(block.count, np.inf)
     if block.turns:
         deviation = free if variable.prior is None else np.full(3, float(variable.prior[1].max()))

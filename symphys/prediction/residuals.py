@@ -1,4 +1,4 @@
-"""From predictions to residuals: predicted less measured, over its standard deviation."""
+"""From predictions to residuals: (predicted - measured) / standard deviation."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from symphys.types import Array, Bools, Ints
 
 WHOLE_TURN = 2 * np.pi
 LENGTHS = ("m", "m/s", "m/s^2")
-"""Units of what a scale of lengths scales."""
-GUESSED, GUESSED_TURN, LEAST = 0.01, 0.02, 1e-9
+"""Units that a scale of lengths multiplies."""
+GUESSED_NOISE_SHARE, GUESSED_NOISE_ANGLE, MIN_NOISE = 0.01, 0.02, 1e-9
 """Where the noise is not given, it begins as a share of the spread of what was measured, or as an angle [rad]."""
 
 
@@ -33,7 +33,7 @@ class RecordingResiduals:
     """
 
     def __init__(self, problem: Problem, predictor: Predictor) -> None:
-        """Look up units, noise and what is missing."""
+        """Look up units, noise and missing samples."""
         self.predictor = predictor
         taken = predictor.recordings
         self.recordings = tuple(each.name for each in taken)
@@ -56,12 +56,12 @@ class RecordingResiduals:
         if first.noise is not None:
             return first.noise
         if first.orientation:
-            return np.full(3, GUESSED_TURN)
+            return np.full(3, GUESSED_NOISE_ANGLE)
         found = [m.values for r in self.predictor.recordings for m in r.measured if _key(r, m) == key]
         values = np.concatenate(found)
         spread = np.nanstd(values, axis=0)
         largest = float(np.nanmax(np.abs(values)))
-        return np.asarray(np.maximum(GUESSED * np.where(spread > 0, spread, largest), LEAST))
+        return np.asarray(np.maximum(GUESSED_NOISE_SHARE * np.where(spread > 0, spread, largest), MIN_NOISE))
 
     def rows(self, recording: int) -> ResidualRows:
         """Describe the residuals of a recording."""
@@ -141,13 +141,13 @@ def residuals_of(problem: Problem, threads: int | None = None) -> RecordingResid
 
 
 def present(measured: Measured) -> Bools:
-    """Return (n, residuals of a sample) where there is a number."""
+    """Return (n, residuals of a sample) where a number was measured."""
     finite: Bools = np.isfinite(measured.values)
     return np.repeat(np.all(finite, axis=1, keepdims=True), 3, axis=1) if measured.orientation else finite
 
 
 def difference(measured: Measured, predicted: Array) -> Array:
-    """Return (n, m) predicted less measured; of orientations the rotation vector (n, 3) [rad] to the predicted one.
+    """Return (n, m) predicted less measured; for orientations the rotation vector (n, 3) [rad] to the prediction.
 
     Angles of joints are known up to whole turns, see ``without_turns``.
     """
@@ -158,7 +158,7 @@ def difference(measured: Measured, predicted: Array) -> Array:
 
 
 def without_turns(off: Array) -> Array:
-    """Remove whole turns from differences (n,) [rad] of an encoder that counts from anywhere or is reset.
+    """Remove whole turns from differences (n,) [rad] of an encoder with an arbitrary or changing origin.
 
     The first is the nearest of those that differ by whole turns, and none jumps by more than half a turn to the next.
     """
@@ -170,17 +170,17 @@ def without_turns(off: Array) -> Array:
 
 
 def quantity_names(keys: Sequence[tuple[str, str]]) -> tuple[str, ...]:
-    """Name the measured quantities; with the table's name where tables use one name for different formulas."""
+    """Name the measured quantities; with the table's name where tables share a name for different formulas."""
     names = [name for name, _ in keys]
     return tuple(name if names.count(name) == 1 else f"{name}: {text}" for name, text in keys)
 
 
 def _key(recording: Recording, measured: Measured) -> tuple[str, str]:
-    """Return what makes a quantity: its name and formula."""
+    """Return the key of a quantity: its name and formula."""
     return measured.name, measured.value.text
 
 
 def _unit(measured: Measured, world: World) -> str:
-    """Return the unit of what was measured, as far as it is known."""
+    """Return the unit of a measurement, as far as it is known."""
     units = {name: unit for name in measured.value.names if (unit := quantity_unit(name, world)) is not None}
     return unit_of(measured.value, units)

@@ -7,11 +7,11 @@ import numpy as np
 from symphys.types import Array
 
 SMALL_ANGLE = 1e-4
-"""Of the sine of half an angle: below it series stand for quotients."""
+"""Sine of half an angle below which series replace quotients."""
 
 
 def turned(q: Array, v: Array) -> tuple[Array, Array]:
-    """q exp(v / 2) (4,) for a rotation vector v (3,) [rad] in the frame that q turns, and its derivative (4, 3)."""
+    """Return q exp(v / 2) (4,) for a rotation vector v (3,) [rad] in the frame of q, and its derivative (4, 3)."""
     half = float(np.linalg.norm(v)) / 2
     sinc = np.sinc(half / np.pi)
     turn = np.array([np.cos(half), *(sinc / 2 * v)])
@@ -37,7 +37,7 @@ def rotation_slopes(q: Array, p: Array) -> Array:
 
 
 def _relative(q: Array, p: Array) -> tuple[Array, Array, Array]:
-    """Scalar part (n, 1), which is not negative, and vector part (n, 3) of conj(q) p, and both by p (n, 4, 4)."""
+    """Return scalar part (n, 1) >= 0 and vector part (n, 3) of conj(q) p, and their derivatives by p (n, 4, 4)."""
     w, x, y, z = q.T
     rows = np.array([[w, x, y, z], [-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]]).transpose(2, 0, 1)
     found = np.einsum("nij,nj->ni", rows, p)
@@ -47,7 +47,7 @@ def _relative(q: Array, p: Array) -> tuple[Array, Array, Array]:
 
 
 def _factors(w: Array, v: Array) -> tuple[Array, Array, Array]:
-    """Return the rotation vector is f v: f, its derivative by w, and that by |v| over |v|; each (n, 1)."""
+    """Return f with rotation vector f v, its derivative by w, and that by |v| over |v|; each (n, 1)."""
     s = np.linalg.norm(v, axis=1, keepdims=True)
     size, small = w**2 + s**2, s < SMALL_ANGLE
     safe, whole = np.where(small, 1.0, s), np.where(small, w, 1.0)

@@ -1,4 +1,4 @@
-"""What a run folder holds: one definition of each of its files, which writers and readers import.
+"""The contents of a run folder: one definition of each of its files, for writers and readers.
 
 ``runs`` is the table of all runs below a folder, ``best`` the best of them, and ``diff`` says what differs between two.
 """

@@ -1,4 +1,4 @@
-"""mpc.json and mpc.npz of a run folder: one definition for who writes and who reads.
+"""mpc.json and mpc.npz of a run folder: one definition for writer and reader.
 
 | file | holds |
 |---|---|
@@ -18,8 +18,7 @@ import numpy as np
 
 from symphys import files
 from symphys import json_values as values
-from symphys.results.archives import read_archive
-from symphys.results.text_files import ReportError, read_table
+from symphys.results.text_files import ReportError, read_archive, read_table
 from symphys.types import Array
 
 MPC, PLANS = "mpc.json", "mpc.npz"
@@ -57,7 +56,7 @@ class TargetRecord:
 
     @property
     def met(self) -> bool:
-        """Whether it holds at the end; NaN never does."""
+        """Whether the target holds at the end; NaN never does."""
         return self.error <= self.tolerance
 
 
@@ -71,12 +70,12 @@ class ClosedLoopRecord:
         horizon, dt, plant_dt, duration: [s] of plans, of the model's and of the plant's steps, and what was simulated.
         iterations: of a tick.
         feedback: whether commands between ticks answered what was measured.
-        plant: what the plant differs in, in words.
-        latency_kind: what counted as latency: "measured", "cpu" or seconds.
+        plant: differences of the plant, in words.
+        latency_kind: the counted latency: "measured", "cpu" or seconds.
         ticks, in_time: how many there were, and how many plans were ready before the next tick.
         median, p99, worst: [s] of the latencies that counted.
         targets: at the end.
-        evaluator: what evaluated, in words.
+        evaluator: description of the evaluator.
         threads: of it.
         stopped: why it ended before its time; empty.
         command_names, value_names: of the columns below.
@@ -131,12 +130,12 @@ class ClosedLoopRecord:
 
     @property
     def done(self) -> bool:
-        """Whether it went to its end and every target is met there; without targets, that it went to its end."""
+        """Whether the loop ran to its end and meets every target there."""
         return not self.stopped and all(target.met for target in self.targets)
 
     @property
     def held(self) -> float:
-        """[s] for how long all targets were met without a break up to the end."""
+        """Return how long [s] up to the end all targets were met without a break."""
         return min((target.held for target in self.targets), default=0.0)
 
     @property

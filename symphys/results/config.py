@@ -1,9 +1,10 @@
-"""config.json: what exactly was asked for, and the key by which a finished run is recognised."""
+"""config.json: the settings of a run, the key of a finished run, and the folder name of a problem under settings."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -22,9 +23,9 @@ class Config:
         problem: the stem of the problem's file.
         solver: a solver's name.
         seed: 0 is the guess as it stands.
-        settings: what the command line changed in the file, by dotted key.
+        settings: changes by the command line in the file, by dotted key.
         options: the solver's options, all of them.
-        backend: what was to evaluate; "auto" is the best that the machine has.
+        backend: the requested evaluator; "auto" is the best that the machine has.
         guess: the "run" folder that it was taken from, and the "digest" of what was taken, which counts; else empty.
         key: of the problem's text and all the above; two runs with one key are the same run.
     """
@@ -69,3 +70,29 @@ def make_config(
     canonical = json.dumps(files.strict(parts), sort_keys=True, allow_nan=False)
     key = hashlib.sha256(canonical.encode()).hexdigest()
     return Config(problem, solver, seed, settings, options, backend, guess, key)
+
+
+MAX_SETTINGS_LENGTH = 80
+"""Characters of the settings in a folder name before they are cut."""
+
+
+def case_name(problem: str, settings: Mapping[str, object], guess: str = "") -> str:
+    """Return ``ball_throw``, or ``ball_throw@ground.friction=0.6`` under settings, whatever order they were given in.
+
+    Settings that are too long for a name, or have characters that not every file system keeps apart, are shortened
+    and end in a digest of the whole. ``guess`` is a last word for a guess from elsewhere, ``guess=1a2b3c4d``.
+    """
+    if guess:
+        before = case_name(problem, settings)
+        return f"{before}{',' if settings else '@'}{guess}"
+    if not settings:
+        return problem
+    words = settings_words(settings, ",")
+    kept = re.sub(r"[^a-z0-9._=,+-]+", "_", words)[:MAX_SETTINGS_LENGTH]
+    digest = hashlib.sha256(words.encode()).hexdigest()[:10]
+    return f"{problem}@{kept}" if kept == words else f"{problem}@{kept}~{digest}"
+
+
+def settings_words(settings: Mapping[str, object], between: str = ", ") -> str:
+    """Write ``ground.friction=0.6, simulation.dt=0.01``, in the order of the keys; empty without settings."""
+    return between.join(f"{key}={json.dumps(files.strict(settings[key]))}" for key in sorted(settings))

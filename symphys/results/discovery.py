@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED
-from symphys.results.case_name import settings_words
+from symphys.results.config import settings_words
 from symphys.results.file_names import CONFIG, FIGURES, PROBLEM, RESULT
 from symphys.results.run import Run, read_run
 from symphys.results.text_files import ReportError
 
 RANKS = {word: rank for rank, word in enumerate((SOLVED, BEST_FOUND, DOUBTED))}
-"""Of verdicts; what is not named comes last."""
+"""Ranks of verdicts; others come last."""
 
 
 def middle(numbers: Sequence[float]) -> float:
-    """Return the median; the sum of two may be beyond the largest double, that of their halves is not."""
+    """Return the median; halves are added, since a sum may exceed the largest double."""
     return 2 * float(np.median(np.asarray(numbers, float) / 2))
 
 
@@ -37,7 +37,7 @@ class Entry:
         return sum(run.solved for run in self.runs)
 
     def median(self, numbers: list[float]) -> float:
-        """Return the median of those that are finite; nan if none is."""
+        """Return the median of the finite numbers; nan without any."""
         finite = [number for number in numbers if np.isfinite(number)]
         return middle(finite) if finite else np.nan
 
@@ -67,7 +67,7 @@ class Study:
 
     @property
     def best(self) -> Run:
-        """Return the best by its verdict, then the lowest objective, then the lowest cost."""
+        """Return the best run by its verdict, then the lowest objective, then the lowest cost."""
 
         def merit(run: Run) -> tuple[int, float, float]:
             known = [np.inf if np.isnan(number) else number for number in (run.objective, run.equivalents)]
@@ -94,7 +94,7 @@ def is_run(files: list[str]) -> bool:
 
 
 def read_all(root: Path, read: Callable[[Path], Run] | None = None) -> tuple[list[Run], list[Run]]:
-    """Runs with a result, and folders without a readable one; ``read``: ``read_run``, or a ``BriefReader``."""
+    """Return runs with a result, and folders without a readable one; ``read``: ``read_run``, or a ``BriefReader``."""
     runs = [read(folder) if read else read_run(folder, root) for folder in run_folders(root)]
     return [run for run in runs if run.readable], [run for run in runs if not run.readable]
 
@@ -116,7 +116,7 @@ def make_study(problem: str, place: str, runs: Sequence[Run]) -> Study:
 
 
 def sample(study: Study, most: int) -> Study:
-    """Keep at most so many runs of each solver, evenly among its seeds, the first and the last of them."""
+    """Keep at most ``most`` runs of each solver, evenly among its seeds, the first and the last of them."""
 
     def some(runs: tuple[Run, ...]) -> tuple[Run, ...]:
         chosen = np.linspace(0, len(runs) - 1, min(len(runs), most)).round().astype(int)

@@ -1,6 +1,6 @@
-"""What can be drawn: axes, their ticks and what is computed from positions overflow far below the largest double.
+"""Drawable numbers: axes, their ticks and derived lengths overflow far below the largest double.
 
-Tables have every number as it is. Figures leave out what is beyond ``LARGEST``, and the page says so.
+Tables have every number as it is. Figures leave out what is beyond ``MAX_DRAWABLE``, and the page says so.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from typing import Any, TypeVar
 import numpy as np
 
 T = TypeVar("T")
-LARGEST = 1e50
-"""In whatever unit: no length, cost or time of a sensible motion is near it, and its sixth power is a double still."""
-OVERSIZED = f"Numbers beyond {LARGEST:g} are left out of the figures; tables have them."
+MAX_DRAWABLE = 1e50
+"""Largest drawable number in any unit; its sixth power is still a double."""
+OVERSIZED = f"Numbers beyond {MAX_DRAWABLE:g} are left out of the figures; tables have them."
 
 
 def small(numbers: Any) -> bool:
-    """Whether all of them are finite and can be drawn."""
-    return bool(np.all(np.abs(np.asarray(numbers, float)) <= LARGEST))
+    """Whether all numbers are finite and can be drawn."""
+    return bool(np.all(np.abs(np.asarray(numbers, float)) <= MAX_DRAWABLE))
 
 
 def largest(array: Any) -> float:
-    """Return the largest size of those that are finite; 0 without any."""
+    """Return the largest size of the finite numbers; 0 without any."""
     sizes = np.abs(np.asarray(array, float))
     return float(np.max(sizes[np.isfinite(sizes)], initial=0.0))
 
@@ -32,8 +32,8 @@ def drawable(value: T) -> T:
     """Return a record, or a part of one, with nan for every number that is finite and cannot be drawn."""
     found: Any = value
     if isinstance(value, np.ndarray) and value.dtype.kind == "f":
-        found = np.where(np.isfinite(value) & (np.abs(value) > LARGEST), np.nan, value)
-    elif isinstance(value, float) and np.isfinite(value) and abs(value) > LARGEST:
+        found = np.where(np.isfinite(value) & (np.abs(value) > MAX_DRAWABLE), np.nan, value)
+    elif isinstance(value, float) and np.isfinite(value) and abs(value) > MAX_DRAWABLE:
         found = np.nan
     elif isinstance(value, Mapping):
         found = {key: drawable(entry) for key, entry in value.items()}
@@ -47,7 +47,7 @@ def drawable(value: T) -> T:
 def oversized(value: Any) -> bool:
     """Whether a number in a record, or a part of one, is finite and cannot be drawn."""
     if isinstance(value, float) or (isinstance(value, np.ndarray) and value.dtype.kind == "f"):
-        return largest(value) > LARGEST
+        return largest(value) > MAX_DRAWABLE
     if isinstance(value, Mapping):
         return any(map(oversized, value.values()))
     if isinstance(value, tuple):

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from symphys.types import Array, Ints
 
 COLLINEAR = 1e-9
-"""A corner counts where it makes a triangle with its neighbours of more than this area, by the square of the size."""
+"""Least area of a corner's triangle with its neighbours, relative to the squared size."""
 COPLANAR = 1e-8
-"""A point this near to the plane of a face belongs to it, by the size of the hull."""
+"""Largest distance from the plane of a face, relative to the size of the hull, of a point of the face."""
 FLAT_EXTENT = 1e-7
-"""Corners whose extent in a direction is less, by the largest one, are in a plane or in a line."""
+"""Relative extent in a direction below which corners are in a plane or on a line."""
 SMOOTH = np.cos(np.deg2rad(35))
-"""Faces whose normals are nearer to each other approximate a curved surface: pictures draw no edge between them."""
+"""Cosine between normals of faces above which pictures draw no edge: they approximate a curved surface."""
 
 
 def flat_hull(points: Array, size: float = 0.0) -> list[int]:

@@ -1,4 +1,4 @@
-"""result.json: what a run found. Every field is declared here once, for those that write it and those that read it."""
+"""result.json: the result of a run. Every field is declared here once, for writers and readers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ REACHED = frozenset(
         *("trust", "guess", "stages"),
     )
 )
-"""Fields that a run does not reach where it fails: then they are null in the file."""
+"""Fields that a failed run does not reach: null in the file."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class CheckRecord:
 
 
 def _share(error: float, tolerance: float) -> float:
-    """Error / tolerance; inf for an error without any tolerance."""
+    """Return error / tolerance; inf for an error without tolerance."""
     if tolerance > 0:
         return error / tolerance
     return 0.0 if error == 0 else error * np.inf
@@ -175,7 +175,7 @@ class Result:
 
     Attributes:
         problem, title: the file's stem and its title.
-        solver, seed: who solved it, from which guess.
+        solver, seed: solver, and number of the start.
         solved: whether every check is met, or the point is stationary where there is none, by a motion that can be
             relied on; the same as a verdict of "solved".
         status, advice: how the solver ended and what to try.
@@ -200,8 +200,8 @@ class Result:
             "flags", those of the compiler, where something was compiled, "chosen", why the solver was taken where none
             was named, and "guess", the run from which it starts.
         when: UTC time of the end, ISO 8601.
-        command: what was typed.
-        backend: what evaluated the functions.
+        command: the command line.
+        backend: the evaluator of the functions.
         verdict: a word of ``symphys.findings.verdict``.
         doubts: why the motion is not to be relied on, one clause each.
         again: whether what failed was the machine and not the run: the same command tries it again.
@@ -244,23 +244,23 @@ class Result:
 
     @property
     def interrupted(self) -> bool:
-        """Whether the same command would go on with it."""
+        """Whether the same command would resume it."""
         return self.status == "interrupted"
 
     @property
     def accepted(self) -> bool:
-        """Whether it did what was asked: solved, or the best was found of what has nothing to meet."""
+        """Whether the run achieved its aim: solved, or the best found if there is nothing to meet."""
         return self.verdict in ACCEPTED
 
     @property
     def worst(self) -> float | None:
-        """Largest ratio of the checks, nan if one is nan: all are met at 1 or below. None without any."""
+        """The largest ratio of the checks, nan if one is nan: all are met at 1 or below. None without any."""
         ratios = [check.ratio for check in self.checks]
         return max(ratios, key=lambda ratio: math.inf if math.isnan(ratio) else ratio, default=None)
 
     @property
     def worst_ratio(self) -> float:
-        """Largest ratio of the checks, inf if one is nan; nan without any."""
+        """The largest ratio of the checks, inf if one is nan; nan without any."""
         worst = math.nan if self.worst is None else self.worst
         return math.inf if self.checks and math.isnan(worst) else worst
 
@@ -309,7 +309,7 @@ class Result:
 
 
 def everything_met(entry: Mapping[str, object], result: Result) -> bool:
-    """Whether the file says that nothing is missed; one that is older than verdicts says so by ``solved``."""
+    """Whether the file says that nothing is missed; older files say so by ``solved``."""
     return all(check.met for check in result.checks) and ("verdict" in entry or entry.get("solved") is True)
 
 
@@ -333,5 +333,5 @@ def read_result(path: Path) -> Result:
 
 
 def smoothed(stages: Iterable[StageRecord]) -> bool:
-    """Whether the solver saw anything but exact contact."""
+    """Whether the solver used smoothed contact."""
     return any(stage.smoothing > 0 for stage in stages)

@@ -36,11 +36,11 @@ class Run(Result):
         place: the folder's path below the report's folder, with forward slashes.
         readable: whether there is a result; if not, only names and ``faults`` mean anything.
         description: of the problem.
-        settings: what the command line changed in the problem's file, by dotted key.
+        settings: changes by the command line in the problem's file, by dotted key.
         met: whether nothing is missed.
         examination: how far the solution can be trusted.
         trace: the iterations.
-        faults: what could not be read, one sentence each.
+        faults: unreadable parts, one sentence each.
     """
 
     folder: Path = Path()
@@ -136,7 +136,8 @@ def written_sets(problem: dict[str, object], variable: str) -> tuple[str, ...]:
 
 
 CHECK = ("kind", "name", "error", "tolerance", "ratio", "met", "unit")
-MOST_KEPT = 1000
+MAX_INTERNED = 1000
+"""Largest number of values that are kept to be shared by equal ones."""
 
 
 class BriefReader:
@@ -223,7 +224,7 @@ class BriefReader:
         """Return ``read(value)``, the same object for equal values."""
         key = f"{kind} {value!r}"
         if key not in self.kept:
-            if len(self.kept) >= MOST_KEPT:
+            if len(self.kept) >= MAX_INTERNED:
                 self.kept.clear()
             self.kept[key] = read(value)
         return self.kept[key]

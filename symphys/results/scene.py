@@ -1,4 +1,4 @@
-"""scene.json: what a picture of a motion needs of its world. Frozen records, their writing and their reading.
+"""scene.json: the part of a world that pictures of a motion need. Frozen records, their writing and their reading.
 
 What cannot be read, or is too large to draw, is left out of the picture.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from symphys import json_values as values
 from symphys.json_values import Text
 from symphys.model.shapes import SHAPES
-from symphys.results.drawable import LARGEST, small
+from symphys.results.drawable import MAX_DRAWABLE, small
 from symphys.results.polytope import Polytope, make_polytope
 from symphys.results.scene_joints import SceneJoint
 from symphys.results.text_files import read_table
@@ -109,7 +109,7 @@ def _points(value: object) -> Array:
 
 
 SIZES: dict[int, Callable[[object], Any]] = {0: _points, 1: values.number, 3: values.vector}
-"""How a size is read, by its ``SizeKey.count``."""
+"""Readers of a size, by its ``SizeKey.count``."""
 
 
 def _orientation(value: object) -> Array:
@@ -189,7 +189,7 @@ class SceneTerrain:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> SceneTerrain | None:
-        """Terrain; None if its heights are no grid over rising x and y."""
+        """Read terrain; None if its heights are no grid over rising x and y."""
         entry = values.table(value)
         x, y, rows = values.numbers(entry.get("x")), values.numbers(entry.get("y")), entry.get("z")
         found = [values.numbers(row) for row in rows] if isinstance(rows, list) else []
@@ -198,7 +198,7 @@ class SceneTerrain:
         if not all(small(side) and (np.diff(side) > 0).all() for side in (x, y)):
             return None
         z = np.array(found)
-        return cls(text(entry.get("name")), x, y, np.where(np.abs(z) <= LARGEST, z, np.nan))
+        return cls(text(entry.get("name")), x, y, np.where(np.abs(z) <= MAX_DRAWABLE, z, np.nan))
 
 
 @dataclass(frozen=True)

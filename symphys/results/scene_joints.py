@@ -1,4 +1,4 @@
-"""Joints as scene.json has them: frozen records, their writing and their reading."""
+"""Joints of scene.json: frozen records, their writing and their reading."""
 
 from __future__ import annotations
 
@@ -57,28 +57,28 @@ class SceneCoordinate:
 
 @dataclass(frozen=True)
 class SceneMotor:
-    """A motor: its kind as in problem files, and those of its numbers that there are, in SI units, by their keys."""
+    """A motor: its kind as in problem files, and its known numbers, in SI units, by their keys."""
 
     kind: str
     numbers: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def torque(self) -> float:
-        """The largest [N m] or [N]; nan where it is not known."""
+        """The largest torque [N m] or force [N]; nan where unknown."""
         return self.numbers.get("torque", np.nan)
 
     @property
     def velocity(self) -> float:
-        """The largest speed [rad/s] or [m/s]; nan where it is not known."""
+        """The largest speed [rad/s] or [m/s]; nan where unknown."""
         return self.numbers.get("velocity", np.nan)
 
     def to_json(self) -> dict[str, Any]:
-        """The ``motor`` of a joint."""
+        """Return the ``motor`` of a joint."""
         return {"kind": self.kind, **self.numbers}
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> SceneMotor | None:
-        """A motor; None for no table."""
+        """Read a motor; None for no table."""
         entry = values.table(value)
         numbers = {key: values.number(number) for key, number in entry.items() if key != "kind"}
         return cls(text(entry.get("kind")), numbers) if entry else None
@@ -111,7 +111,7 @@ class SceneJoint:
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """The names of those that it holds."""
+        """The names of the connected bodies."""
         return tuple(name for name in (self.first, self.second) if name)
 
     @property
@@ -128,7 +128,7 @@ class SceneJoint:
 
     @property
     def rotates(self) -> bool:
-        """Whether it leaves a rotation free."""
+        """Whether a rotation is free."""
         return any(self.turns) or not (self.turns or self.kind == "fixed")
 
     def to_json(self) -> dict[str, Any]:
@@ -146,7 +146,7 @@ class SceneJoint:
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> SceneJoint | None:
-        """A joint; None for one without a name, a body and two frames."""
+        """Read a joint; None for one without a name, a body and two frames."""
         entry = values.table(value)
         limits = values.numbers(entry.get("limits"))
         lower, upper = limits if limits.size == 2 else (np.nan, np.nan)

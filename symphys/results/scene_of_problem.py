@@ -1,4 +1,4 @@
-"""The scene of a problem: what a picture needs of a world whose parameters are set."""
+"""The scene of a problem: the part of a world with given parameters that pictures need."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from symphys.types import Array
 
 
 def make_scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | None = None) -> Scene:
-    """Gravity, bodies, static surfaces, and joints, in SI units, with the parameters that ``z`` (by variable) sets.
+    """Return gravity, bodies, static surfaces and joints, in SI units, with the parameters of ``z`` (by variable).
 
     Terrain is sampled where ``motion`` goes; without one, around the bodies at the start.
     """
@@ -54,7 +54,7 @@ def make_scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | No
 
 
 def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
-    """The values of the physical parameters that variables set; ``z`` holds (components, knots) arrays."""
+    """Return the physical parameters that variables set; ``z`` holds (components, knots) arrays."""
     values: dict[str, Any] = {}
     for variable in problem.variables:
         if variable.kind != "parameter":
@@ -67,13 +67,13 @@ def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:
 
 
 def make_solid(shape: Shape) -> Solid:
-    """A shape with numbers, no symbols."""
+    """Return a shape with numbers, without symbols."""
     sizes = {key: np.array(floats(size), float)[()] for key, size in shape.sizes.items()}
     return Solid.of(shape.kind, sizes, plain(shape.centre), plain(shape.orientation))
 
 
 def make_joint(joint: Joint, bodies: Sequence[str]) -> SceneJoint:
-    """A joint with numbers, no symbols; ``bodies``: the names of the world's bodies."""
+    """Return a joint with numbers, without symbols; ``bodies``: the names of the world's bodies."""
     return SceneJoint(
         name=joint.name,
         kind=joint.kind.name,
@@ -96,7 +96,7 @@ def bound(value: Scalar | None, missing: float) -> float:
 
 
 def make_motor(motor: Motor) -> SceneMotor:
-    """A motor with those of its bounds that there are, and a servo's gain."""
+    """Return a motor with its known bounds, and a servo's gain."""
     numbers = {key: float(v) for key, v in asdict(motor).items() if v is not None and not isinstance(v, tuple)}
     if isinstance(motor, AffineMotor) and math.isfinite(motor.torque):
         numbers["torque"] = motor.torque
@@ -104,16 +104,16 @@ def make_motor(motor: Motor) -> SceneMotor:
 
 
 def plain(vector: Any) -> Array:
-    """A vector of numbers."""
+    """Return a vector of numbers."""
     return np.array([float(component) for component in vector])
 
 
 MAX_HEIGHTS = 49
-"""Heights along the longer side."""
+"""Largest number of heights along the longer side."""
 MIN_ASPECT = 0.3
-"""Of the shorter side in the longer one."""
-MARGIN = 0.15
-"""On each side, as a share of the longer one."""
+"""Least ratio of the shorter side to the longer one."""
+CROP_MARGIN = 0.15
+"""Margin on each side, as a share of the longer one."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def crop(world: World, places: Array) -> TerrainCrop:
     reach = max(size(body) for body in world.bodies)
     side = float((high - low).max()) + 2 * reach
     side = side if side > 0 else 1.0
-    room = np.maximum(high - low + 2 * reach, MIN_ASPECT * side) / 2 + MARGIN * side
+    room = np.maximum(high - low + 2 * reach, MIN_ASPECT * side) / 2 + CROP_MARGIN * side
     middle = (low + high) / 2
     return TerrainCrop(middle - room, middle + room)
 
@@ -143,7 +143,7 @@ def size(body: Body) -> float:
 
 
 def sample(terrain: Terrain, near: TerrainCrop) -> SceneTerrain:
-    """The heights there."""
+    """Return heights of the terrain within a rectangle."""
     sides = near.high - near.low
     columns, rows = (int(count) for count in np.maximum(np.round(MAX_HEIGHTS * sides / sides.max()), 2))
     x, y = (np.linspace(near.low[k], near.high[k], count) for k, count in enumerate((columns, rows)))
@@ -155,5 +155,5 @@ def sample(terrain: Terrain, near: TerrainCrop) -> SceneTerrain:
 
 
 def short(numbers: Array) -> Array:
-    """Numbers with no more digits than a picture can show."""
+    """Round numbers to the digits that a picture can show."""
     return np.array([float(f"{number:.7g}") for number in numbers.tolist()])

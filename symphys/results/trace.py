@@ -16,11 +16,11 @@ from symphys.results.text_files import reason
 from symphys.types import Array
 
 OUTPUT = "output: "
-"""Before the names of columns with reported quantities of the problem, and of the solver's iteration."""
+"""Prefix of columns with reported quantities of the problem and of the solver."""
 OLD_OUTPUT = "told: "
-"""The same in older files."""
+"""The prefix in older files."""
 OLD_NAMES = {"miss": "max_violation"}
-"""Columns that older files have under another name."""
+"""Present names by the names of columns in older files."""
 
 
 def renamed(column: str) -> str:

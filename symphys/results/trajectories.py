@@ -12,20 +12,19 @@ import numpy as np
 
 from symphys import json_values as values
 from symphys.archives import MOST_BYTES, NUMBER
-from symphys.results.archives import read_archive
 from symphys.results.drawable import largest, oversized
-from symphys.results.text_files import ReportError
+from symphys.results.text_files import ReportError, read_archive
 from symphys.trajectory import Trajectory, shapes
 from symphys.types import Array
 
 ABSENT = {"force": 0.0, "torque": 0.0, "contact_force": 0.0}
-"""What stands for quantities that a file does not have, where that is not nan."""
+"""Values of quantities that a file does not have, where that is not nan."""
 UNUSED = ("residual", "crowded", "ambiguous", "paradox")
-"""Numbers on the contact solver: nothing that draws a motion depends on them, so they may be anything."""
+"""Numbers on the contact solver, which no picture of a motion uses."""
 
 
 POSES = ("time", "body_names", "position", "orientation")
-"""What is read of a guess, of which only its path is drawn: a quarter of the time of all."""
+"""The arrays that are read of a guess, of which only the path is drawn: a quarter of the reading time."""
 
 
 def read_trajectory(path: Path, only: Sequence[str] = ()) -> Trajectory:
@@ -47,7 +46,7 @@ def read_trajectory(path: Path, only: Sequence[str] = ()) -> Trajectory:
 
 
 def make_trajectory(arrays: Mapping[str, Array]) -> Trajectory:
-    """Check the shapes; quantities that are absent become nan, forces on bodies and contacts 0, orientations 1."""
+    """Check shapes; absent quantities become nan, forces on bodies and contacts 0, orientations 1."""
     time = np.asarray(arrays["time"], float).reshape(-1)
     count, bodies = shape_of(arrays["position"], time.size)
     contacts, joints = names_of(arrays, "contact_names"), names_of(arrays, "joint_names")
@@ -76,7 +75,7 @@ def make_trajectory(arrays: Mapping[str, Array]) -> Trajectory:
 
 
 def shape_of(position: Array, times: int) -> tuple[int, int]:
-    """Number of times and bodies."""
+    """Return the numbers of times and bodies."""
     if position.ndim != 3 or position.shape[2] != 3 or position.shape[0] != times or 0 in position.shape:
         raise ValueError(f"position has shape {position.shape}, ({times}, bodies, 3) is expected")
     return position.shape[0], position.shape[1]

@@ -64,7 +64,7 @@ def is_small(problem: Problem) -> bool:
 
 
 def staged(problem: Problem) -> bool:
-    """Whether controls act over time, and everything that is asked for is of one state and one input each."""
+    """Whether controls act over time, and every term depends on one state and one input."""
     asked: tuple[Cost | Target | Constraint, ...] = (*problem.costs, *problem.targets, *problem.constraints)
     return controls(problem) and not problem.free_duration and not any(each.formula.parts for each in asked)
 
@@ -75,18 +75,18 @@ def controls(problem: Problem) -> bool:
 
 
 def squares(problem: Problem) -> bool:
-    """Whether everything that is minimised is a square."""
+    """Whether every minimised term is a square."""
     return all(cost.squares for cost in problem.costs)
 
 
 def along(problem: Problem) -> bool:
-    """Whether something is asked for along the way, not at a few instants only."""
+    """Whether something is evaluated over time, not only at a few instants."""
     asked: tuple[Cost | Constraint, ...] = (*problem.costs, *problem.constraints)
     return any(each.at == ALWAYS for each in asked)
 
 
 def limited(problem: Problem) -> bool:
-    """Whether states are constrained along the way, or the file has a guess of them."""
+    """Whether states are constrained over time, or the file has a guess of them."""
     return problem.guess is not None or any(each.at == ALWAYS for each in problem.constraints)
 
 

@@ -30,17 +30,17 @@ from pathlib import Path
 from symphys import files
 from symphys import json_values as values
 
-BEAT = 10.0
+TOUCH_INTERVAL = 10.0
 """[s] between two touches of a claim."""
 LEASE = 120.0
 """[s] without a touch after which a claim of another machine is over; longer than any call that blocks all threads."""
-HELD = ".claim"
+CLAIM_FOLDER = ".claim"
 """The folder that holds the claim of a run folder."""
-ASIDE = ".claim-"
+CLAIM_PREFIX = ".claim-"
 """Prefix of the names under which claims are made and put away."""
-OWNER = "owner"
+OWNER_FILE = "owner"
 """The file of a claim that names its owner."""
-TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOENT)
+TAKEN_ERRORS = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOENT)
 """Errors of a rename where another claim exists, or where another process has removed the prepared folder."""
 seen: dict[Path, tuple[int, float]] = {}
 """Claims that this process waits for: the time of the last touch, and since when [s] this process has seen it."""
@@ -134,7 +134,7 @@ class Claim:
     @property
     def path(self) -> Path:
         """The folder of the claim."""
-        return self.folder / HELD / self.owner.token
+        return self.folder / CLAIM_FOLDER / self.owner.token
 
     @property
     def held(self) -> bool:
@@ -175,20 +175,20 @@ class Claim:
         Raises:
             FileError: the folder cannot be written.
         """
-        outer = self.folder / f"{ASIDE}{self.owner.token}"
+        outer = self.folder / f"{CLAIM_PREFIX}{self.owner.token}"
         try:
             outer.mkdir()
             (outer / self.owner.token).mkdir()
-            put(outer / self.owner.token / OWNER, json.dumps(asdict(self.owner)).encode())
+            put(outer / self.owner.token / OWNER_FILE, json.dumps(asdict(self.owner)).encode())
             with contextlib.suppress(OSError):
-                (self.folder / HELD).rmdir()  # not every system renames over an empty folder
-            outer.rename(self.folder / HELD)
+                (self.folder / CLAIM_FOLDER).rmdir()  # not every system renames over an empty folder
+            outer.rename(self.folder / CLAIM_FOLDER)
         except OSError as error:
             discard(outer / self.owner.token)
             discard(outer)
-            if error.errno in TAKEN or occupied(self.folder):
+            if error.errno in TAKEN_ERRORS or occupied(self.folder):
                 return False
-            raise files.FileError(f"cannot write {self.folder / HELD}: {files.reason(error)}") from error
+            raise files.FileError(f"cannot write {self.folder / CLAIM_FOLDER}: {files.reason(error)}") from error
         return True
 
     def release(self) -> None:
@@ -234,14 +234,14 @@ def take(folder: Path) -> Claim:
 def occupied(folder: Path) -> list[Path]:
     """Return the claims in a run folder: one at most, unless something else was put there."""
     try:
-        return sorted((folder / HELD).iterdir())
+        return sorted((folder / CLAIM_FOLDER).iterdir())
     except OSError:
         return []
 
 
 def evict(path: Path) -> None:
     """End the claim at this path, if there still is one: renamed away, it cannot publish any more."""
-    aside = path.parents[1] / f"{ASIDE}{path.name}.over"
+    aside = path.parents[1] / f"{CLAIM_PREFIX}{path.name}.over"
     with contextlib.suppress(OSError):
         path.rename(aside)
         discard(aside)
@@ -262,8 +262,8 @@ def discard(path: Path) -> None:
 def clear(folder: Path, claim: Claim) -> None:
     """Remove what processes that were killed have left of their claims."""
     for path in list(folder.iterdir()):
-        if path.name.startswith(ASIDE) and claim.held:
-            discard(path / path.name.removeprefix(ASIDE))
+        if path.name.startswith(CLAIM_PREFIX) and claim.held:
+            discard(path / path.name.removeprefix(CLAIM_PREFIX))
             discard(path)
 
 
@@ -286,7 +286,7 @@ def owner(folder: Path) -> Owner | None:
 def read_owner(path: Path) -> Owner:
     """Return the owner of a claim; an anonymous one if its file cannot be read."""
     try:
-        return values.record(Owner, json.loads(files.read_text(path / OWNER)), values.verbatim)
+        return values.record(Owner, json.loads(files.read_text(path / OWNER_FILE)), values.verbatim)
     except (ValueError, RecursionError, files.FileError):
         return Owner()
 
@@ -333,7 +333,7 @@ class Heart:
     def run(self) -> None:
         """Touch all claims, forever."""
         while True:
-            time.sleep(BEAT)
+            time.sleep(TOUCH_INTERVAL)
             with self.lock:
                 held = list(self.claims)
             for claim in held:

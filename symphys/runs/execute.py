@@ -1,4 +1,4 @@
-"""One run from its beginning to a finished folder: claim it, solve, judge by the exact rollout, examine, write."""
+"""One run from start to finished folder: claim it, solve, judge by the exact rollout, examine, write."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ Transcribe = Callable[[Problem, bool], Transcription]
 """(problem, whether it is only ever evaluated without smoothing) -> its transcription."""
 Transcriptions = Callable[[Job], Transcription]
 """Job -> the transcription of its problem, such as a ``TranscriptionCache``."""
-SAMPLES = "samples of [[scenario]] tables are evaluated by compiled kernels, and none can be made here"
-SMOOTHED = (
+NO_SAMPLES = "samples of [[scenario]] tables are evaluated by compiled kernels, and none can be made here"
+SMOOTHED_ONLY = (
     "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing, or add a stage at 0, "
     "such as smoothing = [0.1, 0.01, 0]"
 )
@@ -46,8 +46,8 @@ JUDGING = "rolling it out exactly"
 """The progress message with which judging a solution begins."""
 CHECKPOINT_INTERVAL = 10.0
 """[s] at least between two checkpoints of a run."""
-SHARE = 50
-"""Writing checkpoints takes at most one second in so many."""
+MIN_CHECKPOINT_SPACING = 50
+"""Least time between checkpoints, in units of the time to write one."""
 
 
 def no_callback(_: object) -> None:
@@ -146,7 +146,7 @@ def with_claim(
 
 
 def is_over(job: Job, found: RunInspection) -> bool:
-    """Whether there is nothing to do: the run is over and not to be repeated."""
+    """Whether the run is over and not to be repeated."""
     return found.state not in UNFINISHED and (not job.outdated or found.stamp != job.outdated)
 
 
@@ -169,7 +169,7 @@ def transcribed(job: Job, transcriptions: Transcriptions) -> Transcription:
     try:
         require_kernels(backend)
     except Unavailable as error:
-        raise Unavailable(f"{SAMPLES}: {error}") from error
+        raise Unavailable(f"{NO_SAMPLES}: {error}") from error
     found = transcriptions(job)
     if found.shooting.scenario is None:
         raise Unavailable(found.backend.note)
@@ -286,7 +286,7 @@ def judge(
     known = Examination.from_json(files.strict(examined or {}))
     found = () if well else obstacles(known, judged(verdict))
     # more iterations do not help where the costs outweigh a target
-    rest = "" if found and known.outweighed else outcome.advice or SMOOTHED * smoothed
+    rest = "" if found and known.outweighed else outcome.advice or SMOOTHED_ONLY * smoothed
     return Judgement(verdict, taken.motion, examined, sentences([*found, rest]))
 
 
@@ -363,7 +363,7 @@ class CheckpointKeeper:
             raise
         except files.FileError as error:
             self.log(f"no checkpoint: {error}")
-        self.due = monotonic() + max(self.every, SHARE * (monotonic() - began))
+        self.due = monotonic() + max(self.every, MIN_CHECKPOINT_SPACING * (monotonic() - began))
 
 
 def stop_at_limit(job: Job, message: str) -> Result:

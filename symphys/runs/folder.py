@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from symphys import files
-from symphys.results.case_name import case_name
-from symphys.results.config import Config
+from symphys.results.config import Config, case_name
 from symphys.results.file_names import (
     CHECKPOINT,
     CONFIG,
@@ -44,7 +43,7 @@ class RunFolder:
         settings: Mapping[str, object] | None = None,
         guess: str = "",
     ) -> RunFolder:
-        """OUT/<case>/<solver>-seed<k>; FileError for a problem whose name would lead out of OUT."""
+        """Return OUT/<case>/<solver>-seed<k>; FileError for a problem whose name would lead out of OUT."""
         if problem in {"", ".", ".."}:
             raise files.FileError(f"a problem called {problem!r} can have no folder: rename its file")
         return cls(out / case_name(problem, settings or {}, guess) / f"{solver}-seed{seed}")

@@ -1,4 +1,4 @@
-"""Another run as the guess: its variables by name, resampled onto the problem's knots, its motion, its multipliers."""
+"""Another run as the guess: its variables, resampled onto the problem's knots, its motion, its multipliers."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from symphys.errors import SymphysError
 from symphys.problem import Problem, Variable, load_problem
 from symphys.problem.guess.motion import GuessedMotion
 from symphys.problem.guess.recorded import recorded_guess
-from symphys.results.archives import read_archive
 from symphys.results.config import read_config
 from symphys.results.discovery import is_run, run_folders
 from symphys.results.file_names import CONFIG, MULTIPLIERS, PROBLEM, TRAJECTORY
 from symphys.results.run import read_run
+from symphys.results.text_files import read_archive
 from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory
 from symphys.types import Array
 
-DIGITS = 8
+DIGEST_DIGITS = 8
 """Digits of the digest in the names of folders."""
 
 
@@ -65,8 +65,8 @@ class GuessOrigin:
 
     @property
     def word(self) -> str:
-        """The part of a folder's name that tells guesses apart; empty without one."""
-        return f"guess={self.digest[:DIGITS]}" if self.digest else ""
+        """The part of a folder's name that distinguishes guesses; empty without one."""
+        return f"guess={self.digest[:DIGEST_DIGITS]}" if self.digest else ""
 
 
 OWN_GUESS = GuessOrigin()

@@ -1,4 +1,4 @@
-"""Jobs: runs that are asked for, with problem, solver, seed and folder."""
+"""Jobs: requested runs, with problem, solver, seed and folder."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import Any
 
 from symphys.codegen.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
-from symphys.results.case_name import case_name
-from symphys.results.config import Config, make_config
+from symphys.results.config import Config, case_name, make_config
 from symphys.runs.choice import chosen
 from symphys.runs.folder import RunFolder
 from symphys.runs.guess import OWN_GUESS, GuessOrigin, RunGuess, with_guess
@@ -19,10 +18,10 @@ from symphys.solvers import SOLVERS, recorded_options, solver
 
 @dataclass(frozen=True)
 class Job:
-    """A run that is asked for, with everything it needs; may be sent to another process.
+    """A requested run with everything that it needs; may be sent to another process.
 
     Attributes:
-        problem: what to solve.
+        problem: the problem to solve.
         config: the exact request, as plain values.
         options: of the solver, validated.
         folder: where the run is written.
@@ -65,7 +64,7 @@ class Job:
 
     @property
     def smooth(self) -> bool:
-        """Whether the solver will ask for rollouts at a smoothing above 0."""
+        """Whether the solver will use a smoothing above 0."""
         return self.problem.simulation.smoothing[0] > 0
 
 
@@ -115,7 +114,7 @@ def solver_options(problem: Problem, name: str) -> Any:
 
 
 def check_tables(problem: Problem) -> None:
-    """ProblemError if a [solver.NAME] table is of no solver, or sets what that solver does not take."""
+    """Raise ProblemError for a [solver.NAME] table of an unknown solver, or with an unknown option."""
     require_solvers(problem.solver_tables, problem.solvers or (), SOLVERS, problem.file)
     for name in problem.solver_tables:
         solver_options(problem, name)

@@ -21,10 +21,10 @@ PACKAGES = ("casadi", "numpy", "scipy", "cma")
 """Packages whose versions decide the last digits of a result."""
 ANSWER_TIMEOUT = 2.0
 """[s] after which a program of the system is not waited for any more."""
-COMMIT = re.compile("[0-9a-f]{40}|[0-9a-f]{64}")
-MOST_LINKS = 5
+COMMIT_PATTERN = re.compile("[0-9a-f]{40}|[0-9a-f]{64}")
+MAX_LINKS = 5
 """Symbolic references that are followed."""
-MOST_LINE, MOST_PACKED = 4096, 64 * 2**20
+MAX_LINE_BYTES, MAX_PACKED_BYTES = 4096, 64 * 2**20
 """[bytes] Largest file with one line, and with all references."""
 
 
@@ -110,25 +110,25 @@ def commit_of(git: Path) -> str:
         git = git.parent / (line.removeprefix("gitdir:").strip() if line.startswith("gitdir:") else "")
     common = git / (line_of(git / "commondir") or ".")
     value = line_of(git / "HEAD")
-    for _ in range(MOST_LINKS):
+    for _ in range(MAX_LINKS):
         if not value.startswith("ref:"):
             break
         name = value.removeprefix("ref:").strip()
         if name.startswith("/") or ".." in name:
             return ""
         value = line_of(git / name) or line_of(common / name) or packed(common / "packed-refs", name)
-    return value if COMMIT.fullmatch(value) else ""
+    return value if COMMIT_PATTERN.fullmatch(value) else ""
 
 
 def packed(path: Path, name: str) -> str:
     """Return the commit of a reference in packed-refs; empty if it is not there."""
-    rows = (line.split() for line in read(path, MOST_PACKED).splitlines())
+    rows = (line.split() for line in read(path, MAX_PACKED_BYTES).splitlines())
     return next((row[0] for row in rows if len(row) == 2 and row[1] == name), "")
 
 
 def line_of(path: Path) -> str:
     """Return the stripped text of a short file; empty if there is none."""
-    return read(path, MOST_LINE).strip()
+    return read(path, MAX_LINE_BYTES).strip()
 
 
 def read(path: Path, most: int) -> str:

@@ -1,4 +1,4 @@
-"""The stored variables of a run, rolled out again by the exact rollout, and compared with what is recorded.
+"""Replay of a run: its stored variables simulated again by the exact rollout, and compared with the record.
 
 Nothing of the folder is executed: it holds a problem, settings and numbers. The recorded motion was computed by the
 same rollout, so the two agree bit for bit where versions and processor do.
@@ -18,11 +18,10 @@ from symphys import json_values as values
 from symphys.errors import SymphysError
 from symphys.files import FileError
 from symphys.problem import Problem, load_problem
-from symphys.results.archives import read_archive
 from symphys.results.config import Config
 from symphys.results.file_names import CONFIG, PROBLEM, RESULT, TRAJECTORY
 from symphys.results.result import Result
-from symphys.results.text_files import ReportError, read_table
+from symphys.results.text_files import ReportError, read_archive, read_table
 from symphys.results.trajectories import make_trajectory
 from symphys.runs.execute import no_callback
 from symphys.runs.provenance import machine, versions
@@ -32,13 +31,13 @@ from symphys.types import Array
 
 BUILDING, ROLLING = "building the problem", "rolling it out"
 PARTS = {BUILDING: 8.0, ROLLING: 2.0}
-"""The parts that ``replay`` announces, and about what share of the time each takes."""
+"""The parts that ``replay`` announces, with their relative times."""
 COUNTED = {"residual": "N s", "crowded": "", "ambiguous": "", "paradox": ""}
 """Quantities of a whole step, not of a body, joint or contact, and their units."""
 
 
 class ReplayError(SymphysError):
-    """A run that cannot be rolled out again; says which file is missing or does not fit."""
+    """Raised for a run that cannot be simulated again; names the file that is missing or does not fit."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class Replay:
         folder: of the run.
         instants: of the recorded motion.
         quantities: how many were compared.
-        differences: those that are not the same to the bit, those of the motion first.
+        differences: quantities that are not bit-for-bit equal, those of the motion first.
         elsewhere: what the run was made with and what is here, by name, where the two differ: versions, processor,
             platform.
         lacking: arrays that trajectory.npz does not have, as in older files; they are not compared.
@@ -66,7 +65,7 @@ class Replay:
 
     @property
     def same(self) -> bool:
-        """Whether everything is the same, to the bit."""
+        """Whether everything is bit-for-bit equal."""
         return not self.differences and not self.fault
 
     def __str__(self) -> str:
@@ -85,7 +84,7 @@ class Replay:
 
 
 def replay(folder: Path, tell: Callable[[str], None] = no_callback) -> Replay:
-    """Roll out the variables of a run again and compare; ``tell`` is called with each of PARTS.
+    """Simulate the variables of a run again and compare; ``tell`` is called with each of PARTS.
 
     Raises:
         ReplayError: no such folder, a file that is missing or damaged, or variables that do not fit the problem.
@@ -114,7 +113,7 @@ def replay(folder: Path, tell: Callable[[str], None] = no_callback) -> Replay:
 
 
 def read_parts(folder: Path) -> tuple[Result, dict[str, Array], Problem]:
-    """Result, the arrays of a motion, and problem of a run folder. Raises as ``replay`` does."""
+    """Return result, arrays of the motion, and problem of a run folder. Raises as ``replay`` does."""
     if not folder.is_dir():
         raise ReplayError(f"{folder}: there is no such folder; a run folder is one as reports/ball_throw/cma-seed0")
     try:
@@ -160,7 +159,7 @@ def compared_table(judged: Result | Assessment) -> dict[str, float]:
 
 
 def check_fits(folder: Path, recorded: Trajectory, again: Trajectory) -> None:
-    """ReplayError where the recorded motion is of other things, or has another number of instants."""
+    """Raise ReplayError where the recorded motion has other bodies, or another number of instants."""
     for what in ("body_names", "contact_names", "joint_names", "time"):
         first, second = (np.asarray(getattr(each, what)) for each in (recorded, again))
         same = first.size == second.size if what == "time" else first.tolist() == second.tolist()
@@ -178,7 +177,7 @@ def elsewhere(result: Result) -> dict[str, tuple[str, str]]:
 
 @dataclass(frozen=True)
 class QuantityDifference:
-    """A quantity that is not the same to the bit.
+    """A quantity that is not bit-for-bit equal.
 
     Attributes:
         name: ``ball.position``, ``output: speed [m/s]``, ``objective``.

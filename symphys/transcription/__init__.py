@@ -1,4 +1,4 @@
-"""From a problem to a shooting problem: the rollout, its costs and their derivatives as casadi functions."""
+"""From a problem to a shooting problem: the rollout, its objective and their derivatives as casadi functions."""
 
 from typing import TYPE_CHECKING
 

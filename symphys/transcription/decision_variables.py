@@ -1,4 +1,4 @@
-"""From the decision vector z to what the rollout starts from: initial state, inputs of every step, parameters."""
+"""From the decision vector z to the start of a rollout: initial state, inputs of every step, parameters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from symphys.types import Expr
 
 @dataclass(frozen=True)
 class RolloutStart:
-    """x0 (nx,) without memory, u (nu, N) as variables give it and p (np,), as expressions of z."""
+    """x0 (nx,) without memory, u (nu, N) as variables set it and p (np,), as expressions of z."""
 
     x0: Expr
     u: Expr
@@ -27,7 +27,7 @@ class RolloutStart:
 
 
 def blocks(problem: Problem) -> tuple[VariableBlock, ...]:
-    """The blocks of z: one a variable."""
+    """Return the blocks of z, one for each variable."""
     return tuple(
         VariableBlock(v.name, start, (v.guess.size // v.knots, v.knots), v.guess, v.lower, v.upper, v.scale, v.spread)
         for v, (start, _) in zip(problem.variables, spans(problem.variables), strict=True)
@@ -35,9 +35,10 @@ def blocks(problem: Problem) -> tuple[VariableBlock, ...]:
 
 
 def start_of(
-    problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr, beside: Sequence[str] = ()
+    problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, z: Expr, excluded: Sequence[str] = ()
 ) -> RolloutStart:
-    """The rollout's start as a function of z, without the variables ``beside``, inputs that are added elsewhere."""
+    """Return the start of a rollout of z, without the inputs of the variables ``excluded``, added elsewhere."""
+    # Nominal initial state, parameters and inputs.
     starts = problem.parametric.starts()
     winding = [joint.name for joint in problem.parametric.joints if joint.kind.winds]
     near = {f"{name}.{UNWRAPPED}": starts[f"{name}.start"] for name in winding}
@@ -45,13 +46,14 @@ def start_of(
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
     steps, scheduled = problem.simulation.steps, parameters.phases.at(ca.DM(np.arange(problem.simulation.steps)).T)
     u = ca.vertcat(ca.MX.zeros(inputs_size(world, inputs) - scheduled.shape[0], steps), scheduled)
+    # Values of z take their places; those of single recordings come last.
     places = zip(problem.variables, spans(problem.variables), strict=True)
     parts = [(variable, z[first:last]) for variable, (first, last) in places]
     measured = initial
     for variable, part in sorted(parts, key=lambda each: each[0].each):
         if variable.each and measured is initial:
             initial = dict(measured)
-        if variable.kind == "recording" or variable.name in beside:  # the first is how a motion was measured
+        if variable.kind == "recording" or variable.name in excluded:  # the first is how a motion was measured
             continue
         if variable.kind == "control":
             u = u + _spread_inputs(problem, variable, input_columns(world, inputs), part)
@@ -59,6 +61,7 @@ def start_of(
         values = initial if variable.kind == "initial" else physical
         for slot in variable.slots:
             values[slot.name] = _replace(values[slot.name], slot.components, part)
+    # Unit quaternions, then bodies carried along by joints and moved parameters.
     varied = {slot.name for variable in problem.variables for slot in variable.slots}
     initial |= {name: _unit(initial[name]) for name in varied if name.endswith(".orientation")}
     if measured is not initial:
@@ -74,13 +77,13 @@ def start_of(
 
 
 def own_bodies(problem: Problem) -> list[str]:
-    """The bodies whose starts variables set for each recording."""
+    """Return the bodies whose initial states are variables of each recording."""
     slots = [slot.name for variable in problem.variables if variable.each for slot in variable.slots]
     return list(dict.fromkeys(name.rpartition(".")[0] for name in slots if name in problem.initial))
 
 
 def _replace(value: Expr, components: Sequence[int], part: Expr) -> Expr:
-    """``value`` with the named components taken from ``part``."""
+    """Return ``value`` with the named components taken from ``part``."""
     if list(components) == list(range(value.shape[0])):
         return part
     rows = [value[i] for i in range(value.shape[0])]
@@ -90,12 +93,12 @@ def _replace(value: Expr, components: Sequence[int], part: Expr) -> Expr:
 
 
 def _unit(q: Expr) -> Expr:
-    """A varied quaternion at length 1: solvers move its four numbers freely, a rotation needs a unit one."""
+    """Normalise a quaternion: solvers vary its four numbers freely."""
     return q / ca.norm_2(q)
 
 
 def _spread_inputs(problem: Problem, variable: Variable, columns: Mapping[str, slice], part: Expr) -> Expr:
-    """(nu, N): a control's knots as inputs of every step, in the rows that its slots name."""
+    """Return (nu, N) a control's knots as inputs of every step, in the rows that its slots name."""
     count = variable.guess.size // variable.knots
     place = ca.DM(max(column.stop for column in columns.values()), count)
     for slot in variable.slots:
@@ -107,7 +110,7 @@ def _spread_inputs(problem: Problem, variable: Variable, columns: Mapping[str, s
 
 
 def knot_weights(knots: int, steps: int, interpolation: str) -> Expr:
-    """(knots, steps) sparse: the share of each knot in each step, at its middle, since inputs act all over it.
+    """Return (knots, steps) sparse: the weight of each knot in each step, at the middle of the step.
 
     "constant": the horizon is cut into equal parts, one a knot. "linear": knots lie at equal distances from the
     start to the end of the horizon, values between them are interpolated.

@@ -1,4 +1,4 @@
-"""What a formula's names mean at one instant of a rollout, and the symbols that stand for them.
+"""The values of a formula's names at one instant of a rollout, and the symbols that stand for them.
 
 Phases may set numbers of the world. A step has one value of each number. Its inputs hold a share for each phase that
 sets something, 1 in the steps of the phase and 0 in others, and a number is base + sum of share (own - base). Impulses
@@ -22,16 +22,16 @@ from symphys.model.state_layout import input_columns, input_sizes, input_symbols
 from symphys.model.world import Scheme, World
 from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable, placing
 from symphys.problem.references import reference_values
-from symphys.transcription.feedback.sensor_memory import SensorMemory
+from symphys.transcription.sensor_memory import SensorMemory
 from symphys.types import Array, Expr
 
-QUARTER = 0.25
-"""Of a step: so far from its ends it is asked which step a number belongs to, so that rounding does not matter."""
+STEP_MARGIN = 0.25
+"""Share of a step by which times are shifted from its ends, so that rounding does not select another step."""
 
 
 @dataclass(frozen=True)
 class PhaseShare:
-    """How much of a phase there is in a step.
+    """The share of a phase in a step.
 
     Attributes:
         name: of the input.
@@ -46,18 +46,18 @@ class PhaseShare:
     before: float
 
     def at(self, tick: Expr) -> Expr:
-        """The share in the step of this number."""
+        """Return the share in the step of this number."""
         now = self._within(tick)
         return (1 - self.before) * now + self.before * self._within(ca.fmax(tick - 1, 0)) if self.before else now
 
     def _within(self, tick: Expr) -> Expr:
-        first, last = (end - QUARTER for end in self.ticks)
+        first, last = (end - STEP_MARGIN for end in self.ticks)
         return ca.logic_and(tick > first, tick < last)
 
 
 @dataclass(frozen=True)
 class PhaseNumbers:
-    """What phases set.
+    """Parameters that phases set.
 
     Attributes:
         shares: of the phases that set something, one or two each.
@@ -70,11 +70,11 @@ class PhaseNumbers:
     nominal: Mapping[str, Array] = field(default_factory=dict)
 
     def at(self, ticks: Expr) -> Expr:
-        """(shares, N): of the steps of these numbers (1, N)."""
+        """Return (shares, N) of the steps with these numbers (1, N)."""
         return ca.vertcat(type(ticks)(0, ticks.shape[1]), *(share.at(ticks) for share in self.shares))
 
     def values(self, known: Mapping[str, Expr]) -> dict[str, Expr]:
-        """Map parameters to their expressions (SX) in a step; ``known``: those that are symbols of p."""
+        """Return parameters as expressions (SX) in a step; ``known``: those that are symbols of p."""
         found = {}
         for name, parts in self.sets.items():
             base = known.get(name, ca.DM(self.nominal[name]))
@@ -106,7 +106,7 @@ def phase_numbers(problem: Problem) -> PhaseNumbers:
 
 @dataclass(frozen=True)
 class Instant:
-    """The arguments that a formula may depend on, SX: state, inputs, parameters, time, the whole of z."""
+    """The arguments that a formula may depend on, SX: state, inputs, parameters, time, all of z."""
 
     x: Expr
     u: Expr
@@ -121,14 +121,14 @@ class Instant:
 
 @dataclass(frozen=True)
 class Parameters:
-    """What p stacks: the physical parameters that variables set, the numbers of feedback, the duration if it is set.
+    """The entries of p: physical parameters that variables set, numbers of feedback, the duration if it is free.
 
     Attributes:
         names: in the order of p.
         symbols: SX, one column each.
         nominal: their values in the file.
         physical: how many of them are physical.
-        phases: which of the world's numbers change from step to step, and how.
+        phases: the numbers of the world that change from step to step.
     """
 
     names: tuple[str, ...]
@@ -149,7 +149,7 @@ class Parameters:
         return {name: found[name] for name in self.names[: self.physical]} | self.phases.values(found)
 
     def step_length(self, simulation: Simulation, p: Expr) -> Expr:
-        """[s]: a number, or an entry of ``p`` (np,) over the number of steps where a variable sets the duration."""
+        """Return the time step [s]: a number, or from an entry of ``p`` (np,) with a free duration."""
         return p[self.columns[DURATION]] / simulation.steps if DURATION in self.columns else simulation.dt
 
     def scheme(self, simulation: Simulation) -> Scheme:
@@ -158,7 +158,7 @@ class Parameters:
 
 
 def varied_parameters(problem: Problem) -> Parameters:
-    """The parameters that some variable sets, in the order of first mention, and all numbers of feedback.
+    """Return the parameters that variables set, in order of first mention, and all numbers of feedback.
 
     Feedback is controllers, force laws and phases. Of a problem of a sweep also those in which it differs from others,
     so that they share what is built.
@@ -173,13 +173,13 @@ def varied_parameters(problem: Problem) -> Parameters:
 
 
 def swept_parameters(problem: Problem) -> list[str]:
-    """The parameters in which the problems of its sweep differ, but for those that decide where bodies start."""
+    """Return the parameters that differ in a sweep, except those that set where bodies start."""
     names = problem.varied & problem.parameters.keys()
     return sorted(names.difference(placing(names)))
 
 
 def input_names(problem: Problem) -> tuple[str, ...]:
-    """The forces, torques and commands that variables set, controllers drive or force laws act on, in that order."""
+    """Return forces, torques and commands that variables, controllers or force laws set, in that order."""
     set_ = [slot.name for v in problem.variables if v.kind == "control" for slot in v.slots]
     driven = [name for controller in problem.controllers for name, _ in controller.drives]
     acted = [name for law in problem.forces for name, _, _ in law.acts_on]
@@ -187,7 +187,7 @@ def input_names(problem: Problem) -> tuple[str, ...]:
 
 
 def instant(world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory, n: int) -> Instant:
-    """Symbols for all that a formula may depend on; ``n``: length of z."""
+    """Make symbols for all arguments of a formula; ``n``: length of z."""
     return Instant(
         ca.SX.sym("x", memory.size),
         input_symbols(world, inputs),
@@ -205,7 +205,7 @@ def compile_formula(
     memory: SensorMemory,
     formula: Formula,
 ) -> ca.Function:
-    """A formula as a casadi function of (x, u, p, time, z); x with its memory.
+    """Make a formula a casadi function of (x, u, p, time, z); x with its memory.
 
     What a formula takes of a whole motion is one more argument at the end: its parts, one after the other.
     """
@@ -225,12 +225,12 @@ def compile_formula(
 
 
 def now(name: str) -> str:
-    """The name of what a control variable is at one instant; its own name is all of its knots."""
+    """Return the name of a control variable's value at one instant; its own name stands for all of its knots."""
     return f"{name} now"
 
 
 def _acting(world: World, inputs: Sequence[str], variable: Variable, u: Expr) -> Expr:
-    """(components,) what a control variable is at an instant whose inputs are ``u``."""
+    """Return (components,) the value of a control variable at an instant whose inputs are ``u``."""
     slot = variable.slots[0]
     return u[input_columns(world, inputs)[slot.name]][list(slot.components)]
 
@@ -244,7 +244,7 @@ def namespace(
     at: Instant,
     wanted: frozenset[str],
 ) -> dict[str, Expr]:
-    """Map names, except those of variables, to expressions at an instant; expensive ones only if they are wanted."""
+    """Map names, except those of variables, to expressions at an instant; costly ones only if wanted."""
     dt = parameters.step_length(problem.simulation, at.p)
     names: dict[str, Expr] = {"time": at.time, "duration": ca.SX(dt * problem.simulation.steps)}
     if memory.terminates:
@@ -262,12 +262,12 @@ def namespace(
 
 
 def moving_names(world: World) -> frozenset[str]:
-    """The names that change within a step."""
+    """Return the names that change within a step."""
     return frozenset({"time", ALIVE, *named_sensors(world)})
 
 
 def spans(variables: Sequence[Variable]) -> list[tuple[int, int]]:
-    """(start, stop) of each variable in z."""
+    """Return (start, stop) of each variable in z."""
     result, start = [], 0
     for variable in variables:
         result.append((start, start + variable.guess.size))

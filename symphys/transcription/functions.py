@@ -1,4 +1,4 @@
-"""A rollout and what a problem asks of it as casadi functions of (z, smoothing)."""
+"""A rollout and the objective of a problem as casadi functions of (z, smoothing)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from symphys.transcription.rollout import Rollout
 
 
 class ExpressionFunctions:
-    """Each function is made when it is first asked for; see ``symphys.codegen.backends.Functions``."""
+    """Functions of a rollout, made on demand; see ``symphys.codegen.backends.interface.ProblemFunctions``."""
 
     def __init__(self, rollout: Rollout, asked: Terms | None = None) -> None:
         """Prepare the functions; ``asked``: terms of the rollout, built on demand where None."""
@@ -20,7 +20,7 @@ class ExpressionFunctions:
 
     @cached_property
     def terms(self) -> Terms:
-        """All that is asked of the rollout, as expressions."""
+        """The terms of the problem as expressions."""
         return rollout_terms(self._rollout) if self._asked is None else self._asked
 
     @property
@@ -33,31 +33,31 @@ class ExpressionFunctions:
 
     @property
     def squares(self) -> Any:
-        """(m,) residuals as an expression; None where a cost is no sum of squares, or where there are none."""
+        """The residuals (m,) as an expression; None without any, or if a cost is no sum of squares."""
         r = self.terms.residuals
         return r if r is not None and r.shape[0] else None
 
     @cached_property
     def value(self) -> ca.Function:
-        """-> (merit, objective, errors, outputs)."""
+        """(z, smoothing) -> (merit, objective, errors, outputs)."""
         return self._function("value", [self._merit, *self._common, self.terms.outputs])
 
     @cached_property
     def gradient(self) -> ca.Function:
-        """-> (merit, objective, errors, d merit / dz (n,), outputs)."""
+        """(z, smoothing) -> (merit, objective, errors, d merit / dz (n,), outputs)."""
         slopes = ca.gradient(self._merit, self._rollout.z)
         return self._function("gradient", [self._merit, *self._common, slopes, self.terms.outputs])
 
     @cached_property
     def residuals(self) -> ca.Function | None:
-        """-> (r, objective, errors, outputs)."""
+        """(z, smoothing) -> (r, objective, errors, outputs)."""
         if self.squares is None:
             return None
         return self._function("residuals", [self.squares, *self._common, self.terms.outputs])
 
     @cached_property
     def jacobian(self) -> ca.Function | None:
-        """-> (r, objective, errors, dr/dz (m, n), outputs)."""
+        """(z, smoothing) -> (r, objective, errors, dr/dz (m, n), outputs)."""
         if self.squares is None:
             return None
         slopes = ca.jacobian(self.squares, self._rollout.z)
@@ -65,18 +65,18 @@ class ExpressionFunctions:
 
     @cached_property
     def nlp(self) -> ca.Function:
-        """-> (objective, constraints)."""
+        """(z, smoothing) -> (objective, constraints)."""
         return self._function("nlp", [self.terms.objective, self.terms.constraints])
 
     @cached_property
     def constraint_jacobian(self) -> ca.Function:
-        """-> (constraints, their derivative (m, n))."""
+        """(z, smoothing) -> (constraints, their derivative (m, n))."""
         constraints = self.terms.constraints
         return self._function("constraint_jacobian", [constraints, ca.jacobian(constraints, self._rollout.z)])
 
     @cached_property
     def hessian(self) -> ca.Function:
-        """-> the second derivative of the objective (n, n)."""
+        """(z, smoothing) -> the second derivative of the objective (n, n)."""
         return self._function("hessian", [ca.hessian(self.terms.objective, self._rollout.z)[0]])
 
     def _function(self, name: str, outputs: list[Any]) -> ca.Function:
@@ -84,5 +84,5 @@ class ExpressionFunctions:
 
 
 def function_of(rollout: Rollout, name: str, outputs: list[Any]) -> ca.Function:
-    """Outputs of a rollout as a function of (z, smoothing) with dense results."""
+    """Return outputs of a rollout as a function of (z, smoothing) with dense results."""
     return ca.Function(name, [rollout.z, rollout.smoothing], [ca.densify(output) for output in outputs])

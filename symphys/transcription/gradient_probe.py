@@ -1,4 +1,4 @@
-"""What is differentiated to examine a gradient: one number that depends on every formula that a problem asks for."""
+"""The number whose gradient is examined: one that depends on every formula of a problem."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ class Probe(Protocol):
     """
 
     def values(self, Z: Array) -> Array:
-        """(batch,) at Z (batch, n)."""
+        """Return the values (batch,) at Z (batch, n)."""
 
     def gradient(self, z: Array) -> Array:
-        """(n,) its derivative at z (n,)."""
+        """Return the derivative (n,) at z (n,)."""
 
 
 def combined(means: Expr) -> Expr:
-    """The combination of ``Terms.means``."""
+    """Return the combination of ``Terms.means``."""
     weights = np.random.default_rng(0).uniform(0.5, 1.5, means.shape[0])
     return ca.dot(ca.DM(weights), ca.densify(means))
 
 
 class ExpressionProbe:
-    """See ``Probe``; the gradient on casadi's virtual machine, values too where the evaluator has none.
+    """A ``Probe`` on casadi's virtual machine; an evaluator, if there is one, computes the values.
 
     A kernel's values are those of the virtual machine to the last bit, and a hundred times cheaper.
     """
 
     def __init__(self, rollout: Rollout, asked: Terms, evaluator: Evaluator) -> None:
-        """Functions are built when they are asked for."""
+        """Prepare the functions, which are built on demand."""
         self._rollout, self._number = rollout, combined(asked.means)
         self._evaluator: Evaluator | None = evaluator
         self._calls: dict[int, BufferedFunction] = {}

@@ -1,4 +1,4 @@
-"""The one yardstick: how a candidate does in the exact rollout."""
+"""The judge: the assessment of a candidate by the exact rollout."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from symphys.types import Array
 
 @dataclass(frozen=True)
 class Criterion:
-    """One thing that should hold.
+    """A target, constraint or goal with its error.
 
     Attributes:
         kind: "target", "constraint" or "goal".
@@ -32,13 +32,13 @@ class Criterion:
 
     @property
     def met(self) -> bool:
-        """Whether it holds; NaN never does."""
+        """Whether the error is within the tolerance; NaN never is."""
         return isfinite(self.ratio) and self.ratio <= 1
 
 
 @dataclass(frozen=True)
 class Assessment:
-    """Objective, each cost, each check and each output of one candidate, by name."""
+    """Objective, costs, checks and outputs of one candidate, by name."""
 
     objective: float
     costs: dict[str, float]
@@ -58,7 +58,7 @@ class Assessment:
 
 
 def assessment(problem: Problem, objective: float, costs: Array, errors: Array, outputs: Array) -> Assessment:
-    """The verdict from the numbers of the exact rollout; the arrays as in ``Terms``."""
+    """Return the assessment from the numbers of the exact rollout; the arrays as in ``Terms``."""
     checks = []
     held = [("target", t.name, t.tolerance, t.unit) for t in problem.targets]
     held += [("constraint", c.name, c.tolerance, c.unit) for c in problem.constraints]

@@ -1,4 +1,4 @@
-"""Where the first number that is not finite comes from: the start, a step, a formula, or a derivative of these."""
+"""The origin of the first number that is not finite: the start, a step, a formula, or a derivative of these."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from symphys.transcription.recorded_parts import (
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 
-WORDS = {
+OPERATION_FORMATS = {
     ca.OP_ADD: "{} + {}",
     ca.OP_SUB: "{} - {}",
     ca.OP_MUL: "{} * {}",
@@ -45,7 +45,7 @@ WORDS = {
 
 @dataclass(frozen=True)
 class NonFiniteOperation:
-    """An operation with finite operands whose result is not, on the way to a result of the function.
+    """An operation with finite operands whose result is not finite, and on which a result depends.
 
     Attributes:
         operation: with the values that it was given, such as ``1 / 0``; empty where an argument itself is not finite.
@@ -59,7 +59,7 @@ class NonFiniteOperation:
 
 
 def non_finite_operation(function: ca.Function, arguments: Sequence[Array]) -> NonFiniteOperation | None:
-    """Find the first operation of an SX function that is not finite, or None; ``arguments``: one dense vector each."""
+    """Find the first operation of an SX function that is not finite; ``arguments``: one dense vector each."""
     run = _Run(function, arguments)
     spoilt = [(place, source) for place, source in run.results if not isfinite(run.values[source])]
     if not spoilt:
@@ -104,15 +104,17 @@ class _Run:
             self.codes.append(code)
 
     def words(self, at: int) -> str:
-        """The operation with its operands' values."""
+        """Return the operation with its operands' values as text."""
         if not self.operands[at]:
             return ""
         known = [f"{self.values[x]:.6g}" for x in self.operands[at]]
-        pattern = WORDS.get(self.codes[at], f"operation {self.codes[at]} of " + ", ".join("{}" for _ in known))
+        pattern = OPERATION_FORMATS.get(
+            self.codes[at], f"operation {self.codes[at]} of " + ", ".join("{}" for _ in known)
+        )
         return pattern.format(*known)
 
     def origins(self, at: int) -> tuple[tuple[int, int], ...]:
-        """The arguments that a value is made from."""
+        """Return the arguments on which a value depends."""
         seen, left = set[int](), [at]
         while left:
             x = left.pop()
@@ -127,15 +129,16 @@ def _compute(code: int, operands: list[float]) -> float:
     return float(compute(code, *operands))
 
 
-Asked = Cost | Target | Constraint | Output
+Objective = Cost | Target | Constraint | Output
 Columns = Sequence[str]
 """A name for each element of a vector."""
 
-MOST_NAMES = 4
+MAX_NAMES = 4
+"""Largest number of names in a clause."""
 
 
 def first_non_finite(rollout: Rollout, arrays: RolloutArrays) -> str:
-    """A clause that says where the rollout, or what is asked of it, first is not finite; empty if it is nowhere."""
+    """Return a clause with the place where the rollout or a formula first is not finite; empty if nowhere."""
     return _in_start(rollout, arrays) or _in_steps(rollout, arrays) or _in_formulas(rollout, arrays)
 
 
@@ -179,7 +182,7 @@ def _in_formulas(rollout: Rollout, arrays: RolloutArrays) -> str:
 
 
 def _derivative_clause(
-    rollout: Rollout, arrays: RolloutArrays, kind: str, asked: Asked, formula: Formula, k: int, row: int
+    rollout: Rollout, arrays: RolloutArrays, kind: str, asked: Objective, formula: Formula, k: int, row: int
 ) -> str:
     compiled = rollout.compiled(formula)
     arguments = _formula_arguments(rollout, arrays, formula, k, row)
@@ -218,8 +221,8 @@ def _cause(found: NonFiniteOperation | None, names: Sequence[Columns], results: 
     return f": {found.operation}{made}{leads}" if found.operation else f"{made}{leads}"
 
 
-def _instants(rollout: Rollout) -> Iterator[tuple[str, Asked, Formula, int, int]]:
-    """(kind, objective, formula, number of the state, number of the inputs) of every evaluation of a formula."""
+def _instants(rollout: Rollout) -> Iterator[tuple[str, Objective, Formula, int, int]]:
+    """Yield (kind, objective, formula, number of the state, number of the inputs) of all evaluations of formulas."""
     problem, steps = rollout.problem, rollout.steps
     groups = (
         ("cost", problem.costs),
@@ -260,5 +263,5 @@ def _argument_names(rollout: Rollout) -> tuple[Columns, Columns, Columns]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    more = len(names) - MOST_NAMES
-    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MAX_NAMES
+    return ", ".join(names[:MAX_NAMES]) + (f" and {more} more" if more > 0 else "")

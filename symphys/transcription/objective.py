@@ -1,4 +1,4 @@
-"""Costs, targets and constraints along a rollout: the objective, its residuals, and the errors it is judged by.
+"""Costs, targets and constraints along a rollout: the objective, its residuals, and the judged errors.
 
 ``terms`` formulates them once, of the symbols of ``FormulaSamples``. Casadi's virtual machine puts expressions of a
 rollout in their place, a kernel the places of its vector, and rollouts with large nets put arrays there.
@@ -19,17 +19,17 @@ from symphys.problem import Constraint, Cost, Phase, Problem, Target
 from symphys.transcription.rollout import Rollout
 from symphys.types import Expr
 
-LONG = 512
-"""Numbers of a sum from which it may stand outside the function of all terms."""
+MIN_SEPARATE_SUM = 512
+"""Least number of terms of a sum that may be computed outside the function of all terms."""
 Series = tuple[Formula, int]
 """A formula at the starts (0) or ends (1) of all steps."""
 Total = tuple[tuple[Series, ...], float | None]
-"""Series, and the scale of the squares that are added up too; None: there are none."""
+"""Series, and the scale of their summed squares; None without squares."""
 Sums = Callable[[float | None], tuple[Expr, Expr | None]]
 
 
 class FormulaSamples:
-    """What a problem may ask of a rollout, as symbols (MX) in whose place an evaluator puts its own values.
+    """The samples of formulas along a rollout as symbols (MX), for which evaluators substitute values.
 
     Attributes:
         z: (n,) decision vector.
@@ -55,7 +55,7 @@ class FormulaSamples:
 
     @property
     def symbols(self) -> list[Expr]:
-        """All of them: z, p, moments, series and totals."""
+        """All symbols: z, p, moments, series and totals."""
         moments = [symbol for pair in self.moments.values() for symbol in pair]
         return [self.z, self.p, *moments, *self.series.values(), *self.totals.values()]
 
@@ -71,14 +71,14 @@ class FormulaSamples:
         return self.rollout.compiled(formula)(x, u, self.p, k * self.interval, self.z, *parts)
 
     def _part(self, part: MotionPart) -> Expr:
-        """Return the part (m,) that a formula takes of the whole motion; integrals follow the rule of running costs."""
+        """Return the value (m,) of a part over the whole motion; integrals follow the rule of running costs."""
         if part.kind in ("start", "end"):
             return self.at(part.formula, 0.0 if part.kind == "start" else "end")
         average = _mean(ca.horzcat(*map(self.values, self.over_steps(part.formula))))
         return average if part.kind == "average" else self.interval * self.steps * average
 
     def over_steps(self, formula: Formula) -> tuple[Series, ...]:
-        """Return the series whose mean is the time average; two for what moves (trapezoid)."""
+        """Return the series whose mean is the time average; two (trapezoid) for moving quantities."""
         return tuple((formula, shift) for shift in ((0, 1) if self.rollout.moves(formula) else (0,)))
 
     def values(self, series: Series) -> Expr:
@@ -87,9 +87,9 @@ class FormulaSamples:
         return self.series.setdefault(series, ca.MX.sym("series", size, self.steps))
 
     def sums(self, series: tuple[Series, ...], scale: float | None) -> tuple[Expr, Expr | None]:
-        """Return the sum (m,) of the columns, and with a scale the sum of the squares of scale times each number."""
+        """Return the sum (m,) of the columns, and with a scale the sum of the scaled squares."""
         samples = ca.horzcat(*map(self.values, series))
-        if not self._separate or samples.numel() < LONG:
+        if not self._separate or samples.numel() < MIN_SEPARATE_SUM:
             return plain_sums(samples, scale)
         rows = int(samples.shape[0])
         total = self.totals.setdefault((series, scale), ca.MX.sym("total", rows + (scale is not None)))
@@ -98,7 +98,7 @@ class FormulaSamples:
 
 @dataclass(frozen=True)
 class Terms:
-    """Everything that a problem asks of a rollout, as expressions of z.
+    """Objective, residuals, constraints and outputs of a problem as expressions of z.
 
     Attributes:
         costs: (k,) weighted cost of each [[cost]].
@@ -140,9 +140,11 @@ def rollout_terms(rollout: Rollout) -> Terms:
 def terms(samples: FormulaSamples) -> Terms:
     """Return the terms of a problem as expressions of the symbols of its samples."""
     problem = samples.problem
+    # Evaluate all formulas.
     costs = [_cost(samples, cost) for cost in problem.costs]
     targets = [(target, samples.at(target.formula, target.at)) for target in problem.targets]
     limits = [_Limit(samples, constraint) for constraint in problem.constraints]
+    # Objective = costs + squared residuals of targets; penalties are squared violations.
     residuals = [np.sqrt(target.weight) * value for target, value in targets]
     objective = sum((cost.value for cost in costs), ca.MX(0)) + sum(
         (ca.sumsqr(residual) for residual in residuals), ca.MX(0)
@@ -171,7 +173,7 @@ def terms(samples: FormulaSamples) -> Terms:
 
 
 def has_squares(problem: Problem) -> bool:
-    """Whether ``Terms.residuals`` are more than none."""
+    """Whether ``Terms.residuals`` has any entries."""
     return all(cost.squares for cost in problem.costs) and bool(problem.costs or problem.targets or problem.constraints)
 
 
@@ -179,7 +181,7 @@ Bounds = tuple[tuple[str, ...], np.ndarray[Any, np.dtype[np.float64]], np.ndarra
 
 
 def bounds(problem: Problem, size_of: Callable[[Formula], int]) -> Bounds:
-    """Names, lower and upper bounds of ``Terms``, without its expressions; ``size_of`` formulas."""
+    """Return names, lower and upper bounds of ``Terms``, without its expressions; ``size_of`` formulas."""
     names, lower, upper = list[str](), [np.zeros(0)], [np.zeros(0)]
     steps = problem.simulation.steps
     for constraint in problem.constraints:
@@ -196,12 +198,12 @@ def bounds(problem: Problem, size_of: Callable[[Formula], int]) -> Bounds:
 
 
 def _bounds(constraint: Constraint, size: int, count: int) -> Any:
-    """(size count,) each, of so many values of a constraint."""
+    """Return lower and upper bounds (size count,) of ``count`` values of a constraint."""
     return (np.tile(np.broadcast_to(bound, (size,)), count) for bound in (constraint.lower, constraint.upper))
 
 
 def goal_error(objective: Any, goal: float) -> Any:
-    """Error / tolerance of a goal for the objective: 1 at the goal, below it where the objective is lower."""
+    """Return error / tolerance of a goal for the objective: 1 at the goal, less below it."""
     return 1 + (objective - goal) / max(abs(goal), 1e-9)
 
 
@@ -215,17 +217,17 @@ def _stack(parts: list[Expr]) -> Expr:
 
 
 def plain_sums(samples: Expr, scale: Any = None) -> tuple[Expr, Expr | None]:
-    """Return the sum of the columns, and that of the squares of scale times each number."""
+    """Return the sum of the columns, and that of the scaled squares."""
     return ca.sum2(samples), None if scale is None else ca.sumsqr(scale * ca.vec(samples))
 
 
 def _mean(samples: Expr) -> Expr:
-    """(m,): the mean of the columns."""
+    """Return the mean (m,) of the columns."""
     return ca.sum2(samples) / samples.shape[1]
 
 
 def within(samples: Expr, phase: Phase | None, steps: int) -> tuple[Expr, int]:
-    """Return the columns of a phase, of one series (N) or two (2N), and how many steps the phase has."""
+    """Return the columns of a phase, of one series (N) or two (2N), and the number of its steps."""
     if phase is None:
         return samples, steps
     first, last = phase.ticks(steps)
@@ -252,7 +254,7 @@ def _cost(samples: FormulaSamples, cost: Cost) -> _Cost:
 
 
 def _weighed(cost: Cost, values: Expr, weight: Any, sums: Sums | None = None) -> _Cost:
-    """A cost of values (m, samples); ``sums``: of a scale, where it is not one function that adds them up."""
+    """Return a cost of values (m, samples); ``sums`` computes sums by scale outside this function."""
     scale = ca.sqrt(weight) if cost.squares else None
     total, squares = plain_sums(values, scale) if sums is None else sums(scale)
     mean = total / values.shape[1]
@@ -285,7 +287,7 @@ class _Limit:
         self.error = ca.if_else(total >= 0, ca.mmax(violation), total) / constraint.tolerance  # mmax hides a NaN
 
     def _violation(self) -> Expr:
-        """(c,) >= 0: how far each value lies outside its bounds."""
+        """Return (c,) >= 0: the distance of each value from its bounds."""
         total = ca.MX.zeros(self.value.shape[0])
         for bound, sign in ((self.lower, -1), (self.upper, 1)):
             finite = np.isfinite(bound)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import casadi as ca
 import numpy as np
@@ -19,11 +19,12 @@ from symphys.codegen import AdjointDiscount, FunctionCall, MemoryLayout, Place, 
 from symphys.codegen.program.collection import uncollected
 from symphys.codegen.toolchain.identity import identity_of
 from symphys.expression import Formula
+from symphys.model.controllers import Net
+from symphys.model.controllers.net import Activation, Layer, activated
 from symphys.model.state_layout import Layout as Columns
 from symphys.model.state_layout import input_columns
-from symphys.problem import ALIVE, Problem
+from symphys.problem import ALIVE, FeedbackController, Problem
 from symphys.transcription.decision_variables import start_of
-from symphys.transcription.feedback.controller_calls import Places, control_calls
 from symphys.transcription.formula_names import spans
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.objective import FormulaSamples, Series, Terms, terms
@@ -35,14 +36,153 @@ if TYPE_CHECKING:
     from symphys.dynamics.tracing.recording import TracedCall, TracedVector
 
 
-CHUNK = 64
-"""Numbers that a call adds up."""
+class Places(Protocol):
+    """The places of a rollout in a program."""
+
+    rollout: Rollout
+    layout: MemoryLayout
+    smoothing: Place
+    x: Place
+    given: Place
+    u: Place
+    p: Place
+    time: Place
+
+
+def control_calls(rollout: Rollout, places: Places) -> list[FunctionCall]:
+    """Return the calls before those of a step, from ``x`` and ``given`` to ``u``; none without feedback."""
+    if rollout.feedback is None:
+        return []
+    return ControllerCalls(rollout, places).calls
+
+
+class ControllerCalls:
+    """Makes the calls of one step in order."""
+
+    def __init__(self, rollout: Rollout, places: Places) -> None:
+        """Make all calls."""
+        self.rollout, self.places = rollout, places
+        self.calls: list[FunctionCall] = []
+        laws, given = rollout.control.laws, places.given
+        if rollout.problem.controllers:
+            sensed = {name: self.sense(name) for name in self.used()}
+            outputs = [self.outputs(c, [sensed[name] for name in c.senses]) for c in rollout.problem.controllers]
+            given = places.u if laws is None else places.layout.take(places.u.size)
+            self.add_up(outputs, given)
+        if laws is not None:
+            self.calls.append(FunctionCall(laws, (places.x, given, places.p, places.time), (places.u,)))
+
+    def used(self) -> list[str]:
+        """Return the sensors that some controller reads."""
+        return list(dict.fromkeys(name for c in self.rollout.problem.controllers for name in c.senses))
+
+    def sense(self, name: str) -> Place:
+        """Add the call of a sensor and return the place of its reading."""
+        sensor = next(s for s in self.rollout.problem.sensors if s.name == name)
+        places = self.places
+        return self.call(self.rollout.control.sensor(sensor), places.x, places.p, places.time)
+
+    def call(self, function: ca.Function, *inputs: Place) -> Place:
+        """Add a call with one result and return the place of the result."""
+        result = self.places.layout.take(int(function.numel_out(0)))
+        self.calls.append(FunctionCall(function, inputs, (result,)))
+        return result
+
+    def outputs(self, controller: FeedbackController, senses: Sequence[Place]) -> list[Place]:
+        """Add the calls of a controller and return the places of its outputs, in order."""
+        law = controller.law
+        if isinstance(law, Net):
+            return self.net(law, self.numbers(controller, "weights"), senses)
+        sensed = [ca.SX.sym("sensed", place.size) for place in senses]
+        numbers = {key: ca.SX.sym(key, size) for key, size in law.sizes.items()}
+        time = ca.SX.sym("time")
+        value = law.act(ca.vertcat(ca.SX(0, 1), *sensed), time, numbers)
+        function = ca.Function("act", [*sensed, time, *numbers.values()], [ca.densify(ca.SX(value))])
+        held = [self.numbers(controller, key) for key in numbers]
+        return [self.call(function, *senses, self.places.time, *held)]
+
+    def numbers(self, controller: FeedbackController, key: str) -> Place:
+        """Return the place of a controller's numbers among the parameters."""
+        return part(self.places.p, self.rollout.parameters.columns[f"{controller.name}.{key}"])
+
+    def net(self, net: Net, weights: Place, senses: Sequence[Place]) -> list[Place]:
+        """Add a call for each output of a layer."""
+        values, layers = list(senses), tuple(net.layers())
+        for layer in layers:
+            result = self.places.layout.take(layer.outputs)
+            straight = part(weights, net.straight) if net.skip and layer == layers[-1] else None
+            for k in range(layer.outputs):
+                function, inputs = self.row(layer, k, weights, values, straight, senses)
+                self.calls.append(FunctionCall(function, inputs, (part(result, slice(k, k + 1)),)))
+            values = [result]
+        return values
+
+    def row(
+        self,
+        layer: Layer,
+        k: int,
+        weights: Place,
+        values: Sequence[Place],
+        straight: Place | None,
+        senses: Sequence[Place],
+    ) -> tuple[ca.Function, tuple[Place, ...]]:
+        """Return the function of one output of a layer, and its arguments."""
+        width, start = layer.inputs, layer.matrix.start
+        products = [([*values], part(weights, slice(start + k * width, start + (k + 1) * width)))]
+        if straight is not None:
+            size = sum(place.size for place in senses)
+            products.append(([*senses], part(straight, slice(k * size, (k + 1) * size))))
+        bias = layer.biases.start + k
+        biases = [part(weights, slice(bias, bias + 1))] if layer.biases.stop > layer.biases.start else []
+        sizes = [([place.size for place in inputs], held.size) for inputs, held in products]
+        places = [place for inputs, held in products for place in (*inputs, held)]
+        return row_function(layer.activation, sizes, len(biases)), (*places, *biases)
+
+    def add_up(self, outputs: Sequence[Sequence[Place]], result: Place) -> None:
+        """Add the call that sums the inputs of variables and of all controllers."""
+        controllers = self.rollout.problem.controllers
+        given = ca.SX.sym("given", self.places.u.size)
+        total, symbols = ca.SX(given), list[Expr]()
+        columns = input_columns(self.rollout.world, self.rollout.inputs)
+        for controller, parts in zip(controllers, outputs, strict=True):
+            own = [ca.SX.sym("output", place.size) for place in parts]
+            symbols += own
+            for (name, component), scale, value in zip(
+                controller.drives, controller.scale, ca.vertsplit(ca.vertcat(*own)), strict=True
+            ):
+                total[columns[name].start + component] += scale * value
+        function = ca.Function("inputs", [given, *symbols], [ca.densify(total)])
+        flat = [place for parts in outputs for place in parts]
+        self.calls.append(FunctionCall(function, (self.places.given, *flat), (result,)))
+
+
+def part(place: Place, columns: slice) -> Place:
+    """Return some words of a place."""
+    return Place(place.offset + columns.start, columns.stop - columns.start, place.stride)
+
+
+def row_function(activation: Activation, sizes: Sequence[tuple[list[int], int]], biases: int) -> ca.Function:
+    """Return (values ..., weights), those of a skip connection if there is one, and a bias -> one output."""
+    symbols, products = list[Expr](), list[Expr]()
+    for values, held in sizes:
+        own = [ca.SX.sym("value", size) for size in values]
+        weights = ca.SX.sym("weights", held)
+        symbols += [*own, weights]
+        products.append(ca.dot(weights, ca.vertcat(*own)))
+    bias = [ca.SX.sym("bias") for _ in range(biases)]
+    first, *straight = products
+    total = activated(activation, sum(bias, first))
+    return ca.Function("row", [*symbols, *bias], [ca.densify(sum(straight, total))])
+
+
+SUM_CHUNK = 64
+"""Terms that one call adds."""
 
 
 def sums_in_calls(
     layout: MemoryLayout, series: Sequence[Place], rows: int, scale: float | None
 ) -> tuple[list[FunctionCall], Place]:
-    """Calls that add up samples, and where the result lies.
+    """Return calls that sum samples, and the place of the result.
 
     Args:
         layout: takes what the calls give.
@@ -58,7 +198,7 @@ def sums_in_calls(
     calls, chunks = list[FunctionCall](), dict[int, ca.Function]()
     total = layout.take(count)
     calls.append(FunctionCall(ca.Function("zeros", [], [ca.DM.zeros(count)]), (), (total,)))
-    longest = max(CHUNK // rows, 1) * rows
+    longest = max(SUM_CHUNK // rows, 1) * rows
     for whole in series:
         for start in range(0, whole.size, longest):
             part, after = Place(whole.offset + start, min(longest, whole.size - start)), layout.take(count)
@@ -70,7 +210,7 @@ def sums_in_calls(
 
 
 def _chunk(rows: int, columns: int, scale: float | None) -> ca.Function:
-    """(sums before, samples) -> sums after."""
+    """Return (sums before, samples) -> sums after."""
     before, samples = ca.SX.sym("before", rows + (scale is not None)), ca.SX.sym("samples", rows * columns)
     after: list[Expr] = [before[i] for i in range(before.numel())]
     for k in range(rows * columns):
@@ -81,16 +221,16 @@ def _chunk(rows: int, columns: int, scale: float | None) -> ca.Function:
     return ca.Function("sums", [before, samples], [ca.vertcat(*after)])
 
 
-NOTHING: Mapping[str, Formula] = MappingProxyType({})
-ASIDE = frozenset({"name", "title", "description", "file", "text", "settings", "solvers", "solver_tables"})
-"""What no program depends on."""
+NO_FORMULAS: Mapping[str, Formula] = MappingProxyType({})
+IGNORED_FIELDS = frozenset({"name", "title", "description", "file", "text", "settings", "solvers", "solver_tables"})
+"""Fields of a problem on which no program depends."""
 
 
 class RolloutPlaces:
-    """Where a program keeps a rollout; see ``controller_calls.Places``."""
+    """The places of a rollout in a program; see ``Places``."""
 
     def __init__(self, rollout: Rollout, by_step: Sequence[str] = ()) -> None:
-        """Places for z, smoothing, times, parameters, inputs and states; ``by_step`` as in ``rollout_program``."""
+        """Reserve z, smoothing, times, parameters, inputs and states; ``by_step`` as in ``rollout_program``."""
         self.rollout, self.problem, self.steps, self.by_step = rollout, rollout.problem, rollout.steps, by_step
         self.layout = MemoryLayout()
         nx, nu, np_ = (int(part.shape[0]) for part in (rollout.x0, rollout.given, rollout.p))
@@ -104,20 +244,20 @@ class RolloutPlaces:
         self.time = self.layout.series(1, self.steps + 1)
 
     def recorded(self, formula: Formula, shift: int) -> FunctionCall:
-        """A call of each step for the value of a formula at its start (0) or end (1); results lie one after another."""
+        """Return a call of each step for a formula at its start (0) or end (1); results are contiguous."""
         function = dense(self.rollout.compiled(formula))
         out = self.layout.series(int(function.size1_out(0)), self.steps)
         places = (self.x.later(shift), self.u, self.p, self.time.later(shift), self.z)
         return FunctionCall(function, places, (out,))
 
     def whole(self, call: FunctionCall) -> Place:
-        """All results of a call of each step, one after the other."""
+        """Return all results of a call of each step in order."""
         (out,) = call.outputs
         return Place(out.offset, out.size * self.steps)
 
 
 def dense(function: ca.Function) -> ca.Function:
-    """The function with dense results."""
+    """Return the function with dense results."""
     arguments = function.sx_in()
     results = [ca.densify(result) for result in function.call(arguments)]
     return ca.Function(function.name(), arguments, results)
@@ -126,11 +266,11 @@ def dense(function: ca.Function) -> ca.Function:
 def rollout_program(
     rollout: Rollout,
     exact: bool = False,
-    recorded: Mapping[str, Formula] = NOTHING,
+    recorded: Mapping[str, Formula] = NO_FORMULAS,
     shift: int = 1,
     by_step: Sequence[str] = (),
 ) -> Program:
-    """A program of z and smoothing, with all that is asked of a rollout: see ``_epilogue``; and ``alive``.
+    """Return a program of (z, smoothing) with the outputs of ``_epilogue``, and ``alive``.
 
     Args:
         rollout: of a problem.
@@ -147,6 +287,7 @@ def rollout_program(
 def _rollout_program(
     rollout: Rollout, exact: bool, recorded: Mapping[str, Formula], shift: int, by_step: Sequence[str]
 ) -> Program:
+    # Formulas are sampled in every step; the epilogue combines the samples.
     places = RolloutPlaces(rollout, by_step)
     samples = FormulaSamples(rollout, separate=True)
     asked = terms(samples)
@@ -176,7 +317,7 @@ def _rollout_program(
 
 def program_identity(problem: Problem, exact: bool) -> str | None:
     """Return a key of a rollout's program; problems that differ only in texts and solver options share it."""
-    data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in ASIDE}
+    data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in IGNORED_FIELDS}
     return identity_of(data, exact)
 
 
@@ -208,14 +349,14 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
             places.setdefault(slot, own)
         calls.append(_guarded(piece, places, zeros))
     if after.size > columns.size:
-        calls.append(_remember(samples, _part(after, slice(columns.size, None))))
+        calls.append(_memory_call(samples, _part(after, slice(columns.size, None))))
     if rollout.termination is not None:
         calls.append(FunctionCall(rollout.termination, (samples.x, after, samples.p), (samples.x.later(),)))
     return calls
 
 
 def _most_zeros(calls: Sequence[TracedCall]) -> int:
-    """The size of the longest result that zeros stand for."""
+    """Return the size of the longest result that zeros may replace."""
     return max(
         (
             vector.size
@@ -230,7 +371,7 @@ def _most_zeros(calls: Sequence[TracedCall]) -> int:
 
 
 def _guarded(traced: TracedCall, places: Mapping[TracedVector, Place], zeros: Place | None) -> FunctionCall:
-    """A call with its guard and its section, whose vectors lie in ``places``."""
+    """Return a call with its guard and its section, whose vectors lie in ``places``."""
     inputs, outputs = (tuple([places[slot] for slot in slots]) for slots in (traced.inputs, traced.outputs))
 
     def part_of(part: Part, size: int) -> Place:
@@ -259,7 +400,7 @@ def _alive(samples: RolloutPlaces) -> Place | None:
     return _part(samples.x, memory.columns[ALIVE]) if memory.terminates else None
 
 
-def _remember(samples: Places, result: Place) -> FunctionCall:
+def _memory_call(samples: Places, result: Place) -> FunctionCall:
     """Return the call that stores what the sensors of the next step need of this one."""
     memory, inputs = samples.rollout.memory, samples.rollout.inputs
     x, u = ca.SX.sym("x", samples.x.size), ca.SX.sym("u", samples.u.size)
@@ -268,13 +409,13 @@ def _remember(samples: Places, result: Place) -> FunctionCall:
 
 
 def _part(place: Place, columns: slice) -> Place:
-    """Some columns of a state."""
+    """Return some columns of a state."""
     start, stop, _ = columns.indices(place.size)
     return Place(place.offset + start, stop - start, place.stride)
 
 
 def _knot_calls(samples: RolloutPlaces) -> list[FunctionCall]:
-    """The call that adds a step's knots to its other inputs, which are 0 where nothing else sets them.
+    """Return the call that adds a step's knots to its other inputs.
 
     There is none where the prologue writes inputs as they are, and none without inputs.
     """
@@ -314,7 +455,7 @@ def _prologue(samples: RolloutPlaces) -> tuple[FunctionCall, ...]:
 def _epilogue(
     places: RolloutPlaces, samples: FormulaSamples, asked: Terms, formulas: Mapping[Series, FunctionCall]
 ) -> tuple[tuple[FunctionCall, ...], dict[str, Place]]:
-    """The calls after the last step, and where their results lie."""
+    """Return the calls after the last step, and the places of their results."""
     parts = {
         "merit": asked.objective + asked.penalties,
         "objective": asked.objective,

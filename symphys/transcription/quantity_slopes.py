@@ -1,7 +1,7 @@
-"""Quantities over time of many rollouts of different lengths, and their exact derivatives along few directions.
+"""Quantities over time of many rollouts of different lengths, and their exact derivatives along some directions.
 
-Forward mode: a lane carries a rollout and its derivatives along ``TOGETHER`` directions. For few numbers that set a
-whole motion this costs about one rollout for each direction; adjoints cost a few for each number that comes out.
+Forward mode: a lane carries a rollout and its derivatives along ``DIRECTIONS_PER_LANE`` directions. For few numbers
+that set a whole motion this costs about one rollout for each direction; adjoints cost a few for each output number.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import numpy as np
 from symphys.codegen import Kernel, Program, compile_program, processors
 from symphys.codegen.program.tangent import tangent_name, tangent_program
 from symphys.expression import Formula
-from symphys.transcription.program import NOTHING, rollout_program
+from symphys.transcription.program import NO_FORMULAS, rollout_program
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 
-TOGETHER = 4
+DIRECTIONS_PER_LANE = 4
 """Directions in a lane. With one, 25 directions of a cube's toss took 36 rollouts; with 4, 23; with 8, 24."""
-ROWS = 128
-"""Rollouts, or groups of directions of them, in a call: the arrays of a call stay small."""
+MAX_ROWS_PER_CALL = 128
+"""Rollouts, or groups of directions of them, in a call, which bounds the memory of its arrays."""
 
 
 class QuantitySlopes:
@@ -41,9 +41,9 @@ class QuantitySlopes:
         smoothing: float = 0.0,
         threads: int | None = None,
         by_step: Sequence[str] = (),
-        watched: Mapping[str, Formula] = NOTHING,
+        watched: Mapping[str, Formula] = NO_FORMULAS,
     ) -> None:
-        """Prepare the kernels, which the first call compiles; that call raises KernelUnavailable without a compiler.
+        """Prepare the kernels, compiled at the first call, which raises KernelUnavailable without a compiler.
 
         ``by_step``: see ``rollout_program``.
         """
@@ -70,10 +70,10 @@ class QuantitySlopes:
         ``directions``: (B, n, d) how the numbers of each row of Z change.
         """
         count, n, d = directions.shape
-        groups = -(-d // TOGETHER)
-        padded = np.zeros((count, n, groups * TOGETHER))
+        groups = -(-d // DIRECTIONS_PER_LANE)
+        padded = np.zeros((count, n, groups * DIRECTIONS_PER_LANE))
         padded[:, :, :d] = directions
-        seeds = padded.reshape(count, n, groups, TOGETHER).transpose(0, 2, 1, 3).reshape(count, groups, -1)
+        seeds = padded.reshape(count, n, groups, DIRECTIONS_PER_LANE).transpose(0, 2, 1, 3).reshape(count, groups, -1)
         names = tuple(map(tangent_name, self.names))
         for rows, skipped in self._calls(lasts, groups):
             given = seeds[rows].reshape(len(rows) * groups, -1)
@@ -82,14 +82,14 @@ class QuantitySlopes:
             lengths = [lasts[row] + 1 for row in rows]
             first = {name: block[::groups] for name, block in found.items()}
             values = self._rows(first, self.names, lengths, 1)
-            lanes = self._rows(found, names, np.repeat(lengths, groups).tolist(), TOGETHER)
+            lanes = self._rows(found, names, np.repeat(lengths, groups).tolist(), DIRECTIONS_PER_LANE)
             for value in values:
-                along = [next(lanes).reshape(*value.shape, TOGETHER) for _ in range(groups)]
+                along = [next(lanes).reshape(*value.shape, DIRECTIONS_PER_LANE) for _ in range(groups)]
                 yield value, np.concatenate(along, axis=2)[:, :, :d]
 
     def _calls(self, lasts: Sequence[int], groups: int) -> Iterator[tuple[list[int], int]]:
-        """Rows that are computed together, in their order, and how many steps none of them needs."""
-        together = max(1, ROWS // groups)
+        """Yield rows that are computed in one call, in order, and how many steps none of them needs."""
+        together = max(1, MAX_ROWS_PER_CALL // groups)
         for first in range(0, len(lasts), together):
             rows = list(range(first, min(first + together, len(lasts))))
             yield rows, self.steps - 1 - max(lasts[row] for row in rows)
@@ -97,7 +97,7 @@ class QuantitySlopes:
     def _rows(
         self, found: Mapping[str, Array], names: Sequence[str], lengths: Sequence[int], width: int
     ) -> Iterator[Array]:
-        """(length, numbers): for each row the named outputs side by side."""
+        """Return (length, numbers) for each row: the named outputs side by side."""
         for row, length in enumerate(lengths):
             parts = [found[name][row].reshape(self.steps, -1)[:length] for name in names]
             yield np.concatenate([part.reshape(length, -1, width) for part in parts], axis=1).reshape(length, -1)
@@ -108,7 +108,7 @@ class QuantitySlopes:
 
     @cached_property
     def _slopes(self) -> Kernel:
-        return self._compiled(tangent_program(self._program, TOGETHER, self.names))
+        return self._compiled(tangent_program(self._program, DIRECTIONS_PER_LANE, self.names))
 
     def _compiled(self, program: Program) -> Kernel:
         return compile_program(program, seeded=(), threads=self._threads)

@@ -1,4 +1,4 @@
-"""A rollout that was simulated, as arrays, and what formulas take of it as a whole motion."""
+"""A simulated rollout as arrays, and the parts of formulas that depend on the whole motion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from symphys.types import Array
 
 @dataclass(frozen=True)
 class RolloutArrays:
-    """All that a rollout went through.
+    """States, inputs, parameters and times of a rollout.
 
     Attributes:
         z: (n,) decision vector.
@@ -48,14 +48,14 @@ class RolloutArrays:
 
 
 def part_numbers(rollout: Rollout, arrays: RolloutArrays, formula: Formula) -> list[Array]:
-    """Return what a formula takes of the whole motion, in numbers, of a rollout that was simulated."""
+    """Evaluate the parts of a formula over the whole motion of a simulated rollout."""
     if not formula.parts:
         return []
     return [np.concatenate([_numbers(rollout, arrays, part) for part in formula.parts])]
 
 
 def _numbers(rollout: Rollout, arrays: RolloutArrays, part: MotionPart) -> Array:
-    """(m,)."""
+    """Evaluate a part (m,)."""
     compiled = rollout.compiled(part.formula)
     found = [np.array(compiled(*formula_arguments(arrays, k, row))).ravel() for k, row in instants(rollout, part)]
     total = np.mean(found, axis=0)
@@ -63,7 +63,7 @@ def _numbers(rollout: Rollout, arrays: RolloutArrays, part: MotionPart) -> Array
 
 
 def instants(rollout: Rollout, part: MotionPart) -> list[tuple[int, int]]:
-    """The numbers of the states and of the inputs at which the formula of a part is evaluated."""
+    """Return the numbers of the states and of the inputs at which the formula of a part is evaluated."""
     steps = rollout.steps
     if part.kind in ("start", "end"):
         return [(0, 0)] if part.kind == "start" else [(steps, steps - 1)]

@@ -1,4 +1,4 @@
-"""Rollouts of which quantities over time are asked for, with what adjoints of them become on their way back to z."""
+"""Rollouts with quantities over time as outputs, and the adjoint of these outputs with respect to z."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class RecordedRollout:
     _kernel: Kernel
 
     def forward(self, Z: Array) -> tuple[Array, dict[str, Array]]:
-        """Values (B,), and by name the quantities (B, N, k)."""
+        """Return values (B,), and quantities (B, N, k) by name."""
         outputs = self._kernel.forward(Z, (self.smoothing,))
         found = {name: np.array(outputs[name]).reshape(len(Z), self.steps, -1) for name in self.quantities}
         return np.array(outputs[VALUE][:, 0]), found
 
     def pull(self, Z: Array, value: Array, quantities: Mapping[str, Array]) -> Array:
-        """(B, n) the adjoint of Z, from those of the values (B,) and of the quantities (B, N, k) by name."""
+        """Return adjoints (B, n) of Z, from those of the values (B,) and of the quantities (B, N, k) by name."""
         parts = [np.asarray(quantities[name], float).reshape(len(Z), -1) for name in self.quantities]
         seeds = np.ascontiguousarray(np.concatenate([np.asarray(value, float)[:, None], *parts], axis=1))
         adjoint = self._kernel.gradient(Z, seeds, (self.smoothing,))[1]
@@ -58,14 +58,14 @@ class RecordedRollout:
 def record_rollout(
     problem: Problem, quantities: Sequence[str], smoothing: float, backend: str, threads: int | None
 ) -> RecordedRollout:
-    """Compile it.
+    """Compile a rollout with quantities as outputs.
 
     Args:
-        problem: what is rolled out.
+        problem: the simulated problem.
         quantities: formulas as in problem files: ``ball.position``, ``rotate(torso.orientation, [0, 0, 1])``.
         smoothing: of the contacts [m/s].
         backend: the name of a kernel's.
-        threads: that share a batch; None: one for each processor.
+        threads: their number for a batch; None: one for each processor.
 
     Raises:
         SymphysError: a quantity is no formula, or names what the problem does not have; there can be no kernel.
@@ -91,7 +91,7 @@ def record_rollout(
 
 
 def parsed(text: str) -> Formula:
-    """The formula of a quantity."""
+    """Parse the formula of a quantity."""
     try:
         return parse(text)
     except FormulaError as error:
@@ -99,7 +99,7 @@ def parsed(text: str) -> Formula:
 
 
 def check_names(rollout: Rollout, formula: Formula) -> None:
-    """SymphysError for a name that the problem does not have."""
+    """Raise SymphysError for a name that the problem does not have."""
     at = instant(rollout.world, rollout.inputs, rollout.parameters, rollout.memory, 0)
     known = namespace(
         rollout.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.memory, at, formula.names

@@ -1,4 +1,4 @@
-"""A rollout as symbols, and formulas evaluated along it."""
+"""A rollout as symbols: force laws and controllers, the step with them, and formulas evaluated along it."""
 
 from __future__ import annotations
 
@@ -11,21 +11,173 @@ import casadi as ca
 import numpy as np
 
 from symphys.dynamics.kept import kept
+from symphys.dynamics.observation import half_step_function
 from symphys.expression import Formula
 from symphys.maths.verbatim import verbatim
+from symphys.model.state_layout import Layout, input_columns, input_sizes, inputs_size
 from symphys.model.world import World
-from symphys.problem import ALIVE, Problem, Termination
+from symphys.problem import ALIVE, FeedbackController, ForceLaw, Problem, Sensor, Termination
 from symphys.transcription.decision_variables import start_of
-from symphys.transcription.feedback.controllers import Control
-from symphys.transcription.feedback.sensor_memory import SensorMemory, memory_of
 from symphys.transcription.formula_names import (
+    STEP_MARGIN,
+    Instant,
     Parameters,
     compile_formula,
     input_names,
+    instant,
     moving_names,
+    namespace,
     varied_parameters,
 )
+from symphys.transcription.sensor_memory import SensorMemory, memory_of
 from symphys.types import Expr
+
+MIN_PIVOT = 0.5
+"""Least pivot: force laws that grow with speed grow by at most its inverse within a step."""
+
+
+def force_function(
+    problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory
+) -> ca.Function:
+    """Return (x, u, p, time) -> the inputs: u plus all force laws of the state; x with its memory.
+
+    Inputs are constant over a step, so a force of the state at t_k would be of first order. The laws are evaluated at
+    t_k + dt/2 instead, see ``half_step_function``, which makes them of second order. Velocities there depend on the
+    laws themselves, f = law(state at t_k + dt/2 under f), so that drag is the implicit midpoint rule: a body that drag
+    stops goes m v / c at any step. Two steps of Newton's method from f = 0, with one slope, solve this: exactly for
+    laws that are linear in velocities; drag that grows with them takes speed in every step.
+    """
+    at = instant(world, inputs, parameters, memory, 0)
+    scheme = parameters.scheme(problem.simulation)
+    ahead = half_step_function(world, scheme, inputs, parameters.symbols)
+    plain = Layout(world).size
+
+    # Law at the half step as a function of the forces that it adds.
+    given = ca.SX.sym("given", at.u.size1())
+    half = ca.vertcat(ahead(at.x[:plain], at.u + given, at.p), at.x[plain:])
+    moment = Instant(half, at.u, at.p, at.time + scheme.dt / 2, at.z)
+    law = _added(problem, world, inputs, parameters, memory, problem.forces, moment)
+    # Two Newton steps from zero with one slope.
+    first, slope = ca.substitute([law, ca.jacobian(law, given)], [given], [ca.SX.zeros(given.size1())])
+    found = _with_slope(first, slope)
+    again = ca.substitute(law, given, found)
+    total = at.u + found + _with_slope(again - found, slope)
+    return ca.Function("forces", [at.x, at.u, at.p, at.time], [ca.densify(total)])
+
+
+def _with_slope(first: Expr, slope: Expr) -> Expr:
+    """Solve f = first + slope f for f (nu,), by elimination among the entries that the slope (nu, nu) has."""
+    slope = ca.sparsify(slope)
+    own = sorted(set(slope.sparsity().get_triplet()[1]))
+    # Sparse Gaussian elimination of (I - slope) f = first, with pivots bounded from below.
+    rows = [{j: float(i == j) - slope[i, j] for j in own if i == j or slope.has_nz(i, j)} for i in own]
+    right = {i: first[i] for i in own}
+    for k, i in enumerate(own):
+        pivot = ca.fmax(rows[k][i], MIN_PIVOT)
+        for below in range(k + 1, len(own)):
+            share = rows[below].get(i)
+            if share is None:
+                continue
+            for j in own[k + 1 :]:
+                if j in rows[k]:
+                    rows[below][j] = rows[below].get(j, 0) - share / pivot * rows[k][j]
+            right[own[below]] -= share / pivot * right[i]
+    # Back substitution.
+    found: dict[int, Expr] = {}
+    for k, i in reversed(list(enumerate(own))):
+        known = sum((rows[k][j] * found[j] for j in own[k + 1 :] if j in rows[k]), ca.SX(0))
+        found[i] = (right[i] - known) / ca.fmax(rows[k][i], MIN_PIVOT)
+    solved = ca.SX.zeros(first.size1())
+    for i, value in found.items():
+        solved[i] = value
+    return first + ca.mtimes(slope, solved)
+
+
+def _added(
+    problem: Problem,
+    world: World,
+    inputs: Sequence[str],
+    parameters: Parameters,
+    memory: SensorMemory,
+    laws: Sequence[ForceLaw],
+    at: Instant,
+) -> Expr:
+    """Return (nu,) the inputs that laws add at an instant."""
+    total, columns = ca.SX.zeros(at.u.shape[0]), input_columns(world, inputs)
+    wanted = frozenset[str]().union(*(law.formula.names for law in laws))
+    names = namespace(problem, world, inputs, parameters, memory, at, wanted)
+    for variable in problem.variables:
+        if variable.name in wanted:
+            slot = variable.slots[0]
+            names[variable.name] = ca.vertcat(*(names[slot.name][k] for k in slot.components))
+    tick = at.time / parameters.step_length(problem.simulation, at.p)
+    for law in laws:
+        value = law.formula.evaluate({name: names[name] for name in law.formula.names})
+        if law.during is not None:
+            value = value * _within(tick, law.during, problem.simulation.steps)
+        for name, components, sign in law.acts_on:
+            for k, component in enumerate(components):
+                total[columns[name].start + component] += sign * value[k]
+    return total
+
+
+def _within(tick: Expr, shares: tuple[float, float], steps: int) -> Expr:
+    """Return 1 in the steps of a phase, else 0: at the start of a step number ``tick``, or half a step later."""
+    first, last = (round(share * steps) - STEP_MARGIN for share in shares)
+    return ca.logic_and(tick > first, tick < last)
+
+
+class Control:
+    """The sensors and controllers of a problem, as functions that a rollout calls in every step."""
+
+    def __init__(
+        self, problem: Problem, world: World, inputs: Sequence[str], parameters: Parameters, memory: SensorMemory
+    ) -> None:
+        """Prepare the functions, which are built on demand."""
+        self.problem, self.world, self.inputs, self.parameters, self.memory = problem, world, inputs, parameters, memory
+
+    def sensor(self, sensor: Sensor) -> ca.Function:
+        """Return (x, p, time) -> the reading of a sensor; x with its memory."""
+        at = instant(self.world, self.inputs, self.parameters, self.memory, 0)
+        wanted = frozenset[str]().union(*(formula.names for formula in sensor.formulas))
+        names = namespace(self.problem, self.world, self.inputs, self.parameters, self.memory, at, wanted)
+        zeros = {name: ca.SX.zeros(size) for name, size in input_sizes(self.world).items()}
+        names |= {**zeros, **self.memory.commands(at.x)}
+        parts = [ca.SX(formula.evaluate({name: names[name] for name in formula.names})) for formula in sensor.formulas]
+        return ca.Function("sense", [at.x, at.p, at.time], [ca.densify(ca.vertcat(*parts))])
+
+    def numbers(self, controller: FeedbackController, p: Expr) -> dict[str, Expr]:
+        """Return the controller's numbers among the parameters."""
+        return {key: p[self.parameters.columns[f"{controller.name}.{key}"]] for key in controller.law.sizes}
+
+    def place(self, controller: FeedbackController) -> ca.DM:
+        """Return (nu, m) sparse: the input that each output is added to, scaled."""
+        columns = input_columns(self.world, self.inputs)
+        rows = [columns[name].start + component for name, component in controller.drives]
+        count = len(rows)
+        return ca.DM.triplet(
+            rows, list(range(count)), ca.DM(controller.scale), inputs_size(self.world, self.inputs), count
+        )
+
+    def function(self) -> ca.Function:
+        """(x, u, p, time) -> the inputs: u of the variables, plus all controllers and force laws."""
+        at = instant(self.world, self.inputs, self.parameters, self.memory, 0)
+        read = {s.name: self.sensor(s)(at.x, at.p, at.time) for s in self.problem.sensors}
+        u = at.u
+        for controller in self.problem.controllers:
+            sensed = ca.vertcat(ca.SX(0, 1), *(read[name] for name in controller.senses))
+            outputs = controller.law.act(sensed, at.time, self.numbers(controller, at.p))
+            u = u + ca.mtimes(self.place(controller), outputs)
+        if self.laws is not None:
+            u = self.laws(at.x, u, at.p, at.time)
+        return ca.Function("control", [at.x, at.u, at.p, at.time], [ca.densify(u)])
+
+    @cached_property
+    def laws(self) -> ca.Function | None:
+        """Return ``force_function``; None without force laws."""
+        if not self.problem.forces:
+            return None
+        return force_function(self.problem, self.world, self.inputs, self.parameters, self.memory)
 
 
 def termination_function(
@@ -36,7 +188,7 @@ def termination_function(
     parameters: Parameters,
     memory: SensorMemory,
 ) -> ca.Function:
-    """(x, after, p) -> the next state: ``after`` is all of it but ``alive``, as the step from x has it."""
+    """Return (x, after, p) -> the next state; ``after`` is the state after the step from x without ``alive``."""
     margin = compile_formula(problem, world, inputs, parameters, memory, termination.margin)
     x, after = ca.SX.sym("x", memory.size), ca.SX.sym("after", memory.size - 1)
     p = ca.SX.sym("p", margin.size1_in(2))
@@ -54,11 +206,11 @@ class Rollout:
     """A problem's rollout as expressions of z and smoothing (MX).
 
     Attributes:
-        problem: what is rolled out.
+        problem: the simulated problem.
         world: its numbers, with symbols (SX) for the parameters that variables set.
         inputs: names of the inputs that u stacks.
-        parameters: what p stacks.
-        memory: what states x hold after those of the world.
+        parameters: the entries of p.
+        memory: the entries of x after the world's state.
         z: (n,) decision vector.
         smoothing: scalar.
         x0: (nx,) initial state.
@@ -80,40 +232,40 @@ class Rollout:
 
     @property
     def controls(self) -> int:
-        """Return how many inputs variables, controllers and laws may set: all but the shares of phases."""
+        """Return the number of inputs that variables, controllers and laws may set, without shares of phases."""
         return int(self.given.shape[0]) - len(self.world.scheduled)
 
     def with_shares(self, u: Expr, tick: Expr) -> Expr:
-        """(nu,): the inputs of a step by its number, from those that may be set."""
+        """Return (nu,) the inputs of a step by its number, with the shares of phases appended."""
         return ca.vertcat(u, self.parameters.phases.at(tick)) if self.world.scheduled else u
 
     @cached_property
     def step(self) -> ca.Function:
-        """One step (x, u, p, smoothing) -> x_next; built when first asked for, since one expression takes its time."""
+        """One step (x, u, p, smoothing) -> x_next, built on demand since one expression takes a while."""
         from symphys.dynamics.functions import step_function
 
         return self.remembering(self.built(step_function))
 
     @cached_property
     def report(self) -> ca.Function:
-        """The step with all that happens in it; see ``report_function``."""
+        """The step with all reported quantities; see ``report_function``."""
         from symphys.dynamics.functions import report_function
 
         return self.remembering(self.built(report_function))
 
     @property
     def _shares(self) -> bool:
-        """Whether problems of a sweep share what is built."""
+        """Whether problems of a sweep share the built functions."""
         return bool(self.problem.varied) and not self.problem.free_duration and not self.world.scheduled
 
     def built(self, make: Callable[..., T], *more: Hashable) -> T:
-        """Build something from the world; problems of a sweep with equal worlds share it."""
+        """Build a function of the world; problems of a sweep with equal worlds share it."""
         scheme = self.parameters.scheme(self.problem.simulation)
         arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
         return kept(make, *arguments, *more) if self._shares else make(*arguments, *more)
 
     def remembering(self, step: ca.Function) -> ca.Function:
-        """A function (x, u, p, smoothing) -> (x_next, ...) of the world's state, for states with memory."""
+        """Extend a function (x, u, p, smoothing) -> (x_next, ...) to states with memory."""
         if self.memory.size == step.size1_in(0):
             return step
         x, u = ca.MX.sym("x", self.memory.size), ca.MX.sym("u", step.size1_in(1))
@@ -149,7 +301,7 @@ class Rollout:
         return self.close(self.step)
 
     def close(self, step: ca.Function) -> ca.Function:
-        """Put the controllers into a step (x, u, p, smoothing) -> (x_next, ...), which then takes [u; time] and adds u.
+        """Add the controllers to a step (x, u, p, smoothing) -> (x_next, ...), which then takes [u; time] and adds u.
 
         Without controllers the second argument is u alone, and u is not among the results.
         """
@@ -162,7 +314,7 @@ class Rollout:
         return ca.Function(f"closed_{step.name()}", [x, given, p, smoothing], [*results, u])
 
     def rolled(self, step: ca.Function) -> tuple[Expr, Expr, list[Expr]]:
-        """States (nx, N + 1), inputs (nu, N) and what else a step gives, N columns each; ``step`` is not closed."""
+        """Return states (nx, N + 1), inputs (nu, N) and the other results of ``step``, which is not closed."""
         from symphys.dynamics.functions import roll_out
 
         given = self.given
@@ -178,35 +330,35 @@ class Rollout:
 
     @property
     def x(self) -> Expr:
-        """(nx, N + 1) states."""
+        """The states (nx, N + 1)."""
         return self._motion[0]
 
     @property
     def u(self) -> Expr:
-        """(nu, N) inputs."""
+        """The inputs (nu, N)."""
         return self.given if self.feedback is None else self._motion[1]
 
     @property
     def steps(self) -> int:
-        """N."""
+        """The number of steps ``N``."""
         return self.problem.simulation.steps
 
     @property
     def dt(self) -> float:
-        """[s] as the file has it."""
+        """The time step [s] of the file."""
         return self.problem.simulation.dt
 
     @property
     def interval(self) -> Expr:
-        """[s] the time step: ``dt``, or an expression of z where a variable sets the duration."""
+        """The time step [s]: ``dt``, or an expression of z with a free duration."""
         return self.parameters.step_length(self.problem.simulation, self.p)
 
     def compiled(self, formula: Formula) -> ca.Function:
-        """The formula as a casadi function of (x, u, p, time, z), and of its parts, one after the other."""
+        """Return the formula as a casadi function of (x, u, p, time, z), and of its parts in order."""
         return compile_formula(self.problem, self.world, self.inputs, self.parameters, self.memory, formula)
 
     def tick(self, when: str | float) -> int:
-        """The number of the state at the end, or nearest to a time [s]."""
+        """Return the number of the state at the end, or nearest to a time [s]."""
         return self.steps if isinstance(when, str) else round(when / self.dt)
 
     def sampled(self, formula: Formula, shift: int) -> Expr:
@@ -231,7 +383,7 @@ class Rollout:
 
 
 def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None, asked: Iterable[Formula] = ()) -> Rollout:
-    """The rollout of a problem over its horizon; ``inputs`` may name more than the problem itself makes use of.
+    """Make the rollout of a problem; ``inputs`` may name more than the problem itself uses.
 
     ``asked``: formulas that will be evaluated along it beside those of the problem.
     """
@@ -246,6 +398,6 @@ def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None, as
 
 
 def call(function: ca.Function, *arguments: Expr) -> list[Expr]:
-    """All results of a call."""
+    """Return all results of a call."""
     results = function(*arguments)
     return list(results) if isinstance(results, tuple) else [results]

@@ -1,4 +1,4 @@
-"""The exact rollout of one z with everything that happened in it, as plain arrays."""
+"""The exact rollout of one z with all reported quantities, as plain arrays."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from symphys.types import Array
 
 @dataclass(frozen=True)
 class Record:
-    """A rollout of ``z`` (n,): all of its states and arguments, and the motion in them."""
+    """A rollout of ``z`` (n,): its states and arguments, and the motion."""
 
     z: Array
     arrays: RolloutArrays
@@ -29,18 +29,18 @@ class Record:
 
 
 def recorder(rollout: Rollout) -> ca.Function:
-    """(z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded, ambiguous, paradox) of the whole horizon."""
+    """Return (z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded, ambiguous, paradox) over time."""
     x, u, happened = rollout.rolled(rollout.report)
     return ca.Function("record", [rollout.z, rollout.smoothing], [x, u, rollout.given, rollout.p, *happened])
 
 
 def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: float) -> Record:
-    """The rollout of z; NotFinite, which says where and why, if it has none."""
+    """Simulate z; NotFinite, with place and cause, if a number is not finite."""
     return recorded(rollout, [np.array(part) for part in record(z, smoothing)], z, smoothing)
 
 
 def recorded(rollout: Rollout, simulated: Sequence[Array], z: Array, smoothing: float) -> Record:
-    """The rollout of z from what ``recorder`` made of it; NotFinite, which says where and why, if it has none."""
+    """Return the rollout of z from the results of ``recorder``; NotFinite, with place and cause, if it has none."""
     x, u, given, p, *happened = (part.T for part in simulated)
     z = np.asarray(z, float)
     dt = rollout.parameters.step_length(rollout.problem.simulation, p.ravel())
@@ -54,7 +54,7 @@ def recorded(rollout: Rollout, simulated: Sequence[Array], z: Array, smoothing: 
 
 
 def motion_of(rollout: Rollout, time: Array, x: Array, u: Array, p: Array) -> Trajectory:
-    """The motion of states (K + 1, nx) that were simulated step by step, with inputs (K, m), at times (K + 1,)."""
+    """Return the motion of states (K + 1, nx), simulated step by step with inputs (K, m), at times (K + 1,)."""
     report, steps = rollout.report, len(u)
     if rollout.feedback is not None:
         pairs = zip(x, u, time, strict=False)
@@ -98,12 +98,12 @@ def _trajectory(
 
 
 def _counts(crowded: Array, ambiguous: Array, paradox: Array) -> dict[str, Any]:
-    """The fields that count steps of a kind."""
+    """Return the fields that count steps of a kind."""
     return {"crowded": crowded.ravel(), "ambiguous": ambiguous.ravel(), "paradox": paradox.ravel()}
 
 
 def plain(rollout: Rollout, x: Array) -> Array:
-    """The states without memory."""
+    """Return the states without memory."""
     return x[:, : Layout(rollout.world).size]
 
 
@@ -112,7 +112,7 @@ def _stack(parts: list[Any]) -> Array:
 
 
 def _joints(rollout: Rollout, x: Array, u: Array, p: Array) -> dict[str, Any]:
-    """The fields of joints."""
+    """Return the fields of joints."""
     joints = rollout.world.joints
     counts = [len(joint.kind.coordinates) for joint in joints]
     read = reading_function(rollout.world, rollout.parameters.symbols).map(rollout.steps + 1)
@@ -137,7 +137,7 @@ def _unit(joint: Joint) -> str:
 
 
 def _commands(rollout: Rollout, u: Array, counts: list[int]) -> Array:
-    """(N, coordinates of all joints): the commands of their motors."""
+    """Return (N, coordinates of all joints) the commands of their motors."""
     columns = input_columns(rollout.world, rollout.inputs)
     commands = [
         u[:, columns[name]] if (name := f"{joint.name}.command") in columns else np.zeros((rollout.steps, count))
@@ -147,7 +147,7 @@ def _commands(rollout: Rollout, u: Array, counts: list[int]) -> Array:
 
 
 def _split(columns: Array, counts: list[int]) -> Array:
-    """(N, J, K): the coordinates of all joints side by side, by joint."""
+    """Split the coordinates of all joints by joint: (N, J, K)."""
     apart = np.full((len(columns), len(counts), max(counts, default=0)), np.nan)
     start = 0
     for j, count in enumerate(counts):
@@ -157,7 +157,7 @@ def _split(columns: Array, counts: list[int]) -> Array:
 
 
 def _applied(rollout: Rollout, u: Array, field: str) -> Array:
-    """(N, B, 3): the inputs of this kind, zero for bodies without any."""
+    """Return (N, B, 3) the inputs of this kind, zero for bodies without any."""
     zero = np.zeros((rollout.steps, 3))
     columns = {name: u[:, part] for name, part in input_columns(rollout.world, rollout.inputs).items()}
     return _stack([columns.get(f"{body.name}.{field}", zero) for body in rollout.world.bodies])

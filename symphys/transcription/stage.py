@@ -1,4 +1,4 @@
-"""A stage: one time step of a problem, with what is sensed there and what is asked for.
+"""A stage: one time step of a problem, with its sensors and its terms of the objective.
 
 What takes steps one after the other, with something else between them, such as actions or nets, is made of it.
 """
@@ -20,11 +20,11 @@ from symphys.transcription.rollout import Rollout
 from symphys.types import Array, Expr
 
 Value = Callable[[Formula, int], Expr]
-"""(r,) of a formula at the start (0) or at the end (1) of the step."""
+"""The value (r,) of a formula at the start (0) or at the end (1) of the step."""
 
 
 class BatchStep(Protocol):
-    """Takes a stage for many rows: a kernel, or casadi's virtual machine.
+    """Evaluates a stage for many rows, by a kernel or casadi's virtual machine.
 
     Attributes:
         sizes: of the results, by name and in their order.
@@ -40,10 +40,10 @@ class BatchStep(Protocol):
         """Return ``Kernel.doubt``."""
 
     def forward(self, rows: Array, smoothing: Sequence[float]) -> Mapping[str, Array]:
-        """(B, m) -> results by name, each (B, size)."""
+        """Evaluate rows (B, m) -> results by name, each (B, size)."""
 
     def gradient(self, rows: Array, seeds: Array, smoothing: Sequence[float]) -> tuple[Any, Array]:
-        """(B, m), (B, all sizes) -> something, and the slopes (B, m) of seeds . results."""
+        """Evaluate rows (B, m) with seeds (B, all sizes); return also the slopes (B, m) of seeds . results."""
 
 
 class Stage:
@@ -54,7 +54,7 @@ class Stage:
     there (o,), whatever ``ask`` makes of formulas, and ``inputs`` (nu,), with what controllers and force laws add.
 
     Attributes:
-        rollout: whose step it is.
+        rollout: the rollout of the step.
         sizes: of the parts of a row.
     """
 
@@ -63,8 +63,8 @@ class Stage:
         rollout: Rollout,
         sense: ca.Function,
         ask: Callable[[Value], Mapping[str, Expr]],
-        looks_at_z: bool = True,
-        shows_inputs: bool = False,
+        reads_z: bool = True,
+        with_inputs: bool = False,
     ) -> None:
         """Describe one step of a rollout.
 
@@ -72,12 +72,12 @@ class Stage:
             rollout: of the problem.
             sense: (x, p, time) -> what is sensed, see ``sense_function``.
             ask: makes expressions (SX) of the values of formulas, by name.
-            looks_at_z: whether a row has z.
-            shows_inputs: whether ``inputs`` are among the results.
+            reads_z: whether a row has z.
+            with_inputs: whether ``inputs`` are among the results.
         """
-        self.rollout, self._sense, self._shows_inputs = rollout, sense, shows_inputs
+        self.rollout, self._sense, self._with_inputs = rollout, sense, with_inputs
         parts = rollout.x0, rollout.given, rollout.p
-        self.sizes = [*(int(part.shape[0]) for part in parts), 1, 1, int(rollout.z.shape[0]) * looks_at_z]
+        self.sizes = [*(int(part.shape[0]) for part in parts), 1, 1, int(rollout.z.shape[0]) * reads_z]
         self._values: dict[tuple[Formula, int], Expr] = {}
         asked = {name: part for name, part in ask(self._value).items() if part.shape[0]}
         self._names = tuple(asked)
@@ -94,7 +94,7 @@ class Stage:
         return KernelStep(build_kernel(backend, program, list(program.outputs), threads))
 
     def program(self, exact: bool) -> Program:
-        """The program, whose vector is a row and whose parameter is the smoothing."""
+        """Return the program, whose vector is a row and whose parameter is the smoothing."""
         places = StagePlaces(self.rollout, sum(self.sizes))
         body = step_calls(places, exact)
         after, last, found = places.x.later().still(), list[FunctionCall](), list[Place]()
@@ -109,9 +109,9 @@ class Stage:
             outputs[name] = places.layout.take(int(self._asked.size1_out(k)))
         if self._names:
             last.append(FunctionCall(self._asked, tuple(found), tuple(outputs[name] for name in self._names)))
-        if self._shows_inputs:
+        if self._with_inputs:
             outputs["inputs"] = places.u.still()
-        looks_at_z = self.sizes[-1] > 0
+        reads_z = self.sizes[-1] > 0
         written = (places.x.still(), places.given, places.p, places.time.still(), places.time.later().still())
         return Program(
             size=places.layout.size,
@@ -119,19 +119,19 @@ class Stage:
             parameters=places.smoothing,
             steps=1,
             outputs={name: place for name, place in outputs.items() if place.size},
-            prologue=(FunctionCall(self._parts(), (places.row,), (*written, *[places.z] * looks_at_z)),),
+            prologue=(FunctionCall(self._parts(), (places.row,), (*written, *[places.z] * reads_z)),),
             body=tuple(body),
             epilogue=tuple(call for call in last if any(place.size for place in call.outputs)),
-            zeroed=() if looks_at_z else (places.z,),
+            zeroed=() if reads_z else (places.z,),
         )
 
     def _parts(self) -> ca.Function:
-        """A row -> its parts."""
+        """Row -> its parts."""
         row, cuts = ca.SX.sym("row", sum(self.sizes)), np.cumsum([0, *self.sizes]).tolist()
         return ca.Function("parts", [row], [row[a:b] for a, b in pairwise(cuts)][: 6 if self.sizes[-1] else 5])
 
     def interpreted(self) -> VirtualMachineStep:
-        """On casadi's virtual machine: the judge, and machines without a compiler."""
+        """Return the stage on casadi's virtual machine, for the judge and machines without a compiler."""
         rollout = self.rollout
         row, smoothing = ca.MX.sym("row", sum(self.sizes)), ca.MX.sym("smoothing")
         x, given, p, now, later, z = ca.vertsplit(row, np.cumsum([0, *self.sizes]).tolist())
@@ -144,16 +144,16 @@ class Stage:
         ]
         found = {"after": after, "sensed": self._sense(after, p, later)}
         found |= dict(zip(self._names, self._asked.call(values), strict=True)) if self._names else {}
-        found |= {"inputs": u} if self._shows_inputs else {}
+        found |= {"inputs": u} if self._with_inputs else {}
         kept = {name: ca.densify(ca.MX(part)) for name, part in found.items() if part.shape[0]}
         return VirtualMachineStep(ca.Function("stage", [row, smoothing], list(kept.values()), ["row", "s"], list(kept)))
 
 
 class StagePlaces:
-    """Where a program keeps a stage; see ``Places``."""
+    """The places of a stage in a program; see ``Places``."""
 
     def __init__(self, rollout: Rollout, row: int) -> None:
-        """Places for a row, and for what comes of it."""
+        """Reserve a row and its results."""
         self.rollout, self.layout = rollout, MemoryLayout()
         nx, nu = int(rollout.x0.shape[0]), int(rollout.given.shape[0])
         self.row, self.smoothing = self.layout.take(row), self.layout.take(1)
@@ -164,7 +164,7 @@ class StagePlaces:
 
 
 class KernelStep:
-    """A stage by a kernel; see ``BatchStep``."""
+    """A ``BatchStep`` by a kernel."""
 
     def __init__(self, kernel: Kernel) -> None:
         """Wrap a kernel of ``Stage.program``."""
@@ -179,7 +179,7 @@ class KernelStep:
 
 
 class VirtualMachineStep:
-    """A stage on casadi's virtual machine, row by row; see ``BatchStep``."""
+    """A ``BatchStep`` on casadi's virtual machine, row by row."""
 
     doubt = ""
 
@@ -203,7 +203,7 @@ class VirtualMachineStep:
 
 
 def sense_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
-    """(x, p, time) -> what these sensors read, one after the other."""
+    """Return (x, p, time) -> the readings of these sensors in order."""
     x, p, time = ca.SX.sym("x", rollout.x0.shape[0]), ca.SX.sym("p", rollout.p.shape[0]), ca.SX.sym("time")
     known = {sensor.name: sensor for sensor in rollout.problem.sensors}
     read = [rollout.control.sensor(known[name])(x, p, time) for name in sensors]

@@ -1,24 +1,53 @@
-"""From a problem to its transcription: one rollout, as the shooting problem that solvers see."""
+"""From a problem to its transcription: the shooting problem that solvers see, with scenarios and sweeps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
+from math import exp, inf
 from time import perf_counter
+from typing import Any, Protocol
 
-from symphys.codegen.backends import BEST, Backend, BackendSource, choose
-from symphys.problem import GuessedMotion, Problem
-from symphys.shooting import GuessedStates, ShootingProblem, StagedProblem
+import casadi as ca
+import numpy as np
+
+from symphys.codegen import Kernel, KernelUnavailable, ProgramError, processors
+from symphys.codegen.backends import (
+    BEST,
+    PRECISIONS,
+    Backend,
+    BackendSource,
+    Description,
+    build_kernel,
+    choose,
+    described,
+)
+from symphys.codegen.backends.interface import joined
+from symphys.codegen.backends.simd import common, probed
+from symphys.codegen.runtime.kernel import Outputs
+from symphys.codegen.toolchain.warm_start import ProgramSource
+from symphys.problem import GuessedMotion, Problem, Variable
+from symphys.shooting import (
+    Evaluator,
+    GuessedStates,
+    Nlp,
+    ScenarioSamples,
+    ShootingProblem,
+    StagedProblem,
+    Values,
+    WithoutResiduals,
+)
 from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.network_rollout import has_large_nets
-from symphys.transcription.objective import bounds, has_squares, limits
+from symphys.transcription.objective import Terms, bounds, has_squares, limits, rollout_terms
 from symphys.transcription.program import program_identity, rollout_program
-from symphys.transcription.randomization.sampler import swept_inputs
 from symphys.transcription.rollout import Rollout, symbolic_rollout
-from symphys.transcription.shared_kernel import shared_backend
+from symphys.transcription.sampler import Sampler, swept_inputs
 from symphys.transcription.transcription import Transcription
+from symphys.types import Array
 
 
 def transcribe(
@@ -27,13 +56,13 @@ def transcribe(
     backend: str = BEST,
     threads: int | None = None,
 ) -> Transcription:
-    """Build everything that solving, judging and recording this problem needs.
+    """Transcribe a problem for solving, judging and recording.
 
     Args:
-        problem: what to solve.
+        problem: the problem to solve.
         exact: whether smoothing 0 is all that will be asked for; kernels then leave the smoothing out.
-        backend: what evaluates it, a name of ``symphys.codegen.backends.NAMES``.
-        threads: that share a batch; None: one for each processor.
+        backend: the evaluator, a name of ``symphys.codegen.backends.NAMES``.
+        threads: their number for a batch; None: one for each processor.
 
     Example:
         >>> import symphys
@@ -43,8 +72,6 @@ def transcribe(
         (False, 6)
     """
     if problem.scenarios is not None:
-        from symphys.transcription.randomization.transcription import with_scenarios
-
         plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads)
         return with_scenarios(plain, problem, exact, backend, threads)
     if has_large_nets(problem):
@@ -55,7 +82,7 @@ def transcribe(
 
 
 def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int | None) -> Transcription:
-    """Transcribe a problem, without its scenarios, as one expression: nets of any size are part of the step."""
+    """Transcribe a problem without its scenarios as one expression; nets of any size are part of the step."""
     began = perf_counter()
     rollout = symbolic_rollout(problem)
     functions = ExpressionFunctions(rollout)
@@ -83,7 +110,7 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
 
 
 def _stages(rollout: Rollout, backend: str, threads: int | None, exact: bool) -> StagedProblem:
-    """The problem step by step, for solvers that ask for it."""
+    """Return the staged problem, built on demand."""
     from symphys.transcription.staged.staged_problem import RolloutStages
 
     return RolloutStages(rollout, backend, threads, exact)
@@ -102,17 +129,260 @@ def _evaluating(
 
 
 def states_of(staged: Callable[[], StagedProblem] | None, guess: GuessedMotion | None) -> GuessedStates | None:
-    """The states of a guessed motion, where there is one and the problem can be taken step by step."""
+    """Return the states of a guessed motion, if there is one and the problem is staged."""
     if staged is None or guess is None:
         return None
-    from symphys.transcription.staged.guessed_states import guessed_states
+    from symphys.transcription.staged.staged_problem import guessed_states
 
     return lambda z, ticks, smoothing: guessed_states(staged(), guess, z, ticks, smoothing)  # type: ignore[arg-type]
 
 
 def guessed(made: Transcription, problem: Problem) -> Transcription:
-    """The transcription of a problem that differs in nothing but its guess; what is compiled is that of ``made``."""
+    """Return ``made`` for a problem that differs only in its guess; compiled functions are shared."""
     states = states_of(made.shooting.staged, problem.guess)
     return replace(
         made, problem=problem, shooting=replace(made.shooting, blocks=blocks(problem), guessed_states=states)
     )
+
+
+LATEST_BACKEND: dict[tuple[object, ...], Backend] = {}
+"""The backend of the last problem of a sweep, by everything that determines it."""
+
+
+def shared_backend(
+    problem: Problem, inputs: tuple[Variable, ...], nlp: Any, exact: bool, backend: str, threads: int | None
+) -> Backend:
+    """Return the backend of a problem by a kernel that takes some of its numbers as inputs.
+
+    A kernel has all other numbers of its problem as constants, and compiling takes longer than many a solve.
+    Programs of problems that differ only in inputs are equal, and compiled once.
+
+    Args:
+        problem: of a sweep.
+        inputs: see ``swept_inputs``.
+        nlp: of the problem itself, see ``Nlp.expression``.
+        exact: as for ``transcribe``.
+        backend: likewise.
+        threads: likewise.
+    """
+    rollout = symbolic_rollout(replace(problem, variables=(*problem.variables, *inputs)))
+    asked = rollout_terms(rollout)
+    key = (whole(rollout, asked), exact, backend, threads)
+    if key in LATEST_BACKEND:
+        made = LATEST_BACKEND[key].description
+        here = replace(made, seconds=0.0, cached=None if made.cached is None else True)
+        chosen = replace(LATEST_BACKEND[key], description=here)
+    else:
+        source = BackendSource(ExpressionFunctions(rollout, asked), lambda: rollout_program(rollout, exact), exact)
+        LATEST_BACKEND.clear()
+        chosen = LATEST_BACKEND[key] = choose(backend, source, threads)
+    numbers = np.concatenate([variable.guess for variable in inputs])
+    return replace(chosen, evaluator=BoundEvaluator(chosen.evaluator, numbers), nlp=bound_nlp(chosen.nlp, nlp, numbers))
+
+
+def whole(rollout: Rollout, asked: Terms) -> str:
+    """Return a text of everything that determines a backend: equal for problems that differ only in inputs."""
+    parts = [getattr(asked, name) for name in ("costs", "objective", "penalties", "errors", "constraints", "outputs")]
+    parts += [asked.means, *([] if asked.residuals is None else [asked.residuals])]
+    text = ca.Function("whole", [rollout.z, rollout.smoothing], parts).serialize()
+    return hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()
+
+
+class BoundEvaluator:
+    """An ``Evaluator`` that appends the same numbers to every point."""
+
+    def __init__(self, evaluator: Evaluator, numbers: Array) -> None:
+        """Append ``numbers`` (s,) to z."""
+        self.evaluator, self.numbers = evaluator, numbers
+
+    def value(self, Z: Array, smoothing: float) -> Values:
+        """Implement ``Evaluator.value``."""
+        return self.evaluator.value(self.joined(Z), smoothing)
+
+    def gradient(self, Z: Array, smoothing: float) -> Values:
+        """Implement ``Evaluator.gradient``."""
+        return self.cut(self.evaluator.gradient(self.joined(Z), smoothing))
+
+    def residuals(self, Z: Array, smoothing: float) -> Values:
+        """Implement ``Evaluator.residuals``."""
+        return self.evaluator.residuals(self.joined(Z), smoothing)
+
+    def jacobian(self, Z: Array, smoothing: float) -> Values:
+        """Implement ``Evaluator.jacobian``."""
+        return self.cut(self.evaluator.jacobian(self.joined(Z), smoothing))
+
+    def joined(self, Z: Array) -> Array:
+        """Return points (batch, n + s)."""
+        return np.hstack([Z, np.broadcast_to(self.numbers, (len(Z), self.numbers.size))])
+
+    def cut(self, found: Values) -> Values:
+        """Return the values with derivatives by z alone."""
+        count = self.numbers.size
+        slopes = {name: getattr(found, name) for name in ("gradient", "jacobian")}
+        return replace(
+            found, **{name: np.ascontiguousarray(d[..., :-count]) for name, d in slopes.items() if d is not None}
+        )
+
+
+def bound_nlp(shared: Nlp, expression: Any, numbers: Array) -> Nlp:
+    """Return objective and constraints with these numbers after z; ``expression``: of the problem itself."""
+    if shared.value is None:
+        return Nlp(expression)
+    z, smoothing = ca.MX.sym("z", expression.size1_in(0)), ca.MX.sym("smoothing")
+    joined, count = ca.vertcat(z, ca.DM(numbers)), expression.size1_in(0)
+
+    def bound(name: str, function: Any, columns: bool | None) -> Any:
+        if function is None:
+            return None
+        first, second = function(joined, smoothing)
+        if columns is not None:
+            second = second[:, :count] if columns else second[:count]
+        return ca.Function(name, [z, smoothing], [first, second])
+
+    return Nlp(
+        expression,
+        bound("value", shared.value, None),
+        bound("gradient", shared.gradient, False),
+        bound("jacobian", shared.jacobian, True),
+        keep=shared.keep,
+    )
+
+
+class SampleEvaluator(Protocol):
+    """Evaluates rows (B, n + s): points followed by the numbers of a sample."""
+
+    def sample_values(self, rows: Array, smoothing: float) -> Values:
+        """Return values without gradients."""
+        ...
+
+    def sample_gradients(self, rows: Array, smoothing: float, discount: float, skipped: int) -> Values:
+        """Return values with gradients (B, n + s).
+
+        Args:
+            rows: see above.
+            smoothing: [m/s].
+            discount: share of its adjoint that the state loses in each step back, see ``AdjointDiscount``.
+            skipped: steps at the end that are not computed.
+        """
+        ...
+
+
+class KernelSamples:
+    """A ``SampleEvaluator`` by a kernel."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        """Wrap a kernel of the sampler's problem whose merit is seeded."""
+        self.kernel = kernel
+
+    def sample_values(self, rows: Array, smoothing: float) -> Values:
+        """Implement ``SampleEvaluator.sample_values``."""
+        outputs = self.kernel.forward(rows, [smoothing])
+        return replace(values(outputs), probe=probed(self.kernel, outputs))
+
+    def sample_gradients(self, rows: Array, smoothing: float, discount: float, skipped: int) -> Values:
+        """Implement ``SampleEvaluator.sample_gradients``."""
+        outputs, slopes = self.kernel.gradient(rows, [1.0], [smoothing], discount, skipped)
+        return values(outputs, slopes)
+
+
+class ScenarioGrids:
+    """A ``ScenarioEvaluator``: a sampler and an evaluator for each time grid."""
+
+    def __init__(
+        self, grids: Sequence[str], samplers: Sequence[Sampler], evaluators: Sequence[SampleEvaluator]
+    ) -> None:
+        """Combine the samplers and evaluators of grids, which have names."""
+        self.grids, self.samplers, self.evaluators = tuple(grids), tuple(samplers), tuple(evaluators)
+
+    def draw(self, rng: np.random.Generator, count: int, width: float = 1.0, grid: int = 0) -> ScenarioSamples:
+        """Implement ``ScenarioEvaluator.draw``."""
+        return ScenarioSamples(grid, self.samplers[grid].draw(rng, count, width))
+
+    def nominal(self, count: int) -> ScenarioSamples:
+        """Return the nominal sample, ``count`` times."""
+        return ScenarioSamples(0, np.tile(self.samplers[0].nominal, (count, 1)))
+
+    def value(self, Z: Array, drawn: ScenarioSamples, smoothing: float) -> Values:
+        """Implement ``ScenarioEvaluator.value``."""
+        return self.evaluators[drawn.grid].sample_values(_joined(Z, drawn), smoothing)
+
+    def gradient(
+        self, Z: Array, drawn: ScenarioSamples, smoothing: float, adjoint_discount: float = 0.0, horizon: float = inf
+    ) -> Values:
+        """Implement ``ScenarioEvaluator.gradient``."""
+        simulation = self.samplers[drawn.grid].problem.simulation
+        discount = 1 - exp(-adjoint_discount * simulation.dt)
+        skipped = max(0, simulation.steps - round(min(horizon, simulation.duration) / simulation.dt))
+        found = self.evaluators[drawn.grid].sample_gradients(_joined(Z, drawn), smoothing, discount, skipped)
+        assert found.gradient is not None, "gradients were asked for"
+        return replace(found, gradient=np.ascontiguousarray(found.gradient[:, : Z.shape[1]]))
+
+
+class NominalEvaluator(WithoutResiduals):
+    """An ``Evaluator`` in the nominal sample."""
+
+    def __init__(self, scenario: ScenarioGrids) -> None:
+        """Wrap an evaluator of samples."""
+        self.scenario = scenario
+
+    def value(self, Z: Array, smoothing: float) -> Values:
+        """Implement ``Evaluator.value``."""
+        return self.scenario.value(Z, self.scenario.nominal(len(Z)), smoothing)
+
+    def gradient(self, Z: Array, smoothing: float) -> Values:
+        """Implement ``Evaluator.gradient``."""
+        return self.scenario.gradient(Z, self.scenario.nominal(len(Z)), smoothing)
+
+
+def _joined(Z: Array, drawn: ScenarioSamples) -> Array:
+    """Return rows (batch, n + s)."""
+    return np.hstack([np.broadcast_to(Z, (len(drawn.numbers), Z.shape[1])), drawn.numbers])
+
+
+def values(outputs: Outputs, gradient: Array | None = None) -> Values:
+    """Read the outputs of a kernel."""
+    alive = outputs["alive"][:, 0] if "alive" in outputs else None
+    return Values(*common(outputs), gradient=gradient, alive=alive)
+
+
+NO_SAMPLES = "there are no samples of scenarios"
+
+
+def with_scenarios(
+    plain: Transcription, problem: Problem, exact: bool, backend: str, threads: int | None
+) -> Transcription:
+    """Return ``plain``, transcribed without scenarios, with kernels of the scenarios as its backend.
+
+    Where there can be no kernels it stays as it is, and its backend's note says so.
+    """
+    began, count = perf_counter(), processors() if threads is None else threads
+    assert problem.scenarios is not None, "nothing differs"
+    grids = {"": problem.simulation, **{grid.name: grid.simulation for grid in problem.scenarios.discretisations}}
+    try:
+        if backend not in PRECISIONS:
+            raise KernelUnavailable(f"the backend {backend} cannot draw samples of scenarios")
+        samplers = [Sampler(replace(problem, simulation=simulation)) for simulation in grids.values()]
+        made = [_sample_evaluator(each.problem, exact, backend, count) for each in samplers]
+    except (KernelUnavailable, ProgramError) as error:
+        description = replace(plain.backend, note=f"{NO_SAMPLES}: {error}")
+        return replace(plain, problem=problem, backend=description)
+    scenario = ScenarioGrids(list(grids), samplers, [evaluator for evaluator, _ in made])
+    shooting = replace(
+        plain.shooting, evaluator=NominalEvaluator(scenario), scenario=scenario, squares=False, nlp=Nlp(None)
+    )
+    note = joined(made[0][1].note, f"{len(grids)} discretisations" if len(grids) > 1 else "")
+    cached = all(description.cached for _, description in made)
+    description = replace(made[0][1], seconds=perf_counter() - began, note=note, cached=cached)
+    return replace(plain, problem=problem, shooting=shooting, backend=description)
+
+
+def _sample_evaluator(problem: Problem, exact: bool, backend: str, threads: int) -> tuple[SampleEvaluator, Description]:
+    """Build the evaluator of one grid: a kernel, or a kernel for steps with large nets between them."""
+    if has_large_nets(problem):
+        from symphys.transcription.network_rollout.context import make_context
+        from symphys.transcription.network_rollout.transcription import large_evaluator
+
+        return large_evaluator(make_context(problem), exact, backend, threads)
+    source = ProgramSource(lambda: rollout_program(symbolic_rollout(problem), exact), program_identity(problem, exact))
+    kernel = build_kernel(backend, source, ("merit",), threads)
+    return KernelSamples(kernel), described(kernel, 0.0)

@@ -1,4 +1,4 @@
-"""What solving, judging and recording a problem needs, in one object."""
+"""A transcription: a problem with its shooting problem and the exact rollout that judges and records."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ if TYPE_CHECKING:
 Judge = Callable[..., Assessment]
 """(z, smoothing = 0) -> verdict."""
 PRICING_CALLS = 5
-"""How often a function is timed; the fastest call counts."""
+"""Calls with which a function is timed; the fastest counts."""
 
 
 @dataclass(frozen=True, eq=False)
 class Transcription:
-    """A problem, its shooting problem, and the exact rollout that judges and records; equal to itself only.
+    """A problem, its shooting problem, and the exact rollout that judges and records; compared by identity.
 
     Attributes:
-        backend: what evaluates the shooting problem.
+        backend: the evaluator of the shooting problem.
         build_seconds: until there were expressions; ``backend.seconds`` come on top.
         records_contacts: whether ``record`` has the forces and gaps of contacts.
     """
@@ -60,17 +60,17 @@ class Transcription:
         return self._judge(z, smoothing)
 
     def simulate(self, z: Array, smoothing: float = 0.0) -> Trajectory:
-        """The motion; NotFinite if there is none."""
+        """Simulate z; NotFinite if a number is not finite."""
         return self.record(z, smoothing).motion
 
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
-        """The motion and the states and arguments that it is made from; NotFinite if there is none."""
+        """Simulate z and return motion, states and arguments; NotFinite if a number is not finite."""
         from symphys.transcription.simulation import recorded
 
         return recorded(self.rollout, self._simulated(z, smoothing), z, smoothing)
 
     def _simulated(self, z: Array, smoothing: float) -> list[Array]:
-        """Return what ``recorder`` makes of z; that of the last one is kept, since judging and recording both ask."""
+        """Return the results of ``recorder`` for z; the last ones are cached for judging and recording."""
         key = np.asarray(z, np.float64).tobytes(), smoothing
         if self._last.get("key") != key:
             self._last.update(key=key, found=[np.array(part) for part in self._recorder(z, smoothing)])
@@ -81,7 +81,7 @@ class Transcription:
         return {}
 
     def motion(self, z: Array, x: Array, u: Array) -> Trajectory:
-        """The motion of states (N + 1, nx) with inputs (N, m), as variables give them, and the parameters of z (n,)."""
+        """Return the motion of states (N + 1, nx) with inputs (N, m) of variables and the parameters of z (n,)."""
         from symphys.transcription.simulation import motion_of
 
         p = np.array(self._start(z)[2]).ravel()
@@ -101,7 +101,7 @@ class Transcription:
     def prices(
         self, kinds: Iterable[str] = ("gradient", "jacobian"), clock: Callable[[], float] = perf_counter
     ) -> dict[str, float]:
-        """Measured cost of one "gradient", "jacobian" or "hessian" in rollouts, at the guess, one at a time.
+        """Measure the cost of a "gradient", "jacobian" or "hessian" in rollouts, at the guess, one at a time.
 
         A Jacobian is that of the residuals, or of the constraints where there are none. Hessians are those of
         casadi's virtual machine, whatever the backend. ``clock``: ``time.process_time`` on a busy machine.
@@ -132,7 +132,7 @@ class Transcription:
             yield adjoint
 
     def pull(self, record: Record, states: Mapping[int, Array], parameters: Array) -> Array | None:
-        """Derivatives by z of numbers that depend on single states and on the parameters: (n, m).
+        """Return derivatives (n, m) by z of numbers that depend on single states and on the parameters.
 
         Args:
             record: an exact rollout.
@@ -161,14 +161,14 @@ class Transcription:
         return self._pulled_start(record.z, adjoint, inputs, parameters)
 
     def _pulled_start(self, z: Array, x0: Array, inputs: Array, p: Array) -> Array:
-        """(n, m): what derivatives (nx, m), (N, nu, m) and (np, m) by the start's parts are by z."""
+        """Return (n, m) derivatives by z from those (nx, m), (N, nu, m), (np, m) by the start's parts."""
         start, count = self._start, p.shape[1]
         given = np.concatenate([inputs[:, :, i].T for i in range(count)], axis=1)
         known = [np.zeros(start.size_out(i)) for i in range(start.n_out())]
         return np.array(start.reverse(count)(z, *known, x0, given, p))
 
     def _backward(self, count: int) -> ca.Function:
-        """The adjoint of the step for so many directions; kept, since a robot's takes its time to build."""
+        """Return the adjoint of the step for ``count`` directions, cached since it is slow to build."""
         if count not in self._adjoints:
             self._adjoints[count] = self.rollout.closed.reverse(count)
         return self._adjoints[count]
@@ -195,7 +195,7 @@ class Transcription:
 
 
 def judge_of(rollout: Rollout, simulated: Callable[[Array, float], list[Array]]) -> Judge:
-    """A judge of candidates by what ``simulated`` makes of them: states, inputs, given inputs and parameters first."""
+    """Return a judge of candidates by the results of ``simulated``: states, inputs, given inputs, parameters, ..."""
     samples = FormulaSamples(rollout)
     asked = terms(samples)
     outputs = [ca.densify(part) for part in (asked.objective, asked.costs, asked.errors, asked.outputs)]
@@ -219,14 +219,14 @@ def judge_of(rollout: Rollout, simulated: Callable[[Array, float], list[Array]])
 def gradient_prices(
     shooting: ShootingProblem, kinds: Iterable[str], clock: Callable[[], float] = perf_counter
 ) -> dict[str, float]:
-    """``Transcription.prices`` where gradients are all that there is."""
+    """Implement ``Transcription.prices`` where only gradients are available."""
     z, evaluator = shooting.start(0)[None], shooting.evaluator
     one = fastest(lambda: evaluator.value(z, 0.0), clock)
     return {kind: fastest(lambda: evaluator.gradient(z, 0.0), clock) / one for kind in kinds if kind == "gradient"}
 
 
 def fastest(call: Callable[[], object], clock: Callable[[], float] = perf_counter) -> float:
-    """Seconds of the fastest of a few calls, by a clock."""
+    """Return the seconds of the fastest of a few calls, by a clock."""
     times = []
     for _ in range(PRICING_CALLS):
         began = clock()

@@ -50,7 +50,7 @@ def marking(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Drivers are waited for, however long they take to start and to end."""
-    monkeypatch.setattr(following, "GRACE", FOREVER)
+    monkeypatch.setattr(following, "GRACE_TIME", FOREVER)
     if find_spec("distributed"):
         monkeypatch.setattr("symphys.batches.engines.dask.TIMEOUT", FOREVER)
 
@@ -130,19 +130,19 @@ def test_submitted_jobs_give_the_same_results(marking: Any, make: Any, recorder:
 )
 def test_what_slurm_cannot_be_asked_for_is_named(scheduler: str, said: str) -> None:
     pytest.importorskip("submitit")
-    from symphys.batches.engines.slurm import read_asked
+    from symphys.batches.engines.slurm import read_request
 
     with pytest.raises(Exception, match=said):
-        read_asked(scheduler)
+        read_request(scheduler)
 
 
 def test_what_slurm_is_asked_for_has_types() -> None:
     pytest.importorskip("submitit")
-    from symphys.batches.engines.slurm import read_asked
+    from symphys.batches.engines.slurm import read_request
 
     asked = {"partition": "short", "timeout_min": 60, "mem_gb": 4.0}
-    assert read_asked("partition=short, timeout_min=60,mem_gb=4") == (False, asked)
-    assert read_asked("local") == (True, {})
+    assert read_request("partition=short, timeout_min=60,mem_gb=4") == (False, asked)
+    assert read_request("local") == (True, {})
 
 
 def test_a_machine_without_slurm_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ MakeJob = Callable[..., Job]
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, recorder: Any) -> Callable[..., tuple[BatchResult, Threads]]:
     """Run jobs by two drivers of this process; and the engine."""
-    monkeypatch.setattr(following, "TICK", 0.01)
+    monkeypatch.setattr(following, "MIN_POLL_INTERVAL", 0.01)
     monkeypatch.setattr(driver, "POLL_INTERVAL", 0.0)
 
     def made(jobs: list[Job], engine: Threads | None = None, **how: Any) -> tuple[BatchResult, Threads]:
@@ -82,7 +82,7 @@ def test_drivers_that_end_are_started_again_but_not_for_ever(run: Any, make_job:
     assert batch.accepted and engine.started in (4, 5)
     batch, engine = run([make_job(seed, iterations=4) for seed in range(3)], Threads(stillborn=1000))
     assert not batch.accepted and not batch.interrupted and batch.results == (None,) * 3
-    assert engine.started == 2 * (following.MOST_ROUNDS + 1)
+    assert engine.started == 2 * (following.MAX_ROUNDS + 1)
     assert "3 of 3 runs are not done; the same command does the rest" in recorder.notes[-1]
     assert [note for note in recorder.notes if note == "a driver ended: it was born dead"]
 

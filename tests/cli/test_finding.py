@@ -146,8 +146,8 @@ def test_text_of_a_file_cannot_reach_the_terminal_as_codes(run: Run, tmp_path: P
 def test_a_long_reading_shows_how_far_it_is(
     out: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shown, "QUIET", 0.0)
-    monkeypatch.setattr(shown, "EVERY", 0.0)
+    monkeypatch.setattr(shown, "QUIET_TIME", 0.0)
+    monkeypatch.setattr(shown, "LINE_INTERVAL", 0.0)
     with ReadingProgress() as tell:
         assert len(read_rows(out, tell).rows) == 4
     assert capsys.readouterr().err == "reading run folders: 0 of 4\n"

@@ -17,7 +17,7 @@ from tools.waiting import FOREVER
 import symphys
 from symphys import problems
 from symphys.report import write_batch_report
-from symphys.results.case_name import case_name
+from symphys.results.config import case_name
 from symphys.runs import read_result
 
 LONG = ("--set", "simulation.dt=1e-4", "--set", "objective.stop=converged")

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from symphys.cli.wording import at
-from symphys.results.case_name import case_name
+from symphys.results.config import case_name
 from symphys.runs import read_result
 from symphys.solvers import TraceRow
 

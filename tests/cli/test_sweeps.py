@@ -12,7 +12,7 @@ from rich.console import Console
 
 import symphys
 from symphys.cli.arguments import points_of, read_problems, read_sweeps
-from symphys.cli.summary import MOST_ROWS, advice_together, best_and_worst, fitting_table
+from symphys.cli.summary import MAX_ROWS, advice_together, best_and_worst, fitting_table
 from symphys.problem.sweeps.points import LazyProblem
 from symphys.results.result import CheckRecord
 from symphys.runs import Result, read_result
@@ -123,16 +123,16 @@ def outcome(solved: bool, number: float) -> Result:
 def test_of_many_rows_the_best_and_the_worst_are_shown() -> None:
     groups = {(f"p@x={k}", "s"): [outcome(k % 2 == 0, float(k))] for k in range(100)}
     shown = list(best_and_worst(groups))
-    half = MOST_ROWS // 2
+    half = MAX_ROWS // 2
     assert [name for name, _ in shown[:half]] == [f"p@x={k}" for k in range(0, 2 * half, 2)]
     assert [name for name, _ in shown[-half:]] == [f"p@x={k}" for k in range(100 - 2 * half + 1, 100, 2)]
-    few = dict(list(groups.items())[:MOST_ROWS])
+    few = dict(list(groups.items())[:MAX_ROWS])
     assert list(best_and_worst(few)) == list(few)
     console = Console(width=120, record=True, file=io.StringIO())
     console.print(fitting_table(best_and_worst(groups), 120, 100 - len(shown)))
     rows = [line for line in console.export_text().splitlines() if line.strip()]
     assert any("... 70 more ..." in row for row in rows)
-    assert sum("p@x=" in row for row in rows) == MOST_ROWS
+    assert sum("p@x=" in row for row in rows) == MAX_ROWS
 
 
 def test_what_is_said_of_many_rows_is_said_once() -> None:

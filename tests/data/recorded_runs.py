@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from symphys import files
-from symphys.results.case_name import case_name
-from symphys.results.config import Config
+from symphys.results.config import Config, case_name
 from symphys.results.file_names import CONFIG, PROBLEM, RESULT
 from symphys.results.result import CheckRecord, Result, VariableRecord
 

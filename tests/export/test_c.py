@@ -15,8 +15,7 @@ from tools.repeats import few
 from symphys.codegen import KernelUnavailable
 from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.export import c_files, write_folders
-from symphys.export.slopes import slopes_function
-from symphys.export.sources import identifier, string
+from symphys.export.sources import identifier, slopes_function, string
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import Transcription, transcribe

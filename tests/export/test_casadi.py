@@ -14,8 +14,7 @@ from tools.repeats import few
 
 from symphys.export import casadi_files, write_folders
 from symphys.export.casadi_files import RESULTS
-from symphys.export.slopes import slopes_function
-from symphys.export.sources import tangent_of
+from symphys.export.sources import slopes_function, tangent_of
 from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.transcription import Transcription, transcribe
@@ -71,7 +70,7 @@ def test_slopes_of_a_step_are_those_of_linearize(name: str, kick: Transcription)
     linearize = slopes_function(tangent_of(one))
     made = Linearization(one.rollout, backend="casadi")
     z = one.shooting.start(1)
-    motion, p = made.motion(z, 0.0), made.begun(z)[2]
+    motion, p = made.motion(z, 0.0), made.start(z)[2]
     slopes = made.step.slopes(motion.x[:-1], motion.u, p, 0.0)
     for k in (0, len(motion.u) // 2):
         u = np.array(one.rollout.with_shares(casadi.DM(motion.u[k]), casadi.DM(k))).ravel()

@@ -8,7 +8,7 @@ import pytest
 
 from symphys import files
 from symphys.export import ExportError, write_folders
-from symphys.export.folder import LIST
+from symphys.export.folder import LIST_FILE
 
 CONTENT = {"a.c": b"one", "b.c": b"two"}
 
@@ -20,7 +20,7 @@ def test_what_was_written_can_be_written_again(tmp_path: Path) -> None:
     assert (folder / "a.c").read_bytes() == b"three"
     write_folders({folder: CONTENT})
     assert (folder / "a.c").read_bytes() == b"one"
-    assert {path.name for path in folder.iterdir()} == {"a.c", "b.c", LIST}
+    assert {path.name for path in folder.iterdir()} == {"a.c", "b.c", LIST_FILE}
 
 
 @pytest.mark.parametrize("kind", ["foreign", "changed", "folder", "link"])
@@ -63,9 +63,9 @@ def test_an_interrupted_export_can_be_done_again(tmp_path: Path, monkeypatch: py
 
 
 def test_a_list_that_is_none_is_named(tmp_path: Path) -> None:
-    (tmp_path / LIST).write_text("[1]", "utf-8")
+    (tmp_path / LIST_FILE).write_text("[1]", "utf-8")
     with pytest.raises(ExportError, match="exported files"):
         write_folders({tmp_path: CONTENT})
-    (tmp_path / LIST).write_text("{", "utf-8")
+    (tmp_path / LIST_FILE).write_text("{", "utf-8")
     with pytest.raises(files.FileError, match="JSON"):
         write_folders({tmp_path: CONTENT})

@@ -12,7 +12,7 @@ import pytest
 from tools.repeats import few
 
 from symphys.export import ExportError, mjcf_model, problem_model
-from symphys.export.mjcf_terrain import deviation, window
+from symphys.export.mjcf_surfaces import deviation, window
 from symphys.model.heightfield import Heightfield
 from symphys.model.joints import BALL, FIXED, HINGE, AffineMotor, Joint, JointFrame
 from symphys.model.shapes import Plane, Terrain

@@ -10,7 +10,7 @@ import pytest
 from tools.repeats import few
 
 from symphys.export import problem_model
-from symphys.export.mjcf_actuation import inertias
+from symphys.export.mjcf import inertias
 from symphys.export.mjcf_bodies import StartState
 from symphys.export.mjcf_trial import stiffer, tried_model
 from symphys.problem import Problem, problem_of_tables

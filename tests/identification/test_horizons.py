@@ -21,7 +21,7 @@ from symphys.identification import (
     identify,
     revive_state,
 )
-from symphys.identification.fitting.horizons import PartialRecordings, before_impact, first_share
+from symphys.identification.fitting.fit import PartialRecordings, before_impact, first_share
 
 GROWING = (0.3, 0.5, 0.7, 0.85, 1.0)
 

@@ -71,7 +71,7 @@ def test_a_fit_ends_whose_jacobian_promises_what_no_step_brings(monkeypatch: pyt
 
     problem.jacobian = promising
     ended = RecordingFit(problem, FitOptions()).run()
-    monkeypatch.setattr("symphys.identification.fitting.levenberg_marquardt.HOPELESS", 0.0)
+    monkeypatch.setattr("symphys.identification.fitting.levenberg_marquardt.MIN_SHARE_OF_MODEL", 0.0)
     on = RecordingFit(problem, FitOptions()).run()
     assert ended.status is on.status is FitStatus.STALLED and ended.state.history[-1].left > 1
     assert len(ended.state.history) < len(on.state.history) - 4

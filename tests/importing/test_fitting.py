@@ -12,7 +12,7 @@ from tools.repeats import first
 
 from symphys.errors import SymphysError
 from symphys.importing.fitting import Fit, best, draw_fit, fit, fits
-from symphys.importing.fitting.solids import DISTANCES, SURFACES, Placed, directions, quaternion
+from symphys.importing.fitting.fit import DISTANCES, SURFACES, Placed, directions, quaternion
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Sphere
 from symphys.types import Array

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from tools.waiting import FOREVER
 
-from symphys.importing import source as reading_process
+from symphys.importing import robot as reading_process
 from symphys.importing.reading.checking import check_model
 from symphys.importing.reading.folders import Folders
 from symphys.importing.records import ImportOptions, ImportProblem
-from symphys.importing.source import read_source
+from symphys.importing.robot import read_source
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -140,7 +140,7 @@ def test_a_crash_or_a_hang_of_mujoco_is_a_message(
     tmp_path: Path, code: str, limit: float, why: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reading_process, "CALL", code)
-    monkeypatch.setattr(reading_process, "TIMEOUT", limit)
+    monkeypatch.setattr(reading_process, "COMPILE_TIMEOUT", limit)
     with pytest.raises(ImportProblem, match=why):
         read_source(model(tmp_path, ""))
 

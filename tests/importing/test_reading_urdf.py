@@ -10,8 +10,7 @@ import pytest
 from tools.repeats import few
 
 from symphys.importing.records import CompiledModel, Finding, ImportOptions, ImportProblem
-from symphys.importing.robot import Imported, read_robot
-from symphys.importing.source import read_source
+from symphys.importing.robot import Imported, read_robot, read_source
 
 mujoco = pytest.importorskip("mujoco")
 

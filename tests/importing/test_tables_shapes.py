@@ -12,8 +12,7 @@ from tools.repeats import few
 
 from symphys.importing import fitting
 from symphys.importing.records import ImportOptions
-from symphys.importing.robot import tables_of
-from symphys.importing.source import read_source
+from symphys.importing.robot import read_source, tables_of
 from symphys.model.shapes import Box, Sphere
 
 mujoco = pytest.importorskip("mujoco")

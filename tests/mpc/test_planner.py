@@ -14,7 +14,7 @@ from symphys.problem import problem_of_tables
 from symphys.shooting import Linearized, StagedMotion
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
 from symphys.solvers.ddp.forward_pass import MotionBatch, forward_pass
-from symphys.solvers.ddp.iteration import LENGTHS, LocalExpansion
+from symphys.solvers.ddp.iteration import STEP_LENGTHS, LocalExpansion
 from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
 from symphys.transcription.staged.staged_problem import RolloutStages
 
@@ -121,11 +121,11 @@ def test_the_compiled_rollout_is_the_forward_pass(monkeypatch: pytest.MonkeyPatc
     policy = backward_pass([slopes], costs, knot_steps(stages()), stages().statics, bounds, 1.0)
     assert policy is not None
     monkeypatch.setattr(stages(), "follow", lambda *_: None)
-    wanted = forward_pass(stages(), found, policy, padded(), LENGTHS)
+    wanted = forward_pass(stages(), found, policy, padded(), STEP_LENGTHS)
     ahead = np.array([gain.ahead for gain in policy.gains if gain is not None])
     back = np.array([gain.back for gain in policy.gains if gain is not None])
     about = PlanPolicy(found.x[:-1], plan().v, ahead, back)
-    x, v, cost = made.follow(found.x[0], about, LENGTHS, 0.0)
+    x, v, cost = made.follow(found.x[0], about, STEP_LENGTHS, 0.0)
     assert x == pytest.approx(wanted.x, abs=1e-9)
     assert v == pytest.approx(wanted.u, abs=1e-9)
     assert cost == pytest.approx([merit(row) for row in wanted.z], rel=1e-9)

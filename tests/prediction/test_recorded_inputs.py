@@ -10,7 +10,7 @@ from tools.repeats import few
 from worlds.commanded import DT, GUESS, SETS, TRUTH, VARIABLES, arm, dense_means, recorded_arm, true_angles
 
 import symphys
-from symphys.prediction.recorded_inputs import step_means
+from symphys.prediction.predictor import step_means
 from symphys.prediction.residuals import residuals_of
 from symphys.problem import RecordedInput
 

@@ -9,7 +9,7 @@ import pytest
 
 import symphys
 from symphys.identification import FitOptions, IdentificationOptions, identify
-from symphys.identification.fitting.start_values import values_to_try
+from symphys.identification.fitting.fit import values_to_try
 from symphys.identification.interface import fit_parameters
 from symphys.prediction import residuals_of
 from symphys.results.identification import Identification, summary

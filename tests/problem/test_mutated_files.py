@@ -37,7 +37,7 @@ import symphys.problems
 from symphys.cli.best import best
 from symphys.cli.ls import ls
 from symphys.errors import SymphysError
-from symphys.importing import source as model_source
+from symphys.importing import robot as model_source
 from symphys.importing.reading.child import main as read_in_this_process
 from symphys.problem import load, load_problem
 from symphys.report.pages.run import write_light_report
@@ -182,14 +182,16 @@ class Journals:
         """Solve one problem."""
         solved(folder)
         self.root = folder / "out"
-        self.journal = self.root / journal.NAME
+        self.journal = self.root / journal.JOURNAL_FILE
         self.line = self.journal.read_bytes()
 
     def __call__(self, dice: random.Random) -> None:
         """List one."""
-        body = mutated(self.line[journal.BODY :].rstrip(b"\n"), dice, (*TEXT_CHANGES, replacing(MEMBER, spoilt_member)))
+        body = mutated(
+            self.line[journal.BODY_START :].rstrip(b"\n"), dice, (*TEXT_CHANGES, replacing(MEMBER, spoilt_member))
+        )
         checksum = zlib.crc32(body) if dice.random() < 0.9 else dice.randrange(2**32)
-        lines = [journal.MARK + b'%08x",' % checksum + body + b"\n", self.line]
+        lines = [journal.LINE_PREFIX + b'%08x",' % checksum + body + b"\n", self.line]
         self.journal.write_bytes(b"".join(dice.sample(lines, dice.choice((1, 2)))))
         list_runs(self.root)
 

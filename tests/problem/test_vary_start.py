@@ -18,7 +18,7 @@ from symphys.model.state_layout import initial_state
 from symphys.problem import Problem, begin
 from symphys.solvers import solver
 from symphys.transcription import transcribe
-from symphys.transcription.randomization.sampler import QuantitySampler
+from symphys.transcription.sampler import QuantitySampler
 
 Load = Callable[..., Problem]
 Refused = Callable[..., ProblemError]

@@ -13,7 +13,7 @@ import pytest
 from tools.repeats import few
 
 from symphys.report import write_batch_report, write_run_report
-from symphys.results.drawable import LARGEST, OVERSIZED, drawable, oversized
+from symphys.results.drawable import MAX_DRAWABLE, OVERSIZED, drawable, oversized
 from symphys.results.run import read_run
 
 HUGE = [1e155, 1e299, 1e307]
@@ -112,7 +112,7 @@ def test_a_batch_of_nothing_else(batch: Path) -> None:
 @pytest.mark.slow
 def test_what_is_large_but_not_beyond_is_drawn(run_dir: Path) -> None:
     """No warning of an overflow either, which would be an error here."""
-    enlarge(run_dir, 1e-3 * LARGEST)
+    enlarge(run_dir, 1e-3 * MAX_DRAWABLE)
     text = text_of(write_run_report(run_dir))
     assert "cannot be drawn" not in text
     assert {"convergence.svg", "motion.svg"} <= {path.name for path in (run_dir / "figures").iterdir()}

@@ -24,10 +24,10 @@ from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.result import Result
 from symphys.results.table import Journal, best, columns, ordered, read_rows
 from symphys.results.table import rows as table_rows
-from symphys.results.table.journal import BODY, MARK, Kept, entry, stamp_of
+from symphys.results.table.journal import BODY_START, LINE_PREFIX, Kept, entry, stamp_of
 from symphys.results.table.row import read_row
 from symphys.results.table.writing import csv_text, json_lines
-from symphys.results.text_files import HEAVY
+from symphys.results.text_files import LARGE_FIELDS
 
 
 def test_a_row_has_what_the_files_say(tmp_path: Path) -> None:
@@ -64,15 +64,15 @@ def test_only_the_heavy_tables_are_cut_and_only_from_the_usual_layouts(tmp_path:
     whole = files.strict(recorded(advice='},\n "z": {\n').to_json())
     files.write_json(tmp_path / RESULT, whole)
     for text in ((tmp_path / RESULT).read_bytes(), json.dumps(whole, indent=1).encode()):
-        cut = files.emptied(text, HEAVY)
+        cut = files.emptied(text, LARGE_FIELDS)
         assert json.loads(cut) == {**whole, "z": {}, "trust": {}} and len(cut) < len(text)
     for layout in (None, 0, 2):
         text = json.dumps(whole, indent=layout).encode()
-        assert files.emptied(text, HEAVY) == text
+        assert files.emptied(text, LARGE_FIELDS) == text
     files.write_json(tmp_path / RESULT, {"z": None, "trust": {}})
     absent = (tmp_path / RESULT).read_bytes()
-    assert files.emptied(absent, HEAVY) == absent
-    assert files.emptied(b'{\n "trust": {"a": 1', HEAVY) == b'{\n "trust": {"a": 1'
+    assert files.emptied(absent, LARGE_FIELDS) == absent
+    assert files.emptied(b'{\n "trust": {"a": 1', LARGE_FIELDS) == b'{\n "trust": {"a": 1'
 
 
 def test_a_file_older_than_verdicts_is_ruled_on(tmp_path: Path) -> None:
@@ -140,7 +140,7 @@ def test_lines_of_another_format_are_skipped(tmp_path: Path, monkeypatch: pytest
     Journal(tmp_path).add(record(tmp_path))
     (line,) = Journal(tmp_path).path.read_bytes().splitlines()
     assert len(list(entry(line))) == 1
-    monkeypatch.setattr("symphys.results.table.journal.ROWS", 2)
+    monkeypatch.setattr("symphys.results.table.journal.ROW_FORMAT", 2)
     assert list(entry(line)) == []
 
 
@@ -183,7 +183,7 @@ def test_what_is_odd_in_a_journal_is_read_from_the_folders(tmp_path: Path) -> No
     truth = read_rows(tmp_path).rows
     Journal(tmp_path).add(folder)
     (line,) = Journal(tmp_path).path.read_bytes().splitlines()
-    content = json.loads(b"{" + line[BODY:])
+    content = json.loads(b"{" + line[BODY_START:])
     random, read = Random(0), 0
     for _ in range(1000):
         changed = mutated(content, random)
@@ -191,7 +191,7 @@ def test_what_is_odd_in_a_journal_is_read_from_the_folders(tmp_path: Path) -> No
         if random.random() < 0.1:
             cut = random.randrange(len(body) + 1)
             body = body[:cut] + random.randbytes(random.randint(0, 2)).replace(b"\n", b"") + body[cut + 1 :]
-        Journal(tmp_path).path.write_bytes(MARK + b'%08x",' % zlib.crc32(body) + body + b"\n")
+        Journal(tmp_path).path.write_bytes(LINE_PREFIX + b'%08x",' % zlib.crc32(body) + body + b"\n")
         found = read_rows(tmp_path)
         (row,) = found.rows
         read += found.read

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from symphys.results.case_name import case_name
+from symphys.results.config import case_name
 
 
 def test_without_settings_it_is_the_problem() -> None:

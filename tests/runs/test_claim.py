@@ -173,7 +173,7 @@ def test_what_killed_processes_leave_of_claims_is_removed(folder: Path) -> None:
 
 
 def test_a_held_claim_is_touched(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(claims, "BEAT", 0.01)
+    monkeypatch.setattr(claims, "TOUCH_INTERVAL", 0.01)
     monkeypatch.setattr(claims, "HEART", claims.Heart())
     with claimed(folder) as claim:
         os.utime(claim.path, (1, 1))

@@ -27,7 +27,7 @@ import pytest
 
 from symphys import files
 from symphys.runs import claim as claims
-from symphys.runs.claim import HELD, LEASE, FolderBusy, Owner, claimed
+from symphys.runs.claim import CLAIM_FOLDER, LEASE, FolderBusy, Owner, claimed
 
 OPERATIONS = ("mkdir", "rename", "replace", "unlink", "rmdir", "listdir", "utime", "stat")
 REAL = {name: getattr(os, name) for name in OPERATIONS}
@@ -97,7 +97,7 @@ class World:
     def tokens(self) -> list[str]:
         """The claims that are there."""
         try:
-            return REAL["listdir"](self.folder / HELD)
+            return REAL["listdir"](self.folder / CLAIM_FOLDER)
         except OSError:
             return []
 
@@ -138,11 +138,11 @@ class World:
         """Note what an operation of a process has done; law 2."""
         first = Path(arguments[0])
         second = Path(arguments[1]) if name in ("rename", "replace") else first
-        if name == "rename" and second == self.folder / HELD:
+        if name == "rename" and second == self.folder / CLAIM_FOLDER:
             (actor.token,), actor.touched, actor.stood_still = self.tokens, self.clock, False
-        if name == "rename" and first == self.folder / HELD / actor.token:
+        if name == "rename" and first == self.folder / CLAIM_FOLDER / actor.token:
             actor.token = ""
-        elif name == "rename" and first.parent == self.folder / HELD:
+        elif name == "rename" and first.parent == self.folder / CLAIM_FOLDER:
             self.taken_over += 1
         if name == "utime":
             actor.stood_still |= self.clock - actor.touched > LEASE

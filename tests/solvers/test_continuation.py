@@ -16,8 +16,8 @@ from symphys.errors import SymphysError
 from symphys.maths.smoothing import positive
 from symphys.shooting import ShootingProblem
 from symphys.solvers import Counts, Outcome, StageResult, Status, TraceRow, solve_multi_start, solver
-from symphys.solvers.core import trace
-from symphys.solvers.core.vanishing_gradient import FLAT
+from symphys.solvers.core import driver
+from symphys.solvers.core.convergence import PLATEAU_ADVICE
 
 SMOOTHINGS = (1.0, 0.1, 0.0)
 every_solver = pytest.mark.parametrize("name", PLAIN)
@@ -99,7 +99,7 @@ def test_a_stage_starts_where_the_one_before_ended(name: str) -> None:
 def test_work_and_time_of_the_stages_are_those_of_the_solve(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The clock advances by one second with each row."""
     rows: list[TraceRow] = []
-    monkeypatch.setattr(trace, "time", SimpleNamespace(perf_counter=lambda: float(len(rows))))
+    monkeypatch.setattr(driver, "time", SimpleNamespace(perf_counter=lambda: float(len(rows))))
     found = solve(name, moving(), monitor=rows.append)
     assert total(found.stages) == found.counts
     assert all(sum(astuple(stage.counts)) > 0 for stage in found.stages)
@@ -125,7 +125,7 @@ def test_stages_need_not_end_at_zero(name: str) -> None:
 @pytest.mark.parametrize("name", ["gradient", "least_squares"])
 def test_what_friction_holds_is_let_go(name: str) -> None:
     stuck = solve(name, held((0.0,)))
-    assert (stuck.status, stuck.advice, stuck.z.tolist()) == (Status.CONVERGED, FLAT, [0.0])
+    assert (stuck.status, stuck.advice, stuck.z.tolist()) == (Status.CONVERGED, PLATEAU_ADVICE, [0.0])
     assert "stages" in stuck.advice
     freed = solve(name, held((1.0, 0.1, 0.0)))
     assert freed.status is Status.MET

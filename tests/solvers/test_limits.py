@@ -18,7 +18,7 @@ from symphys.errors import ProblemError
 from symphys.problem import json_schema, validate_options
 from symphys.shooting import ShootingProblem
 from symphys.solvers import SOLVERS, Outcome, Status, TraceRow, recorded_options, solve_multi_start, solver
-from symphys.solvers.core import trace
+from symphys.solvers.core import driver
 from symphys.solvers.core.outcome import StopReason
 
 AT_ONCE = {"max_seconds": 1e-9}
@@ -40,7 +40,7 @@ def problem_of(name: str, **more: Any) -> ShootingProblem:
 def clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """A second passes whenever the time is asked for: once as a solve begins, then for each row of the trace."""
     ticks = itertools.count()
-    monkeypatch.setattr(trace, "time", SimpleNamespace(perf_counter=lambda: float(next(ticks))))
+    monkeypatch.setattr(driver, "time", SimpleNamespace(perf_counter=lambda: float(next(ticks))))
 
 
 def spent(found: Outcome) -> bool:

@@ -16,7 +16,7 @@ from worlds.toys import stop_at, through_json
 
 from symphys.solvers import Status
 from symphys.solvers.methods.multiple_shooting import DEFECT
-from symphys.solvers.multiple_shooting.multipliers import fitted
+from symphys.solvers.multiple_shooting.nlp import fitted
 
 
 @pytest.mark.slow

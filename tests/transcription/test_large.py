@@ -254,7 +254,7 @@ def both(
     path.write_text(request.param)
     within = transcribe(load_problem(path), backend="casadi")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(split, "MOST_WEIGHTS", 10)
+        patch.setattr(split, "MAX_STEP_WEIGHTS", 10)
         beside = transcribe(load_problem(path))
         assert isinstance(beside, LargeTranscription)
         yield within, beside
@@ -281,10 +281,10 @@ def test_values_and_gradients(both: tuple[Transcription, LargeTranscription], sm
     Z = points(within)
     a = within.shooting.evaluator.gradient(Z, smoothing)
     assert a.gradient is not None
-    for columns, kept in ((1, 1), (4, 150), (layers.SEGMENT_COLUMNS, evaluators.KEPT_NUMBERS)):
+    for columns, kept in ((1, 1), (4, 150), (layers.SEGMENT_COLUMNS, evaluators.MAX_KEPT_NUMBERS)):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(layers, "SEGMENT_COLUMNS", columns)
-            patch.setattr(evaluators, "KEPT_NUMBERS", kept)
+            patch.setattr(evaluators, "MAX_KEPT_NUMBERS", kept)
             b = beside.shooting.evaluator.gradient(Z, smoothing)
         assert b.gradient is not None
         assert np.allclose(a.merit, b.merit, rtol=1e-12)
@@ -431,10 +431,10 @@ def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyP
         HOPPING.replace("ACTIVATION", "skip = true").replace('"[leg.torque, start]"', '"[leg.torque, weights]"')
     )
     problem = load_problem(path)
-    monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
+    monkeypatch.setattr(split, "MAX_STEP_WEIGHTS", 10)
     with pytest.raises(ProblemError, match=r'cost "effort": .*weights'):
         transcribe(problem)
-    monkeypatch.setattr(split, "MOST_WITHIN", 20)
+    monkeypatch.setattr(split, "MAX_EXPORTED_WEIGHTS", 20)
     with pytest.raises(ProblemError, match=r'controller "brain"\.net: .*20'):
         require_small_nets(problem, "export")
 
@@ -444,7 +444,7 @@ def test_quantities_and_exported_functions(tmp_path: Path, monkeypatch: pytest.M
     path = tmp_path / "large.toml"
     path.write_text(LIFTS[1])
     problem = load_problem(path)
-    monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
+    monkeypatch.setattr(split, "MAX_STEP_WEIGHTS", 10)
     beside = transcribe(problem, threads=1)
     assert isinstance(beside, LargeTranscription)
     Z = points(beside)
@@ -470,7 +470,7 @@ def sampled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Transcription, Tr
     made = []
     for most in (1000, 10):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(split, "MOST_WEIGHTS", most)
+            patch.setattr(split, "MAX_STEP_WEIGHTS", most)
             made.append(transcribe(problem))
     if made[0].shooting.scenario is None:
         pytest.skip(made[0].backend.note)
@@ -521,9 +521,9 @@ def test_points_of_a_sweep(text: str, tmp_path: Path, monkeypatch: pytest.Monkey
     path.write_text(text)
     base = load_problem(path)
     found = list(swept(base, combined(None, base, read_axes(("bob.mass=0.8,1.25",))[0])))
-    monkeypatch.setattr(split, "MOST_WEIGHTS", 1000)
+    monkeypatch.setattr(split, "MAX_STEP_WEIGHTS", 1000)
     within = [transcribe(replace(problem, scenarios=None, varied=frozenset()), backend="casadi") for problem in found]
-    monkeypatch.setattr(split, "MOST_WEIGHTS", 10)
+    monkeypatch.setattr(split, "MAX_STEP_WEIGHTS", 10)
     beside = [transcribe(problem, threads=1) for problem in found]
     assert beside[1].backend.cached
     z = points(within[0])

@@ -10,8 +10,8 @@ import pytest
 from symphys.codegen import compile_program, interpret
 from symphys.problem import Problem, problem_of_tables
 from symphys.transcription import rollout_program, transcribe
-from symphys.transcription.objective import LONG
-from symphys.transcription.program import CHUNK
+from symphys.transcription.objective import MIN_SEPARATE_SUM
+from symphys.transcription.program import SUM_CHUNK
 from symphys.transcription.rollout import symbolic_rollout
 
 FREE = {"value": "0.1 * ball.position[0] + 0.2", "weight": 0.3}
@@ -39,7 +39,7 @@ def problem(steps: int, costs: int = 4) -> Problem:
 def test_a_program_adds_up_what_the_expression_does() -> None:
     made = transcribe(problem(301), backend="casadi")
     program = rollout_program(made.rollout)
-    assert len(program.epilogue) > 2 * 301 * 3 / CHUNK > 2 * LONG / CHUNK
+    assert len(program.epilogue) > 2 * 301 * 3 / SUM_CHUNK > 2 * MIN_SEPARATE_SUM / SUM_CHUNK
     kernel = compile_program(program, seeded=("merit",), threads=1)
     z = made.shooting.start(0)
     for smoothing in (0.0, 0.01):

@@ -15,7 +15,7 @@ from symphys.model.state_layout import initial_state
 from symphys.problem import Problem, load_problem
 from symphys.shooting import ScenarioSamples
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.randomization.sampler import Sampler
+from symphys.transcription.sampler import Sampler
 from symphys.types import Array
 
 pytestmark = pytest.mark.slow

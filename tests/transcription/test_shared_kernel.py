@@ -15,7 +15,7 @@ from symphys.problem import Problem, problem_of_tables
 from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.texts import read_axes
 from symphys.transcription import Transcription, transcribe
-from symphys.transcription.randomization.sampler import swept_inputs
+from symphys.transcription.sampler import swept_inputs
 
 TOO_HIGH = {"constraint": [{"name": "stays low", "value": "ball.position[2]", "at": "always", "upper": 1.2}]}
 SWEEP = ("ball.mass=0.5:0.7:2", "ground.friction=0.2,0.4", "ball.shape.sphere.radius=0.1,0.12")

@@ -15,8 +15,7 @@ from symphys.solvers.core.point import Incumbent
 from symphys.solvers.methods.multiple_shooting import DEFECT
 from symphys.solvers.multiple_shooting.chart import interpolated
 from symphys.solvers.multiple_shooting.grid import make_grid
-from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
-from symphys.solvers.multiple_shooting.programs import Programs
+from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp, Programs
 
 SWING = 98.637754
 """The least objective of the acrobot's swing-up that is known."""

@@ -1,4 +1,4 @@
-"""A driver: a process that an engine has started, on any machine, and that does runs of a batch until none is left.
+"""A driver: a process, started by an engine on any machine, that does runs of a batch until none is left.
 
 Drivers do not know each other: each run is claimed in its folder by one of them, as by any other command. They report
 to the command that started them through a ``Board``, a folder of small files.
@@ -204,14 +204,14 @@ class BoardHalt(Halt):
     def __init__(self, board: Board) -> None:
         """Start without a halt."""
         super().__init__(lambda: board.stopped)
-        self.board, self.asked, self.looked = board, False, 0.0
+        self.board, self.stop_requested, self.last_poll = board, False, 0.0
 
     def __call__(self) -> bool:
         """Whether to stop; the board is read every POLL_INTERVAL."""
-        if not self.asked and monotonic() - self.looked > POLL_INTERVAL:
-            self.looked = monotonic()
-            self.asked = self.board.stopped
-        return self.asked
+        if not self.stop_requested and monotonic() - self.last_poll > POLL_INTERVAL:
+            self.last_poll = monotonic()
+            self.stop_requested = self.board.stopped
+        return self.stop_requested
 
     @property
     def reason(self) -> str:

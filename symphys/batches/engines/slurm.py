@@ -17,7 +17,7 @@ from symphys.suggest import hint
 FOLDER = ".slurm"
 """Folder for scripts and outputs of the jobs, inside the folder of the batch."""
 LOCAL = "local"
-ASKED: dict[str, Callable[[str], Any]] = {
+REQUEST_TYPES: dict[str, Callable[[str], Any]] = {
     "timeout_min": int,
     "mem_gb": float,
     "cpus_per_task": int,
@@ -29,26 +29,26 @@ ASKED: dict[str, Callable[[str], Any]] = {
     "gres": str,
 }
 """The keys of ``--scheduler``, with their types."""
-SHARED = ("timeout_min", "mem_gb", "cpus_per_task")
+SHARED_KEYS = ("timeout_min", "mem_gb", "cpus_per_task")
 """Keys with the same name for all executors of submitit."""
-DEFAULTS = {"timeout_min": 60, "cpus_per_task": 1}
+REQUEST_DEFAULTS = {"timeout_min": 60, "cpus_per_task": 1}
 
 
 def opened(scheduler: str, count: int, out: Path) -> SlurmEngine:
     """Make an engine for a request such as ``partition=short,timeout_min=60,mem_gb=4``, or ``local``."""
-    here, asked = read_asked(scheduler)
+    here, asked = read_request(scheduler)
     missing = next((name for name in ("sbatch", "srun") if shutil.which(name) is None), "")
     if missing and not here:
         raise EngineError(
             f"there is no {missing} on this machine: call symphys where Slurm takes jobs, or give --scheduler local"
         )
     executor = submitit.AutoExecutor(folder=str(out / FOLDER), cluster=LOCAL if here else "slurm")
-    named = {name if name in SHARED else f"slurm_{name}": value for name, value in asked.items()}
-    executor.update_parameters(name="symphys", **DEFAULTS | named)
+    named = {name if name in SHARED_KEYS else f"slurm_{name}": value for name, value in asked.items()}
+    executor.update_parameters(name="symphys", **REQUEST_DEFAULTS | named)
     return SlurmEngine(executor)
 
 
-def read_asked(scheduler: str) -> tuple[bool, dict[str, Any]]:
+def read_request(scheduler: str) -> tuple[bool, dict[str, Any]]:
     """Return (whether to stay on this machine, the request by key); EngineError for a request that is not valid."""
     words = [word.strip() for word in scheduler.split(",") if word.strip()]
     asked = {}
@@ -56,10 +56,10 @@ def read_asked(scheduler: str) -> tuple[bool, dict[str, Any]]:
         if word == LOCAL:
             continue
         key, equals, value = word.partition("=")
-        if not equals or key not in ASKED:
-            raise EngineError(f"--scheduler {word!r}: write local, or KEY=VALUE; {hint(key, ASKED)}")
+        if not equals or key not in REQUEST_TYPES:
+            raise EngineError(f"--scheduler {word!r}: write local, or KEY=VALUE; {hint(key, REQUEST_TYPES)}")
         try:
-            asked[key] = ASKED[key](value)
+            asked[key] = REQUEST_TYPES[key](value)
         except ValueError as error:
             raise EngineError(f"--scheduler {word!r}: {key} is a number") from error
     return LOCAL in words, asked

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from symphys.runs import Job, Result
     from symphys.solvers import TraceRow
 
-EVERY = 1.0
+REPORT_INTERVAL = 1.0
 """[s] between two iterations of a run that are reported."""
 
 
@@ -61,7 +61,7 @@ class Events(Observer):
     def advanced(self, job: Job, row: TraceRow) -> None:
         """Write an iteration, at most one in EVERY seconds for each run."""
         now = monotonic()
-        if now - self.reported.get(job.name, -EVERY) < EVERY:
+        if now - self.reported.get(job.name, -REPORT_INTERVAL) < REPORT_INTERVAL:
             return
         self.reported[job.name] = now
         numbers = {"objective": row.best, "worst": row.max_violation, "seconds": row.seconds}

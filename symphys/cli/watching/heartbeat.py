@@ -13,9 +13,9 @@ from rich.text import Text
 from symphys.cli.watching.progress import StepProgress
 from symphys.cli.wording import step_words
 
-EVERY = 5.0
+LINE_INTERVAL = 5.0
 """[s] between plain lines while work goes on."""
-TICK = 1.0
+UPDATE_INTERVAL = 1.0
 """[s] between two updates of a live line."""
 
 
@@ -45,7 +45,7 @@ def live_line(name: str, words: Callable[[], str]) -> Iterator[Callable[[], None
     """
     console = Console(stderr=True)
     if not console.is_terminal:
-        with heartbeat(lambda: click.echo(f"{name}: {words()}", err=True), EVERY):
+        with heartbeat(lambda: click.echo(f"{name}: {words()}", err=True), LINE_INTERVAL):
             yield lambda: None
         return
     with console.status("") as status:
@@ -53,7 +53,7 @@ def live_line(name: str, words: Callable[[], str]) -> Iterator[Callable[[], None
         def show() -> None:
             status.update(Text(words()))
 
-        with heartbeat(show, TICK):
+        with heartbeat(show, UPDATE_INTERVAL):
             yield show
 
 

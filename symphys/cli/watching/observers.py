@@ -17,7 +17,7 @@ from rich.text import Text
 
 from symphys.batches import Observer
 from symphys.cli.watching.events import Events
-from symphys.cli.watching.heartbeat import EVERY, TICK, heartbeat
+from symphys.cli.watching.heartbeat import LINE_INTERVAL, UPDATE_INTERVAL, heartbeat
 from symphys.cli.watching.progress import BatchShare, Notes
 from symphys.cli.wording import at, batch_words, brief, judging_words, log_end, use_words, waiting_words
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from symphys.runs import Job, Result
     from symphys.solvers import TraceRow
 
-MOST_QUIET = 3
+MAX_QUIET = 3
 """Runs without news that are named at once."""
-MOST_SHOWN = 16
+MAX_SHOWN = 16
 """Runs in work that have a line each."""
-MANY = 100
+MANY_RUNS = 100
 """Number of runs from which only those that fail have lines of their own."""
 
 
@@ -39,7 +39,7 @@ class BatchLines(Observer):
     def __init__(self, runs: int) -> None:
         """Start with nothing shown."""
         self.notes, self.batch = Notes(), BatchShare(runs)
-        self.many = runs >= MANY
+        self.many = runs >= MANY_RUNS
         self.lock = RLock()
 
     def echo(self, line: str, folded: bool = False) -> None:
@@ -66,7 +66,7 @@ class BatchLines(Observer):
 class Plain(BatchLines):
     """A line when a run begins, one when it ends, and some while it goes on; nothing is redrawn."""
 
-    def __init__(self, every: float = EVERY, runs: int = 1) -> None:
+    def __init__(self, every: float = LINE_INTERVAL, runs: int = 1) -> None:
         """Start with nothing shown; ``every``: seconds between lines while runs go on."""
         super().__init__(runs)
         self.every, self.last = every, monotonic()
@@ -101,7 +101,7 @@ class Plain(BatchLines):
         """Write which runs bring no news, if a line is due."""
         with self.lock:
             if self.due:
-                for name, words in list(waiting_words(self.batch, self.every).items())[:MOST_QUIET]:
+                for name, words in list(waiting_words(self.batch, self.every).items())[:MAX_QUIET]:
                     self.echo(f"{name}: {words}")
 
     def ended(self, job: Job, result: Result, skipped: bool) -> None:
@@ -135,7 +135,7 @@ class Live(BatchLines):
         """Open the line of the run."""
         with self.lock:
             self.batch.started(job)
-            shown = len(self.tasks) < MOST_SHOWN
+            shown = len(self.tasks) < MAX_SHOWN
             self.tasks[job.name] = self.progress.add_task(f"{job.name}: building", total=None, visible=shown)
 
     def advanced(self, job: Job, row: TraceRow) -> None:
@@ -154,7 +154,7 @@ class Live(BatchLines):
     def beat(self) -> None:
         """Show which runs bring no news, and update the time that is left."""
         with self.lock:
-            for name, words in waiting_words(self.batch, EVERY).items():
+            for name, words in waiting_words(self.batch, LINE_INTERVAL).items():
                 self.describe(name, words)
             self.move()
 
@@ -212,11 +212,11 @@ def watch(runs: int, quiet: bool = False, json: bool = False) -> Iterator[Shown]
         yield Quiet()
     elif not console.is_terminal:
         plain = Plain(runs=runs)
-        with heartbeat(plain.beat, EVERY):
+        with heartbeat(plain.beat, LINE_INTERVAL):
             yield plain
     else:
         text = TextColumn("{task.description}", markup=False, table_column=Column(overflow="fold"))
         with Progress(BarColumn(16), TimeElapsedColumn(), text, console=console, transient=True) as progress:
             live = Live(progress, runs)
-            with heartbeat(live.beat, TICK):
+            with heartbeat(live.beat, UPDATE_INTERVAL):
                 yield live

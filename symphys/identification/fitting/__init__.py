@@ -1,1 +1,1 @@
-"""The fit: Levenberg-Marquardt on the arrow of shared and own numbers, losses, noise, horizons, other starts."""
+"""Fits: Levenberg-Marquardt on the arrow matrix of shared and own numbers, losses, noise, horizons, starts."""

@@ -1,4 +1,4 @@
-"""Normal equations of an arrow, and their solution by the Schur complement of the own blocks.
+"""Arrow-shaped normal equations, and their solution by the Schur complement of the own blocks.
 
 In scaled numbers y = x / scale, with H = J' C J and g = J' psi of the merit sum rho(r),
 
@@ -24,7 +24,7 @@ from symphys.identification.interface import FitParameters, RecordedResiduals, R
 from symphys.types import Array, Bools, Ints
 
 Weighting = Callable[[Array], Array]
-"""Of residuals (m,): (m,) weights of the rows of the Jacobian in a square matrix."""
+"""Residuals (m,) -> weights (m,) of the rows of the Jacobian in a square matrix."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,17 +77,20 @@ class ArrowSystem:
         return self.gradients[:, self.s :]
 
     def step(self, damping: float, free_shared: Bools, free_own: Bools) -> tuple[Array, Array]:
-        """-(H + damping I)^-1 g over the free numbers: (s,) and (K, o), zero where not free."""
+        """Return -(H + damping I)^-1 g over the free numbers: (s,) and (K, o), zero where not free."""
+        # Rows of each recording with its damping; a floor keeps the own blocks invertible.
         s, count = self.s, self.roots.shape[2]
         rows = self.roots * np.concatenate([np.ones((len(free_own), s)), free_own], axis=1)[:, None]
         floor = (EPS * count) ** 2 * np.sum(rows[:, :, s:] ** 2, axis=(1, 2))
         added = np.sqrt(np.maximum(damping, floor)[:, None] * free_own)
         damper = np.zeros((len(rows), count - s, count))
         damper[:, :, s:] = added[:, :, None] * np.eye(count - s)
+        # Eliminate the own numbers: Schur complement by orthogonal factors.
         found = eliminate(np.concatenate([rows, damper], axis=1), s)
         own_side = self.own_gradient * free_own
         side = self.shared_gradient + np.einsum("kos,ko->s", found.gain, own_side)
         shared = np.zeros(s)
+        # Shared step from the stacked remainders, priors and damping; then own steps by substitution.
         whole = np.concatenate([stacked(found.left), np.diag(np.sqrt(self.prior_block)), damping**0.5 * np.eye(s)])
         root = pseudo_root(triangle(whole[:, free_shared]))
         shared[free_shared] = -root.square @ side[free_shared]
@@ -95,7 +98,7 @@ class ArrowSystem:
         return shared, own * free_own
 
     def own_step(self, shared: Array, damping: Array, free_own: Bools) -> Array:
-        """Compute (K, o) the step of the own numbers beside a shared step (s,), with a damping (K,) of each."""
+        """Compute (K, o) the own step for a shared step (s,), with a damping (K,) of each."""
         s, mask = self.s, free_own.astype(float)
         square = self.blocks[:, s:, s:] * mask[:, :, None] * mask[:, None, :]
         side = (self.own_gradient + np.einsum("ksi,s->ki", self.blocks[:, :s, s:], shared)) * mask
@@ -104,13 +107,13 @@ class ArrowSystem:
         return -np.asarray(np.linalg.solve(square, side[:, :, None])[:, :, 0])
 
     def expected_falls(self, shared: Array, own: Array) -> Array:
-        """Return (K,) by how much the quadratic models lower the costs of recordings with a step (s,), (K, o)."""
+        """Return (K,) the decrease of each recording's cost predicted for a step (s,), (K, o)."""
         both = np.concatenate([np.broadcast_to(shared, (len(own), self.s)), own], axis=1)
         bent = np.einsum("ki,kij,kj->k", both, self.blocks, both)
         return np.asarray(-2 * np.sum(both * self.gradients, axis=1) - bent)
 
     def expected_fall(self, shared: Array, own: Array) -> float:
-        """Return by how much the quadratic model lowers the cost with a step (s,), (K, o)."""
+        """Return the decrease of the cost predicted for a step (s,), (K, o)."""
         priors = 2 * float(shared @ self.prior_gradient) + float(shared**2 @ self.prior_block)
         return float(self.expected_falls(shared, own).sum()) - priors
 
@@ -141,6 +144,7 @@ def assemble(
         scale = np.concatenate([problem.shared.scale, problem.own.scale[which[k]]])
         rows = np.concatenate([by_shared, by_own], axis=1) * scale
         costs[k] = weights[k] * loss.value(r)
+        # Triangular factor of the weighted rows and the own priors, and the gradient.
         weighted = rows if plain else rows * np.sqrt(weighting(r))[:, None]
         prior[:, s:] = np.diag(np.sqrt(square[which[k]]))
         roots[k] = triangle(np.concatenate([np.sqrt(weights[k]) * weighted, prior]))

@@ -1,4 +1,4 @@
-"""Whether another minimum is lower: CMA-ES over the shared numbers (Hansen 2016), then fits from what it found.
+"""Check against local minima: CMA-ES over the shared numbers (Hansen 2016), then fits from its candidates.
 
 A candidate is rated by the merit after a few steps of Levenberg-Marquardt of the own numbers, from those of the fit.
 A search that comes to rest begins again elsewhere: anywhere between two bounds, otherwise farther and farther from the
@@ -23,7 +23,7 @@ from symphys.results.identification.record import GlobalSearch
 from symphys.types import Array, Ints
 
 MIN_START_DISTANCE = 0.5
-"""Candidates are other starts if they are farther than this, in scales."""
+"""Distance, in scales, beyond which candidates are separate starts."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class SearchOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """IdentificationError names the option and what would be valid."""
+        """Raise IdentificationError, which names the option and what would be valid."""
         if not self.sigma > 0:
             raise IdentificationError(f"sigma is {self.sigma}: it must be above 0")
         for name in ("evaluations", "own_steps", "starts"):
@@ -80,7 +80,7 @@ def search(
 
 
 def words(fitted: FitOutcome, best: FitOutcome, lower: bool) -> str:
-    """Say what the search means."""
+    """Describe the result of the search."""
     if not lower:
         return "CMA-ES, and fits from what it found, came to nothing lower than the fit"
     share = fitted.merit / best.merit if best.merit > 0 else math.inf
@@ -132,7 +132,7 @@ def strategy(
 
 
 def elsewhere(parameters: FitParameters, at: Array, free: Ints, away: float, stream: np.random.Generator) -> Array:
-    """Draw a start (n,) of the free numbers, in scales: between two bounds, else about ``at`` (n,), so far away."""
+    """Draw a start (n,) of the free numbers: between two bounds, else about ``at`` (n,) at the scale ``away``."""
     lower, upper = (bound[free] / parameters.scale[free] for bound in (parameters.lower, parameters.upper))
     bounded = np.isfinite(lower) & np.isfinite(upper)
     low, high = np.where(bounded, lower, 0.0), np.where(bounded, upper, 1.0)
@@ -141,19 +141,19 @@ def elsewhere(parameters: FitParameters, at: Array, free: Ints, away: float, str
 
 
 def rated(problem: RecordedResiduals, shared: Array, own: Array, which: Ints, options: FitOptions, steps: int) -> float:
-    """Return the merit after so many steps of the own numbers; inf where a simulation is not finite."""
+    """Return the merit after ``steps`` steps of the own numbers; inf where a simulation is not finite."""
     iterations = steps if own.shape[1] else 0
     fit = RecordingFit(problem, replace(options, iterations=iterations), which, hold_shared=True)
     return fit.run(begin(shared, own)).merit
 
 
 def sides(bound: Array) -> list[float | None]:
-    """Return one side of the bounds as pycma takes it: None where there is none."""
+    """Return one side of the bounds in pycma's form: None where there is none."""
     return [float(value) if math.isfinite(value) else None for value in bound]
 
 
 def far_apart(candidates: list[tuple[float, Array]], start: Array, scale: Array) -> list[Array]:
-    """Return the best candidate, then the best of those that are far from the start and from all before, and so on."""
+    """Return the best candidate, then repeatedly the best that is far from the start and all earlier ones."""
     ordered = [shared for _, shared in sorted(candidates, key=lambda each: each[0])]
     chosen = ordered[:1]
     for shared in ordered[1:]:

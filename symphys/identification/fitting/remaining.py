@@ -1,6 +1,6 @@
-"""What is left of a fit in the directions that its recordings determine.
+"""The distance to the minimum in the directions that the recordings determine.
 
-A direction whose standard error is ``VAGUE`` times the size of its numbers is vague: the quadratic model puts its
+A direction whose standard error is ``VAGUE_ERROR`` times the size of its numbers is vague: the quadratic model puts its
 minimum where that model no longer holds. An example is the spin of a ball that slides through every impact: residuals
 depend on it by little more than rounding, and noise puts its minimum thousands of rad/s away. A vague direction has no
 part in whether a fit has converged, and steps along it bring nothing.
@@ -18,14 +18,14 @@ from symphys.identification.fitting.square_root import stacked, triangle
 from symphys.identification.interface import FitParameters
 from symphys.types import Array, Bools, Ints
 
-VAGUE = 10.0
-"""Standard error of a direction by the size of its numbers, above which it is vague."""
-PART = 0.5
-"""A number takes part in a direction if its component is larger, in units of the numbers."""
+VAGUE_ERROR = 10.0
+"""Standard error of a direction, relative to its numbers, above which it is not determined."""
+MIN_COMPONENT = 0.5
+"""Least component, in units of the numbers, with which a number takes part in a direction."""
 
 
 class DeterminedArrow:
-    """An arrow of K recordings in units of the numbers' sizes, without what is vague.
+    """An arrow of K recordings in units of the numbers' sizes, in determined directions only.
 
     Attributes:
         system: the arrow in scaled numbers.
@@ -55,7 +55,7 @@ class DeterminedArrow:
 
     @property
     def whole(self) -> bool:
-        """Whether no direction is vague."""
+        """Whether every direction is determined."""
         return not (self.vague_shared.any() or self.vague_own.any())
 
     def sides(self, gradients: Array) -> Array:
@@ -65,7 +65,7 @@ class DeterminedArrow:
         return np.asarray(scaled[..., :s] + np.einsum("kas,...ka->...ks", self.gain, scaled[..., s:]))
 
     def step(self, gradients: Array | None = None) -> tuple[Array, Array]:
-        """Compute the step (s,), (K, o), in scales, to which gradients (K, n), by default the arrow's, lead."""
+        """Compute the step (s,), (K, o), in scales, for gradients (K, n), by default the arrow's."""
         s = self.system.s
         gradients = self.system.gradients if gradients is None else gradients
         side = self.sides(gradients).sum(axis=0) + self.system.prior_gradient * self.units[0, :s]
@@ -75,18 +75,18 @@ class DeterminedArrow:
 
 
 def determined_root(rows: Array, damping: float) -> tuple[Array, Bools]:
-    """Pseudo-inverses (..., n, m + n) of rows (..., m, n) over a damper sqrt(damping) I, without what is vague.
+    """Return pseudo-inverses (..., n, m + n) of damped rows (..., m, n) in the determined directions.
 
     Also (..., n) which numbers take part in what is vague.
     """
     left, sizes, right = np.linalg.svd(rows, full_matrices=False)
     vectors = np.swapaxes(right, -1, -2)
-    vague = sizes < 1 / VAGUE
+    vague = sizes < 1 / VAGUE_ERROR
     inverse = np.where(vague, 0.0, 1 / (np.where(vague, 1.0, sizes) ** 2 + damping))
     above = (vectors * (sizes * inverse)[..., None, :]) @ np.swapaxes(left, -1, -2)
     below = (vectors * (math.sqrt(damping) * inverse)[..., None, :]) @ right
     found = np.concatenate([above, below], axis=-1)
-    return found, np.any((np.abs(vectors) > PART) & vague[..., None, :], axis=-1)
+    return found, np.any((np.abs(vectors) > MIN_COMPONENT) & vague[..., None, :], axis=-1)
 
 
 def number_units(

@@ -28,7 +28,7 @@ class RobustLoss:
     threshold: float = math.inf
 
     def __post_init__(self) -> None:
-        """IdentificationError where the threshold is no number above 0."""
+        """Raise IdentificationError where the threshold is no number above 0."""
         if not self.threshold > 0:
             raise IdentificationError(f"the threshold of the robust loss is {self.threshold}: it must be above 0")
 
@@ -38,7 +38,7 @@ class RobustLoss:
         return self.threshold < math.inf
 
     def value(self, r: Array) -> float:
-        """Sum of rho over residuals (m,)."""
+        """Return the sum of rho over residuals (m,)."""
         size = np.abs(r)
         if not self.robust or not np.any(size > self.threshold):
             return float(r @ r)

@@ -1,4 +1,4 @@
-"""Least squares by square roots: singular values of rows in place of eigenvalues of their squares.
+"""Least squares by square roots: singular values of rows instead of eigenvalues of their squares.
 
 J'J has the square of the condition of J, and squares lose half of the digits: a J of condition 1e8 leaves a J'J that is
 singular to rounding. Everything here works on rows F with F'F = J' C J, whose singular values are right to rounding of
@@ -17,13 +17,13 @@ from symphys.types import Array, Bools
 
 EPS = float(np.finfo(float).eps)
 ROUNDING = 1e-13
-"""Singular values of columns of length 1 below this share of the largest are rounding, whatever the derivatives are."""
+"""Singular values of columns of length 1, relative to the largest, that always count as rounding."""
 NO_EFFECT = 1e-14
-"""A column shorter than this share of the longest, in scaled numbers, is rounding."""
-SAFETY = 5.0
-"""Singular values up to so many times the measured noise of the derivatives are rounding."""
-TOUCHED = 1e-3
-"""A number takes part in a direction without information if its component is larger."""
+"""Relative length below which a column, in scaled numbers, counts as rounding."""
+NOISE_FACTOR = 5.0
+"""Factor on the measured noise of the derivatives below which singular values are rounding."""
+MIN_TOUCHED_COMPONENT = 1e-3
+"""Least component with which a number takes part in a direction without information."""
 
 
 def triangle(rows: Array) -> Array:
@@ -38,7 +38,7 @@ def triangle(rows: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Root:
-    """The pseudo-inverse P of rows F (..., m, n), so that P P' = (F'F)^-1 without what has no information.
+    """The pseudo-inverse P of rows F (..., m, n), so that P P' = (F'F)^-1 in directions with information.
 
     Attributes:
         inverse: (..., n, m) P.
@@ -68,20 +68,23 @@ def pseudo_root(rows: Array, noise: Array | float = 0.0) -> Root:
         rows: (..., m, n).
         noise: (..., n) lengths of what rounding adds to the columns.
     """
+    # Columns at length 1; those that are rounding become zero.
     lengths = np.linalg.norm(rows, axis=-2)
     longest = np.max(lengths, axis=-1, initial=0.0, keepdims=True)
-    rounding = lengths <= np.maximum(NO_EFFECT * longest, SAFETY * np.asarray(noise))
+    rounding = lengths <= np.maximum(NO_EFFECT * longest, NOISE_FACTOR * np.asarray(noise))
     unit = np.where(rounding, 1.0, lengths)
     scaled = np.where(rounding[..., None, :], 0.0, rows / unit[..., None, :])
+    # Singular values at the level of rounding or of the noise of the derivatives carry no information.
     left, sizes, right = np.linalg.svd(scaled, full_matrices=False)
     vectors = np.swapaxes(right, -1, -2)
     along = np.sqrt(np.einsum("...ji,...j->...i", vectors**2, (np.where(rounding, 0.0, noise) / unit) ** 2))
     largest = np.max(sizes, axis=-1, initial=0.0, keepdims=True)
-    none = sizes <= np.maximum(ROUNDING * largest, SAFETY * along)
+    none = sizes <= np.maximum(ROUNDING * largest, NOISE_FACTOR * along)
+    # Pseudo-inverse without these directions, and the numbers that take part in them.
     share = np.where(none, 0.0, 1 / np.where(none, 1.0, sizes))
     whitener = vectors * share[..., None, :] / unit[..., :, None]
     inverse = whitener @ np.swapaxes(left, -1, -2)
-    touched = rounding | np.any((np.abs(vectors) > TOUCHED) & none[..., None, :], axis=-1)
+    touched = rounding | np.any((np.abs(vectors) > MIN_TOUCHED_COMPONENT) & none[..., None, :], axis=-1)
     shortest = np.min(np.where(rounding, np.inf, lengths), axis=-1, initial=np.inf) / np.maximum(longest[..., 0], EPS)
     weakest = np.minimum(np.min(np.where(none, np.inf, sizes), axis=-1, initial=1.0), shortest)
     return Root(inverse, whitener, left * ~none[..., None, :], touched, weakest)
@@ -89,7 +92,7 @@ def pseudo_root(rows: Array, noise: Array | float = 0.0) -> Root:
 
 @dataclass(frozen=True, eq=False)
 class Eliminated:
-    """Rows of K recordings without their own numbers.
+    """Rows of K recordings with the own numbers eliminated.
 
     Attributes:
         own: the pseudo-inverses of the own columns.

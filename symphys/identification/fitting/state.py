@@ -59,7 +59,7 @@ class FitOptions:
     start_values: bool = True
 
     def __post_init__(self) -> None:
-        """IdentificationError names the option and what would be valid."""
+        """Raise IdentificationError, which names the option and what would be valid."""
         for name in ("iterations", "tolerance", "patience"):
             if not getattr(self, name) >= 0:
                 raise IdentificationError(f"{name} is {getattr(self, name)}: it must be at least 0")
@@ -78,7 +78,7 @@ class FitOptions:
 
 @dataclass(frozen=True)
 class FitStep:
-    """An iteration; 0 is the start.
+    """An iteration; number 0 is the start.
 
     Attributes:
         iteration: its number.
@@ -102,7 +102,7 @@ class FitStep:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FitState(Damped):
-    """Between two iterations: all that the fit needs to go on. A damping of nan: the next iteration sets it.
+    """The state between two iterations, from which a fit resumes. Damping nan: the next iteration sets it.
 
     Attributes:
         shared, own: (s,) and (K, o).
@@ -111,7 +111,7 @@ class FitState(Damped):
         noise: (q,) factors on the noise of each quantity under which the merit is computed; empty: none.
         horizon: share of the recordings that is fitted.
         first: the iteration at which lambda was last set anew.
-        notes: what is to be said of where the fit began, a sentence each.
+        notes: on the start of the fit, a sentence each.
     """
 
     shared: Array
@@ -125,7 +125,7 @@ class FitState(Damped):
     notes: tuple[str, ...] = ()
 
     def plain(self) -> dict[str, Any]:
-        """As JSON-able lists and numbers, from which ``revive_state`` makes the same state to the last bit."""
+        """Return JSON-able lists and numbers, from which ``revive_state`` restores the state to the last bit."""
         found = {name: getattr(self, name) for name in NUMBERS}
         rows = [list(vars(row).values()) for row in self.history]
         return {
@@ -140,10 +140,10 @@ class FitState(Damped):
 
 @dataclass(frozen=True, eq=False)
 class FitOutcome:
-    """How a fit ended, and where.
+    """The end of a fit.
 
     Attributes:
-        status, reason: what ended it, and what that means.
+        status, reason: the cause of its end, and an explanation.
         state: there; ``fit`` goes on from it.
         system: the arrow there, of the recordings that were fitted.
         one_sided: (s,) at a kink, how far from the shared numbers the Jacobian of one side has its minimum; else empty.
@@ -157,17 +157,17 @@ class FitOutcome:
 
     @property
     def merit(self) -> float:
-        """Sum of rho there, with priors."""
+        """The sum of rho, with priors."""
         return self.system.cost
 
 
 def begin(shared: Array, own: Array) -> FitState:
-    """The state before the first iteration, at shared (s,) and own (K, o) within the bounds."""
+    """Return the state before the first iteration, at shared (s,) and own (K, o) within the bounds."""
     return FitState(shared=shared, own=own, damping=math.nan, growth=2.0, stiffest=math.nan)
 
 
 def revive_state(saved: Mapping[str, Any], problem: RecordedResiduals) -> FitState:
-    """The state in ``FitState.plain``; IdentificationError if it is damaged or of other parameters."""
+    """Read ``FitState.plain``; IdentificationError if it is damaged or of other parameters."""
     try:
         shared, own = np.array(saved["shared"], float), np.array(saved["own"], float).reshape(problem.own.guess.shape)
         numbers = {name: kind(saved[name]) for name, kind in NUMBERS.items()}

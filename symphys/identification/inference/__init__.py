@@ -1,1 +1,1 @@
-"""What one may believe of a fit: intervals, bootstrap, directions that are open, what is left."""
+"""Inference from a fit: intervals, bootstrap, unidentifiable directions, residual analysis."""

@@ -25,19 +25,19 @@ from symphys.results.identification.record import OpenDirection
 from symphys.types import Array, Ints
 
 OPEN_ERROR = 1.0
-"""Standard error of a direction, in units of the numbers, above which it is called open."""
+"""Standard error of a direction, in units of the numbers, above which it is not identifiable."""
 ZERO_COMPONENT = 0.02
-"""A component of a direction is none if it is smaller, relative to the largest."""
-EXPONENTS = (1, 2, 3)
+"""Size of a component of a direction, relative to the largest, that counts as zero."""
+TRIED_EXPONENTS = (1, 2, 3)
 """Largest powers that are tried."""
 NO_INFORMATION_ERROR = 1e3
 """Standard error, in units of the numbers, above which a direction has no information at all."""
 TRIAL_DISTANCE = 0.1
-"""How far along an open direction a claim of every value is tried, as a share of the numbers."""
+"""Distance along a direction at which the claim of any value is tested, as a share of the numbers."""
 SAME_RESIDUALS = 1e-3
-"""Residuals that change by less than this share of what one number alone changes are the same."""
+"""Change of residuals, relative to that of one number alone, that counts as none."""
 POWER_TOLERANCE = 0.03
-"""A power is recognised within this share of the largest."""
+"""Tolerance of a power, as a share of the largest."""
 
 
 def open_directions(
@@ -93,7 +93,7 @@ def reduced_rows(
 
 
 def direction_error(rows: Array, directions: Array, largest: float) -> float:
-    """Standard error along the least determined of directions (d, n); inf where there is no information."""
+    """Return the standard error along the least determined of directions (d, n); inf without information."""
     span = np.linalg.qr(directions.T)[0]
     size = float(np.linalg.svd(rows @ span, compute_uv=False)[-1])
     return np.inf if size <= max(ROUNDING * largest, 1 / NO_INFORMATION_ERROR) else 1 / size
@@ -117,7 +117,7 @@ def echelon(basis: Array) -> Array:
 
 
 def components(rows: Array) -> list[tuple[Ints, Ints]]:
-    """Numbers and directions that have to do with each other: (members, rows) of each group, by index."""
+    """Group coupled numbers and directions: (members, rows) of each group, by index."""
     left, found = list(range(len(rows))), []
     while left:
         part, members = [left.pop(0)], np.zeros(rows.shape[1], bool)
@@ -171,7 +171,7 @@ def describe(
 
 
 def unchanged(problem: RecordedResiduals, shared: Array, own: Array, which: Ints, named: Ints, far: Array) -> bool:
-    """Whether points (d, n) a tenth away along open directions have the residuals of the estimate.
+    """Return whether points (d, n) along the directions have the residuals of the estimate.
 
     What is open by the Jacobian is open near the estimate; a product is claimed of every value.
     """
@@ -199,8 +199,8 @@ def kernel(directions: Array) -> Array:
 
 
 def whole_powers(weights: Array) -> Array | None:
-    """Return (n,) small integers, the first above 0, that weights (n,) are a multiple of; None without any."""
-    for most in EXPONENTS:
+    """Return (n,) small integers, the first above 0, proportional to weights (n,); None without any."""
+    for most in TRIED_EXPONENTS:
         powers = weights / weights[np.argmax(np.abs(weights))] * most
         near = np.round(powers)
         if np.all(np.abs(powers - near) <= POWER_TOLERANCE * most) and np.all(near != 0):
@@ -209,7 +209,7 @@ def whole_powers(weights: Array) -> Array | None:
 
 
 def ratio(powers: Array) -> bool:
-    """Whether a monomial is one number by another."""
+    """Whether a monomial is the ratio of two numbers."""
     return bool(len(powers) == 2 and sorted(powers) == [-1, 1])
 
 
@@ -261,12 +261,12 @@ ADVICE: dict[str, tuple[str, ...]] = {
     "record the motor's answer to steps of known torque, with a known inertia": ("gain", "torque", "kp", "kd", "motor"),
     "record fast changes of the command: delays act only where something changes": ("delay", "latency", "time_offset"),
 }
-"""Sentence by the words that ask for it."""
+"""The advice by the words of a quantity that need it."""
 GENERAL = "record motions that differ in this quantity alone, hold it at a known value, or give it a prior"
 
 
 def advice(quantities: Iterable[str]) -> str:
-    """Advise a recording for each kind among quantities such as ``cube.mass``, ``cube.size[2]``, in their order."""
+    """Return the recording to make for each kind among quantities such as ``cube.mass``, in their order."""
     found = []
     for quantity in quantities:
         last = quantity.split(".")[-1].split("[")[0].strip().lower()

@@ -1,4 +1,4 @@
-"""Is what the fit leaves noise, or an effect that the model misses?
+"""Residual analysis: whether residuals are noise, or show an effect that the model lacks.
 
 Noise has no memory and no course. Of each quantity this measures the correlation from one sample to the next with the
 test of Ljung and Box (1978), pooled over recordings and components, and the share of squares that means explain: over
@@ -20,21 +20,20 @@ from symphys.results.identification.record import PredictionErrors, QuantityResi
 from symphys.types import Array, Bools, Ints
 
 COLUMNS = ("quantity", "component", "time", "noise", "impact")
-LAGS = 10
-"""ResidualSamples over which the test looks."""
-FEWEST = 20
-"""Residuals that a verdict needs."""
-BINS = 8
-"""Means over a time."""
-CORRELATED, UNLIKELY, COURSE = 0.2, 1e-3, 0.1
-"""An effect is missing where the correlation is above the first, or where means explain more than the third, and the
-probability of that under noise is below the second."""
-COURSES = {
+MAX_LAGS = 10
+"""Largest lag of the test."""
+MIN_RESIDUALS = 20
+"""Least number of residuals for a verdict."""
+TIME_BINS = 8
+"""Number of means over a time."""
+MAX_AUTOCORRELATION, MAX_PROBABILITY, MAX_EXPLAINED_SHARE = 0.2, 1e-3, 0.1
+"""Bounds of a missing effect: correlation or explained share above, and its probability under noise below."""
+COURSE_NAMES = {
     "by_time": "the time in the recording",
     "by_impact": "the time since the impact",
     "by_recording": "which recording it is",
 }
-FARTHER, NEARER = 1.25, 0.8
+MAX_NOISE_RATIO, MIN_NOISE_RATIO = 1.25, 0.8
 """Root mean squares by noise beyond which the given noise is called too small, or too large."""
 
 
@@ -45,7 +44,7 @@ class ResidualSamples:
     Attributes:
         residual: by noise.
         recording: index among all recordings.
-        rows: what they are of.
+        rows: their description.
     """
 
     residual: Array
@@ -74,7 +73,7 @@ def samples(problem: RecordedResiduals, shared: Array, own: Array, which: Ints) 
 
 
 def study(problem: RecordedResiduals, found: ResidualSamples) -> tuple[QuantityResiduals, ...]:
-    """Each quantity that has residuals."""
+    """Study each quantity that has residuals."""
     entries = []
     for index, name in enumerate(problem.quantities):
         part = found.of(index)
@@ -110,20 +109,23 @@ def quantity_residuals(name: str, unit: str, known: bool, part: ResidualSamples)
         text="",
         **{name: share for name, (share, _) in shares.items()},
     )
-    return judged(measured, [name for name, (share, chance) in shares.items() if share > COURSE and chance < UNLIKELY])
+    return judged(
+        measured,
+        [name for name, (share, chance) in shares.items() if share > MAX_EXPLAINED_SHARE and chance < MAX_PROBABILITY],
+    )
 
 
 def judged(found: QuantityResiduals, courses: Sequence[str]) -> QuantityResiduals:
-    """Add the verdict, in words; ``courses``: the shares that count."""
-    if found.count < FEWEST:
+    """Add the verdict in words; ``courses``: the significant shares."""
+    if found.count < MIN_RESIDUALS:
         return replace(found, verdict="too few", text=f"{found.count} residuals are too few for a verdict")
-    reasons = [f"{getattr(found, name):.0%} depends on {COURSES[name]}" for name in courses]
-    if abs(found.autocorrelation) > CORRELATED and found.ljung_box < UNLIKELY:
+    reasons = [f"{getattr(found, name):.0%} depends on {COURSE_NAMES[name]}" for name in courses]
+    if abs(found.autocorrelation) > MAX_AUTOCORRELATION and found.ljung_box < MAX_PROBABILITY:
         reasons.insert(0, f"one sample is like the next (correlation {found.autocorrelation:.2f})")
     missing = bool(reasons)
-    if found.noise_known and found.ratio > FARTHER:
+    if found.noise_known and found.ratio > MAX_NOISE_RATIO:
         reasons.append(f"it is {found.ratio:.2g} times the given noise")
-    if found.noise_known and found.ratio < NEARER:
+    if found.noise_known and found.ratio < MIN_NOISE_RATIO:
         reasons.append(f"it is {found.ratio:.2g} of the given noise, which is too large")
     text = "; ".join(reasons) or "no memory, no course, and the size of the noise"
     return replace(found, verdict="missing effect" if missing else "noise", text=text)
@@ -139,11 +141,12 @@ def series(part: ResidualSamples) -> list[Array]:
 def ljung_box(runs: Sequence[Array]) -> tuple[float, float, int]:
     """Return lag-1 correlation, probability under white noise, and lags, pooled over series of mean 0."""
     longest = max((len(run) for run in runs), default=0)
-    lags = min(LAGS, longest // 4)
+    lags = min(MAX_LAGS, longest // 4)
     power = sum(float(run @ run) for run in runs)
     count = sum(len(run) for run in runs)
     if lags < 1 or not power > 0:
         return np.nan, np.nan, 0
+    # Autocorrelations pooled over the series, and the sum of their weighted squares.
     statistic, first = 0.0, np.nan
     for lag in range(1, lags + 1):
         pairs = [(run[:-lag], run[lag:]) for run in runs if len(run) > lag]
@@ -155,19 +158,19 @@ def ljung_box(runs: Sequence[Array]) -> tuple[float, float, int]:
 
 
 def binned(time: Array, component: Ints) -> Ints:
-    """Return (m,) the group of each sample: one of ``BINS`` parts in the order of time, by component."""
+    """Return (m,) the group of each sample: one of ``TIME_BINS`` parts in order of time, by component."""
     if not time.size:
         return np.zeros(0, np.int64)
-    edges = np.unique(np.quantile(time, np.linspace(0, 1, BINS + 1)[1:-1]))
+    edges = np.unique(np.quantile(time, np.linspace(0, 1, TIME_BINS + 1)[1:-1]))
     return np.asarray(np.searchsorted(edges, time, side="right") * (int(component.max()) + 1) + component)
 
 
 def explained(r: Array, group: Ints) -> tuple[float, float]:
-    """Share of the squares that the means of groups explain, adjusted for their number; its probability under noise.
+    """Return the share of the squares that group means explain, adjusted, and its probability under noise.
 
     The share is 0 at least, and nan where there are too few; the probability is that of the F test.
     """
-    if r.size < FEWEST:
+    if r.size < MIN_RESIDUALS:
         return np.nan, np.nan
     _, index, sizes = np.unique(group, return_inverse=True, return_counts=True)
     count, freedom = len(sizes), r.size - len(sizes)
@@ -181,7 +184,7 @@ def explained(r: Array, group: Ints) -> tuple[float, float]:
 
 
 def rms(values: Array) -> float:
-    """Root mean square; nan of none."""
+    """Return the root mean square; nan without values."""
     return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
 
 
@@ -214,17 +217,17 @@ def recording_errors(problem: RecordedResiduals, found: ResidualSamples) -> Arra
 
 @runtime_checkable
 class SimulatedImpacts(Protocol):
-    """A problem of identification that simulates when impacts are."""
+    """A problem of identification that also simulates the times of impacts."""
 
     def simulated_impacts(self, shared: Array, own: Array, which: Ints) -> list[Array]:
-        """Return (i,) [s] the instants of impacts, rising, of each recording in ``which``."""
+        """Return the times (i,) [s] of impacts, rising, of each recording in ``which``."""
 
 
 class TimedRecordings(DerivedResiduals):
-    """A problem whose rows have the time since the last impact, from instants of all recordings."""
+    """A problem whose rows have the time since the last impact."""
 
     def __init__(self, problem: RecordedResiduals, impacts: Sequence[Array]) -> None:
-        """Take the instants of impacts (i,) [s] of each of the K recordings, rising."""
+        """Take the times of impacts (i,) [s] of each of the K recordings, rising."""
         super().__init__(problem)
         self.impacts = impacts
 
@@ -237,7 +240,7 @@ class TimedRecordings(DerivedResiduals):
 
 
 def timed(problem: RecordedResiduals, source: RecordedResiduals, shared: Array, own: Array) -> RecordedResiduals:
-    """Return ``problem`` with the impacts that ``source`` simulates at shared (s,), own (K, o), if it simulates any."""
+    """Return ``problem`` with the impacts that ``source`` simulates at shared (s,), own (K, o), if it does."""
     if not isinstance(source, SimulatedImpacts):
         return problem
     return TimedRecordings(problem, source.simulated_impacts(shared, own, np.arange(len(own))))

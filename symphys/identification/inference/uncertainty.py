@@ -1,4 +1,4 @@
-"""Standard errors, 95 % intervals and correlations of what was estimated, from the Jacobian at the estimate.
+"""Standard errors, 95 % intervals and correlations of the estimates, from the Jacobian there.
 
 With H the arrow of second derivatives and M that of the squares of the scores, the covariance is H^-1 M H^-1. In least
 squares M is H, and the covariance its inverse, which is the Cramer-Rao bound under normal noise. Under Huber's loss M
@@ -28,7 +28,7 @@ from symphys.identification.fitting.remaining import DeterminedArrow, number_uni
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.square_root import (
     EPS,
-    TOUCHED,
+    MIN_TOUCHED_COMPONENT,
     Root,
     eliminate,
     pseudo_root,
@@ -38,18 +38,19 @@ from symphys.identification.fitting.square_root import (
 from symphys.identification.interface import FitParameters, RecordedResiduals, Rows
 from symphys.types import Array, Bools, Ints
 
-LEVEL = 0.95
+CONFIDENCE_LEVEL = 0.95
+"""Probability of the intervals."""
 SUSPICIOUS = 1e-8
-"""Singular values below this share of the largest are compared with the rounding of the derivatives."""
-NUDGE = 8 * EPS
-"""Relative change of all numbers at which the Jacobian is evaluated once more, to see its rounding."""
-MOST_NOISE = 1e-9
-"""Largest rounding, as a share of the longest column; a larger change comes from a kink."""
+"""Relative singular values below which the rounding of the derivatives is measured."""
+RELATIVE_NUDGE = 8 * EPS
+"""Relative change of all numbers with which the Jacobian is evaluated again, to measure its rounding."""
+MAX_DERIVATIVE_NOISE = 1e-9
+"""Largest rounding, relative to the longest column; a larger change comes from a kink."""
 
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """The arrow at an estimate with the own numbers eliminated, in scaled numbers; k recordings that were fitted.
+    """The arrow at an estimate with own numbers eliminated, in scaled numbers; k fitted recordings.
 
     Attributes:
         shared: the root of the Schur complement S, priors included.
@@ -112,7 +113,7 @@ class Uncertainty:
 def make_information(
     system: ArrowSystem, free_shared: Bools, free_own: Bools, noise: tuple[Array, Array] | None = None
 ) -> Information:
-    """Eliminate the own numbers from an arrow, (s,) and (k, o) of whose numbers are free.
+    """Eliminate the own numbers of an arrow, of whose numbers (s,) and (k, o) are free.
 
     ``noise``: (k, n, n) rows of the rounding of the roots, and (k, o) the lengths of its own columns.
     """
@@ -124,12 +125,12 @@ def make_information(
     moved = rounding[:, :, :s] + rounding[:, :, s:] @ found.gain
     lengths = np.linalg.norm(stacked(moved), axis=0)
     longest = float(np.max(np.linalg.norm(rows, axis=0), initial=0.0))
-    shared = pseudo_root(triangle(rows), np.minimum(lengths, MOST_NOISE * longest) * free_shared)
+    shared = pseudo_root(triangle(rows), np.minimum(lengths, MAX_DERIVATIVE_NOISE * longest) * free_shared)
     return Information(shared, found.left, found.own, found.gain, free_shared, free_own)
 
 
 def covariances(bread: Information, meat: ArrowSystem) -> tuple[Array, Array, Bools]:
-    """Scaled covariances H^-1 M H^-1: (s, s), and (k, o) variances of own numbers; (s,) shared ones left open."""
+    """Return scaled covariances H^-1 M H^-1: (s, s), (k, o) variances of own numbers, (s,) open shared ones."""
     s, inverse = meat.s, bread.shared.square
     ahead = meat.roots[:, :, :s] + meat.roots[:, :, s:] @ bread.gain
     moves = ahead @ bread.shared.whitener @ bread.shared.whitener.T
@@ -145,13 +146,15 @@ def covariances(bread: Information, meat: ArrowSystem) -> tuple[Array, Array, Bo
 def derivative_noise(
     problem: RecordedResiduals, evaluated: Rows, shared: Array, own: Array, which: Ints, loss: RobustLoss
 ) -> tuple[Array, Array]:
-    """Rounding of the Jacobian: how it changes where all numbers change by units of their last digit.
+    """Measure the rounding of the Jacobian: its change when all numbers change in their last digits.
 
     Returns:
         (k, n, n) roots of the changes of each recording, and (k, o) lengths of those of its own columns, in scales.
     """
     nudged = [
-        np.clip(values + NUDGE * np.maximum(np.abs(values), parameters.scale), parameters.lower, parameters.upper)
+        np.clip(
+            values + RELATIVE_NUDGE * np.maximum(np.abs(values), parameters.scale), parameters.lower, parameters.upper
+        )
         for parameters, values in ((problem.shared, shared), (problem.own, own))
     ]
     again, s, n = problem.jacobian(nudged[0], nudged[1], which), len(shared), len(shared) + own.shape[1]
@@ -164,7 +167,7 @@ def derivative_noise(
             found[k] = triangle(changed)
         longest[k] = np.max(np.linalg.norm(first[2] * weight[:, s:], axis=0), initial=0.0)
     own_lengths = np.linalg.norm(found[:, :, s:], axis=1)
-    return found, np.minimum(own_lengths, MOST_NOISE * longest[:, None])
+    return found, np.minimum(own_lengths, MAX_DERIVATIVE_NOISE * longest[:, None])
 
 
 def uncertainty(
@@ -206,13 +209,13 @@ def uncertainty(
     own_error = np.full(own.shape, np.nan)
     units = number_units((problem.shared, problem.own), (shared, own), (free_shared, free_own), which)
     vague_own = DeterminedArrow(system, units).vague_own
-    open_own = bread.own_open | vague_own | np.any((np.abs(bread.gain) > TOUCHED) & open_shared, axis=2)
+    open_own = bread.own_open | vague_own | np.any((np.abs(bread.gain) > MIN_TOUCHED_COMPONENT) & open_shared, axis=2)
     fitted = np.where(open_own, np.inf, np.sqrt(np.maximum(own_variance, 0))) * problem.own.scale[which]
     own_error[which] = np.where(free_own, fitted, np.nan)
     correlation, known = np.full(covariance.shape, np.nan), np.flatnonzero(np.isfinite(error) & (error > 0))
     some = np.ix_(known, known)
     correlation[some] = covariance[some] / np.outer(error[known], error[known])
-    tail = (1 + LEVEL) / 2
+    tail = (1 + CONFIDENCE_LEVEL) / 2
     quantile = float(scipy.stats.norm.ppf(tail) if noise_known else scipy.stats.t.ppf(tail, max(freedom, 1)))
     own_free = np.ones(own.shape, bool)
     own_free[which] = free_own
@@ -221,5 +224,5 @@ def uncertainty(
 
 
 def at_bound(parameters: FitParameters, values: Array, free: Bools) -> Ints:
-    """-1 for numbers that the lower bound holds, 1 for the upper one, else 0."""
+    """Return -1 for numbers at the lower bound, 1 at the upper one, else 0."""
     return np.where(free, 0, np.where(values <= parameters.lower, -1, 1))

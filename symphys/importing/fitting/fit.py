@@ -1,4 +1,4 @@
-"""The shapes nearest to a mesh: one primitive, a few spheres or a few capsules, and how far off they are.
+"""The shapes nearest to a mesh: one primitive, a few spheres or a few capsules, and their deviations.
 
 A fit minimises deviations by least squares, then their fourth powers, which come near to the least largest deviation.
 A deviation is how far a point of the mesh's outer surface is from the surface of the solids, how far a point inside the
@@ -8,7 +8,7 @@ mesh is outside them, or how much nearer they are to a point outside than the me
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -20,39 +20,185 @@ from numpy.typing import ArrayLike
 from symphys.errors import SymphysError
 from symphys.files import write_bytes
 from symphys.importing.fitting.mesh import Mesh
-from symphys.importing.fitting.solids import Placed, union_distance
 from symphys.maths import rotation
-from symphys.model.shapes import Shape
+from symphys.model.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from symphys.suggest import hint, quote
 from symphys.types import Array
 
-POINTS = 320
+FOOT_STEPS = 8
+"""Newton steps towards the foot of a perpendicular on an ellipsoid."""
+POINTS_ON_SOLID = 1500
+"""Points on the surface of a solid."""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A solid: kind, place (3,), axes (3, 3) in columns, and sizes: radius, radius and half length, or three [m]."""
+
+    kind: str
+    centre: Array
+    axes: Array
+    sizes: Array
+
+    def distance(self, points: Array) -> Array:
+        """Return the signed distances (n,) [m], negative inside."""
+        return DISTANCES[self.kind]((points - self.centre) @ self.axes, self.sizes)
+
+    def surface(self) -> Array:
+        """Return points (k, 3) all over the surface."""
+        return np.asarray(self.centre + SURFACES[self.kind](self.sizes) @ self.axes.T)
+
+    def shape(self) -> Shape:
+        """Return the shape of the model."""
+        centre = tuple(self.centre.tolist())
+        orientation = quaternion(self.axes)
+        a, *more = self.sizes.tolist()
+        if self.kind == "sphere":
+            return Sphere(a, centre)
+        if self.kind == "capsule":
+            return Capsule(a, more[0], centre, orientation)
+        if self.kind == "cylinder":
+            return Cylinder(a, more[0], centre, orientation)
+        kind = Box if self.kind == "box" else Ellipsoid
+        return kind((a, *more), centre, orientation)
+
+
+def to_sphere(p: Array, sizes: Array) -> Array:
+    """Return distances from a sphere about the origin."""
+    return np.asarray(np.linalg.norm(p, axis=1) - sizes[0])
+
+
+def to_capsule(p: Array, sizes: Array) -> Array:
+    """Return distances from a capsule along z."""
+    along = np.clip(p[:, 2], -sizes[1], sizes[1])
+    return np.asarray(np.sqrt(p[:, 0] ** 2 + p[:, 1] ** 2 + (p[:, 2] - along) ** 2) - sizes[0])
+
+
+def to_cylinder(p: Array, sizes: Array) -> Array:
+    """Return distances from a cylinder along z."""
+    over = np.stack([np.hypot(p[:, 0], p[:, 1]) - sizes[0], np.abs(p[:, 2]) - sizes[1]])
+    return np.asarray(np.linalg.norm(np.maximum(over, 0), axis=0) + np.minimum(over.max(axis=0), 0))
+
+
+def to_box(p: Array, sizes: Array) -> Array:
+    """Return distances from a box by its half sizes."""
+    over = np.abs(p) - sizes
+    return np.asarray(np.linalg.norm(np.maximum(over, 0), axis=1) + np.minimum(over.max(axis=1), 0))
+
+
+def to_ellipsoid(p: Array, sizes: Array) -> Array:
+    """Return distances from an ellipsoid, by the same iteration as ``EllipsoidField`` of the collision."""
+    squares, scaled = sizes**2, sizes * p
+    low = -0.98 * squares.min()
+    m = np.maximum((np.abs(scaled) - squares).max(axis=1), low)
+    for _ in range(FOOT_STEPS):
+        parts = scaled / (squares + m[:, None])
+        square = (parts**2).sum(axis=1) + 1e-30
+        slope = (parts**2 / (squares + m[:, None])).sum(axis=1) + 1e-30
+        m = np.maximum(m + (np.sqrt(square) - 1) * square / slope, low)
+    return np.asarray(m * np.linalg.norm(p / (squares + m[:, None]), axis=1))
+
+
+DISTANCES: dict[str, Callable[[Array, Array], Array]] = {
+    "sphere": to_sphere,
+    "capsule": to_capsule,
+    "cylinder": to_cylinder,
+    "box": to_box,
+    "ellipsoid": to_ellipsoid,
+}
+"""Signed distances by the kinds of shapes."""
+
+
+def directions(count: int = POINTS_ON_SOLID) -> Array:
+    """Return unit vectors (count, 3), spread evenly by a Fibonacci spiral."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    turn = np.pi * (1 + 5**0.5) * np.arange(count)
+    ring = np.sqrt(1 - z**2)
+    return np.stack([ring * np.cos(turn), ring * np.sin(turn), z], axis=1)
+
+
+def capsule_surface(sizes: Array) -> Array:
+    """Return points (k, 3) on both ends and the side."""
+    ball = sizes[0] * directions()
+    ball[:, 2] += np.where(ball[:, 2] > 0, sizes[1], -sizes[1])
+    turn, z = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(-sizes[1], sizes[1], 30))
+    side = np.stack([sizes[0] * np.cos(turn), sizes[0] * np.sin(turn), z], axis=-1).reshape(-1, 3)
+    return np.concatenate([ball, side])
+
+
+def cylinder_surface(sizes: Array) -> Array:
+    """Return points (k, 3) on both faces and the side."""
+    turn, z = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(-sizes[1], sizes[1], 24))
+    side = np.stack([sizes[0] * np.cos(turn), sizes[0] * np.sin(turn), z], axis=-1).reshape(-1, 3)
+    turn, out = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(0, 1, 10))
+    face = sizes[0] * np.stack([out * np.cos(turn), out * np.sin(turn), 0 * out], axis=-1).reshape(-1, 3)
+    end = np.array([0.0, 0.0, sizes[1]])
+    return np.concatenate([side, face + end, face - end])
+
+
+def box_surface(sizes: Array) -> Array:
+    """Return points (k, 3) of a grid on each face."""
+    side = np.linspace(-1, 1, 16)
+    u, v = (each.ravel() for each in np.meshgrid(side, side))
+    found = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            face = np.zeros((u.size, 3))
+            face[:, axis], face[:, axis - 2], face[:, axis - 1] = sign, u, v
+            found.append(face * sizes)
+    return np.concatenate(found)
+
+
+SURFACES: dict[str, Callable[[Array], Array]] = {
+    "sphere": lambda sizes: sizes[0] * directions(),
+    "capsule": capsule_surface,
+    "cylinder": cylinder_surface,
+    "box": box_surface,
+    "ellipsoid": lambda sizes: sizes * directions(),
+}
+"""Points on the surface by the kinds of shapes."""
+
+
+def quaternion(axes: Array) -> tuple[float, float, float, float]:
+    """Return the unit quaternion w x y z of a rotation matrix."""
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(axes).as_quat(canonical=True).tolist()
+    return w, x, y, z
+
+
+def union_distance(solids: list[Placed], points: Array) -> Array:
+    """Return the distances (n,) [m] from the nearest of several solids."""
+    return np.asarray(np.min([solid.distance(points) for solid in solids], axis=0))
+
+
+SURFACE_POINTS = 320
 """Points of the outer surface in a search; half as many outside, a quarter inside."""
-MOST_STEPS = 20
+MAX_EVALUATIONS = 20
 """Evaluations of a search, for each power."""
 POWERS = (1, 2, 4)
 """Powers of a distance, as a share of the mesh's size, in the residuals."""
-WIDTHS = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
+SIZE_COUNTS = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
 """Number of sizes of a solid."""
-TURNS = {"sphere": 0, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
+ROTATION_COUNTS = {"sphere": 0, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
 """Rotational degrees of freedom that change a solid."""
 MIN_SIZE = 1e-3
 """The least size of a solid, as a share of the mesh's size."""
 CLUSTER_STEPS = 25
 """Iterations of k-means."""
-SEVERAL = {"spheres": ("sphere", (2, 4, 8)), "capsules": ("capsule", (2, 3, 4))}
+SHAPE_COUNTS = {"spheres": ("sphere", (2, 4, 8)), "capsules": ("capsule", (2, 3, 4))}
 """Fits by more than one shape: the kind, and the counts that are tried."""
-KINDS = (*WIDTHS, *SEVERAL)
+KINDS = (*SIZE_COUNTS, *SHAPE_COUNTS)
 """Everything that ``fit`` tries, in the order of simplicity."""
 GAIN_PER_SHAPE = 0.07
 """Relative decrease of the largest deviation that justifies one more shape."""
-NEGLIGIBLE = 0.005
+NEGLIGIBLE_DEVIATION = 0.005
 """Share of the mesh's size that is added to compared deviations: smaller differences do not matter."""
-SIDES = ((0, 2), (1, 2), (0, 1))
+VIEW_AXES = ((0, 2), (1, 2), (0, 1))
 """The axes to the right and up in each view."""
-MOST_FACES = 8000
+MAX_FACES = 8000
 """Faces of a mesh that are drawn, at most."""
-RINGS = 24
+CIRCLE_CORNERS = 24
 """Corners of a drawn circle."""
 
 
@@ -112,8 +258,8 @@ def fits(vertices: ArrayLike, faces: ArrayLike, kinds: Sequence[str] = KINDS) ->
     mesh = checked(vertices, faces)
     found = []
     for kind in kinds:
-        if kind in SEVERAL:
-            single, counts = SEVERAL[kind]
+        if kind in SHAPE_COUNTS:
+            single, counts = SHAPE_COUNTS[kind]
             found += [measured(kind, mesh, improved(mesh, several(single, mesh, count))) for count in counts]
         else:
             cloud = cloud_of(mesh)
@@ -130,7 +276,7 @@ def best(found: Sequence[Fit]) -> Fit:
 
 def cost(each: Fit) -> float:
     """Return the deviation [mm] with a penalty for each additional shape."""
-    return (each.deviation_mm + NEGLIGIBLE * each.size_mm) * (1 + GAIN_PER_SHAPE) ** (len(each.shapes) - 1)
+    return (each.deviation_mm + NEGLIGIBLE_DEVIATION * each.size_mm) * (1 + GAIN_PER_SHAPE) ** (len(each.shapes) - 1)
 
 
 def measured(kind: str, mesh: Mesh, solids: list[Placed]) -> Fit:
@@ -164,12 +310,14 @@ def improved(mesh: Mesh, start: Sequence[Placed]) -> list[Placed]:
 
     cloud, solids = cloud_of(mesh), list(start)
     for power in POWERS:
-        numbers = np.zeros(sum(3 + TURNS[solid.kind] + WIDTHS[solid.kind] for solid in solids))
+        numbers = np.zeros(sum(3 + ROTATION_COUNTS[solid.kind] + SIZE_COUNTS[solid.kind] for solid in solids))
 
         def residuals(change: Array, power: int = power, solids: list[Placed] = solids) -> Array:
             return np.asarray((10 * cloud.deviations(changed(solids, change, mesh.size)) / mesh.size) ** power)
 
-        found = least_squares(residuals, numbers, method="trf", max_nfev=MOST_STEPS, x_scale=0.1, xtol=1e-4, ftol=1e-4)
+        found = least_squares(
+            residuals, numbers, method="trf", max_nfev=MAX_EVALUATIONS, x_scale=0.1, xtol=1e-4, ftol=1e-4
+        )
         solids = changed(solids, found.x, mesh.size)
     return solids
 
@@ -196,9 +344,9 @@ def cloud_of(mesh: Mesh) -> Cloud:
     low, high = mesh.outer.min(axis=0), mesh.outer.max(axis=0)
     margin = 0.3 * (high - low).max()
     grid = low - margin + np.random.default_rng(2).random((2000, 3)) * (high - low + 2 * margin)
-    outside = thinned(grid[mesh.outside(grid)], POINTS // 2)
+    outside = thinned(grid[mesh.outside(grid)], SURFACE_POINTS // 2)
     away = np.asarray(mesh.tree.query(outside)[0], float)
-    return Cloud(thinned(mesh.outer, POINTS), thinned(mesh.filling, POINTS // 4), outside, away)
+    return Cloud(thinned(mesh.outer, SURFACE_POINTS), thinned(mesh.filling, SURFACE_POINTS // 4), outside, away)
 
 
 def changed(solids: Sequence[Placed], numbers: Array, size: float) -> list[Placed]:
@@ -207,7 +355,7 @@ def changed(solids: Sequence[Placed], numbers: Array, size: float) -> list[Place
 
     found, at = [], 0
     for solid in solids:
-        turns, width = TURNS[solid.kind], WIDTHS[solid.kind]
+        turns, width = ROTATION_COUNTS[solid.kind], SIZE_COUNTS[solid.kind]
         shift, turn, growth = np.split(numbers[at : at + 3 + turns + width], [3, 3 + turns])
         axes = solid.axes @ Rotation.from_rotvec(np.append(turn, [0] * (3 - turns))).as_matrix()
         sizes = np.maximum(solid.sizes * np.exp(np.clip(growth, -3, 3)), MIN_SIZE * size)
@@ -299,12 +447,12 @@ def draw_fit(fitted: Fit, vertices: ArrayLike, faces: ArrayLike, path: Path | st
     from matplotlib.figure import Figure
 
     mesh = checked(vertices, faces)
-    triangles = 1000 * mesh.vertices[mesh.faces[:: max(1, -(-len(mesh.faces) // MOST_FACES))]]
+    triangles = 1000 * mesh.vertices[mesh.faces[:: max(1, -(-len(mesh.faces) // MAX_FACES))]]
     wires = [1000 * wire for shape in fitted.shapes for wire in outline(shape)]
     figure = Figure(figsize=(11, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
-    for k, side in enumerate(SIDES):
-        axes: Any = figure.add_subplot(1, len(SIDES), k + 1)
+    for k, side in enumerate(VIEW_AXES):
+        axes: Any = figure.add_subplot(1, len(VIEW_AXES), k + 1)
         seen, lines = triangles[:, :, side], [wire[:, side] for wire in wires]
         axes.add_collection(PolyCollection(list(seen), facecolor="0.8", edgecolor="0.6", linewidth=0.15))
         axes.add_collection(LineCollection(lines, colors="#1f5fbf", linewidths=0.8))
@@ -329,7 +477,7 @@ def outline(shape: Shape) -> list[Array]:
 
 def own_lines(shape: Shape) -> list[Array]:
     """Return lines on a shape in its own axes: edges of a polytope, circles of round shapes."""
-    turn = np.linspace(0, 2 * np.pi, RINGS + 1)
+    turn = np.linspace(0, 2 * np.pi, CIRCLE_CORNERS + 1)
     circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
     sizes = shape.sizes
     if shape.kind == "box":

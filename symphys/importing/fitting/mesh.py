@@ -22,11 +22,12 @@ VIEWS = 48
 """Number of viewing directions."""
 PIXELS = 48
 """Pixels of a view, along the longest side."""
-WITNESSES = 4
+MIN_WITNESSES = 4
 """Views that must see a point in front of the surface."""
-SURROUNDED = 5
+GAP_NEIGHBOURS = 5
 """Number of nearer neighbours, of eight, from which a pixel counts as a gap between samples."""
 GOLDEN = (1 + 5**0.5) / 2
+"""The golden ratio."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Mesh:
 
     @cached_property
     def samples(self) -> Array:
-        """Points (k, 3) spread over all triangles by area, the same each time, and all vertices."""
+        """The samples (k, 3): points spread over all triangles by area, reproducibly, and all vertices."""
         corners = self.vertices[self.faces]
         areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         rng = np.random.default_rng(0)
@@ -102,9 +103,9 @@ class Mesh:
         return np.asarray(self.samples[self.ahead(self.samples) > -slack / 2])
 
     def ahead(self, points: Array) -> Array:
-        """Return how far points lie in front of the surface (n,) [m] for ``WITNESSES`` views: one may be a gap."""
+        """Return how far points lie in front of the surface (n,) [m] for ``MIN_WITNESSES`` views: one may be a gap."""
         ahead = np.array([view.ahead(points) for view in self.views])
-        return np.asarray(np.partition(ahead, -WITNESSES, axis=0)[-WITNESSES])
+        return np.asarray(np.partition(ahead, -MIN_WITNESSES, axis=0)[-MIN_WITNESSES])
 
     def outside(self, points: Array) -> NDArray[np.bool_]:
         """Return whether points lie in front of the surface (n,), as seen from some directions.
@@ -116,7 +117,7 @@ class Mesh:
 
     @cached_property
     def filling(self) -> Array:
-        """Points (k, 3) of a regular grid inside."""
+        """The points (k, 3) of a regular grid inside."""
         low, high = self.outer.min(axis=0), self.outer.max(axis=0)
         step = self.size / 40
         sides = [np.arange(a + step / 2, b, step) for a, b in zip(low, high, strict=True)]
@@ -140,12 +141,12 @@ class Mesh:
 
 
 def filled(depth: Array) -> Array:
-    """Raise depths to the ``SURROUNDED``-th nearest of eight neighbours, since no sample may have fallen on a pixel."""
+    """Raise depths to the ``GAP_NEIGHBOURS``-th nearest of eight neighbours: a pixel may have no sample."""
     padded = np.pad(depth, 1, constant_values=-np.inf)
     rows, columns = depth.shape
     shifts = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
     around = np.sort([padded[i : i + rows, j : j + columns] for i, j in shifts], axis=0)
-    return np.asarray(np.maximum(depth, around[-SURROUNDED]))
+    return np.asarray(np.maximum(depth, around[-GAP_NEIGHBOURS]))
 
 
 def triangle_distances(triangles: Array, point: Array) -> Array:

@@ -19,8 +19,11 @@ from symphys.importing.records import ImportProblem
 from symphys.suggest import quote
 
 MAX_BYTES = 50_000_000
+"""Largest size of a file [bytes]."""
 MAX_DEPTH = 200
+"""Largest depth of nested elements."""
 MAX_ELEMENTS = 500_000
+"""Largest number of elements of a model."""
 MAX_FILES = 200
 """Files of one model that include each other."""
 MAX_COUNT = 1_000_000

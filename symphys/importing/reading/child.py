@@ -22,21 +22,22 @@ from symphys.importing.reading.urdf_text import Base, Mimic, base_floats, lost_e
 from symphys.importing.records import Finding, ImportProblem, Inertial, JointMotor, counted, listed
 
 READABLE = (".stl", ".obj", ".msh")
-NAMED = re.compile(r"Element (?:'mesh', )?name '([^']*)'")
-ABOUT_MESHES = ("mesh", "decoder", "faces", "vertices", "qhull")
+NAMED_ELEMENT = re.compile(r"Element (?:'mesh', )?name '([^']*)'")
+MESH_WORDS = ("mesh", "decoder", "faces", "vertices", "qhull")
 """Words of messages about meshes."""
-TINY = 1e-3
+STANDIN_SIZE = 1e-3
 """[m] Size of the stand-in for a shape that is left out, which touches nothing and weighs nothing."""
 MIN_INERTIA = 1e-14
 """[kg], [kg m^2] Least mass and inertia of a moving body for MuJoCo."""
 MAX_NUMBER = 1e12
 """Size beyond which a number of a model counts as a mistake."""
-HARMLESS = (1e-3, 1e-6)
+STANDIN_INERTIA = (1e-3, 1e-6)
 """[kg], [kg m^2] Stand-in mass and inertia of a link whose own MuJoCo refuses."""
 MODEL, ANSWER, REQUEST = "model.mjb", "answer.json", "request.json"
-MOST_MEMORY = 8 << 30
+MAX_MEMORY = 8 << 30
 """[bytes] Memory of the process."""
-MOST_BODIES = 2000
+MAX_BODIES = 2000
+"""Largest number of bodies of a model."""
 FINITE_WORDS = (
     "body_pos body_quat body_ipos body_mass body_inertia jnt_pos jnt_axis jnt_stiffness geom_pos geom_size "
     "qpos0 dof_armature dof_damping dof_frictionloss site_pos actuator_gainprm actuator_biasprm "
@@ -68,7 +69,7 @@ def limit_memory() -> None:
     except ImportError:
         return
     _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    limit = MOST_MEMORY if hard == resource.RLIM_INFINITY else min(MOST_MEMORY, hard)
+    limit = MAX_MEMORY if hard == resource.RLIM_INFINITY else min(MAX_MEMORY, hard)
     resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
@@ -119,8 +120,8 @@ def check_compiled(folders: Folders, model: Any) -> None:
     """
     if model.nbody == 1:
         raise ImportProblem(str(folders.file), "it has no bodies; a robot has at least one <body>, or <link>")
-    if model.nbody - 1 > MOST_BODIES:
-        raise ImportProblem(str(folders.file), f"it has {model.nbody - 1} bodies; at most {MOST_BODIES} are read")
+    if model.nbody - 1 > MAX_BODIES:
+        raise ImportProblem(str(folders.file), f"it has {model.nbody - 1} bodies; at most {MAX_BODIES} are read")
     for name in FINITE:
         values = np.asarray(getattr(model, name), float)
         if not np.isfinite(values).all() or np.abs(values).max(initial=0.0) > MAX_NUMBER:
@@ -180,9 +181,9 @@ def keep_inertials(spec: Any, folders: Folders, findings: list[Finding]) -> dict
             refused.append(body.name)
         kept[body.name] = own
         body.explicitinertial = True
-        body.mass = max(own.mass, HARMLESS[0])
+        body.mass = max(own.mass, STANDIN_INERTIA[0])
         body.fullinertia = [np.nan, 0, 0, 0, 0, 0]
-        body.inertia = [HARMLESS[1]] * 3
+        body.inertia = [STANDIN_INERTIA[1]] * 3
     if none:
         text = "they have no <inertial>, thus mass 0; MuJoCo would make one from their shapes"
         findings.append(Finding("recovered", f"mass of {listed(none)}", text))
@@ -320,9 +321,9 @@ def compiled(spec: Any, findings: list[Finding]) -> Any:
 
 def blamed_mesh(spec: Any, message: str) -> Any:
     """Return the mesh that an error is about; None if it is not about a mesh."""
-    if not any(word in message.lower() for word in ABOUT_MESHES):
+    if not any(word in message.lower() for word in MESH_WORDS):
         return None
-    match = NAMED.search(message)
+    match = NAMED_ELEMENT.search(message)
     for mesh in spec.meshes:
         if match and mesh.name == match[1]:
             return mesh
@@ -351,7 +352,7 @@ def take_out(spec: Any, mesh: Any, why: str, findings: list[Finding]) -> None:
     findings.append(Finding("left out", what, text))
     for geom in users:
         geom.meshname, geom.type = "", mujoco.mjtGeom.mjGEOM_SPHERE
-        geom.size = [TINY, 0, 0]
+        geom.size = [STANDIN_SIZE, 0, 0]
         geom.contype = geom.conaffinity = 0
         geom.mass = 0.0
     for skin in list(spec.skins):

@@ -10,7 +10,7 @@ from symphys.importing.records import ImportProblem
 from symphys.suggest import quote
 
 PACKAGE = "package:"
-MOST_PARENTS = 30
+MAX_PARENTS = 30
 """Number of parent folders that are searched for a package."""
 
 
@@ -20,7 +20,7 @@ class Folders:
 
     Attributes:
         file: the model.
-        assets: what the caller allows beside the model's folder.
+        assets: other folders that the caller allows.
     """
 
     file: Path
@@ -47,7 +47,7 @@ class Folders:
         Args:
             path: of the file.
             named: as the model writes it.
-            what: which element names it.
+            what: the element that names it.
 
         Raises:
             ImportProblem: it does.
@@ -100,7 +100,7 @@ class Folders:
             for start in range(len(parts)):
                 yield base.joinpath(*parts[start:]), None
         own = self.own.resolve()
-        for above in (own, *own.parents[:MOST_PARENTS]):
+        for above in (own, *own.parents[:MAX_PARENTS]):
             if above.name == parts[0] if parts else False:
                 yield above.joinpath(*parts[1:]), above
             if parts and own.is_relative_to(above / parts[0]):

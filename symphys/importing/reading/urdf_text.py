@@ -14,8 +14,8 @@ from symphys.importing.records import Finding, JointMotor, counted, listed
 Base = Literal["auto", "free", "fixed"]
 WORLD = "world"
 """The link that MuJoCo takes for the world."""
-MOVING = ("revolute", "continuous", "prismatic", "floating", "planar", "spherical")
-LOST = {
+MOVING_KINDS = ("revolute", "continuous", "prismatic", "floating", "planar", "spherical")
+UNREAD_ELEMENTS = {
     "visual": "meshes and colours for pictures; pictures show the shapes that touch things",
     "gazebo": "settings of another simulator",
     "sensor": "sensors of URDF; add [[sensor]] tables",
@@ -47,7 +47,7 @@ class JointText:
         child: name of a link.
         effort: [N m] or [N]; None: not said.
         velocity: [rad/s] or [m/s]; None: not said.
-        mimic: what it follows.
+        mimic: the joint that it follows.
     """
 
     name: str
@@ -82,7 +82,7 @@ def read_urdf(text: bytes) -> UrdfText:
     joints = tuple(joint(each) for each in root.findall("joint"))
     driven = dict.fromkeys(name for each in root.iter("transmission") for name in driven_by(each))
     links = tuple(each.get("name", "") for each in root.findall("link"))
-    lost = {tag: sum(1 for _ in root.iter(tag)) for tag in LOST}
+    lost = {tag: sum(1 for _ in root.iter(tag)) for tag in UNREAD_ELEMENTS}
     return UrdfText(joints, tuple(driven), links, {tag: count for tag, count in lost.items() if count})
 
 
@@ -146,8 +146,8 @@ def branches(urdf: UrdfText, root: str) -> int:
     seen = {root}
     while held:
         for each in children.get(held.pop(), ()):
-            count += each.kind in MOVING
-            if each.kind not in MOVING and each.child not in seen:
+            count += each.kind in MOVING_KINDS
+            if each.kind not in MOVING_KINDS and each.child not in seen:
                 seen.add(each.child)
                 held.append(each.child)
     return count
@@ -180,7 +180,7 @@ def motors(urdf: UrdfText) -> tuple[dict[str, JointMotor], list[Finding]]:
     driven = set(urdf.driven) or {each.name for each in urdf.joints}
     weak, endless = [], []
     for each in urdf.joints:
-        if each.name not in driven or each.kind not in MOVING or (each.mimic and not urdf.driven):
+        if each.name not in driven or each.kind not in MOVING_KINDS or (each.mimic and not urdf.driven):
             continue
         if each.effort is None or each.effort <= 0:
             weak += [each.name] if urdf.driven else []
@@ -206,7 +206,7 @@ def motors(urdf: UrdfText) -> tuple[dict[str, JointMotor], list[Finding]]:
 
 def speeds(urdf: UrdfText) -> list[Finding]:
     """Return the finding on velocity limits, which nothing enforces."""
-    moving = [each for each in urdf.joints if each.kind in MOVING]
+    moving = [each for each in urdf.joints if each.kind in MOVING_KINDS]
     given = [each.velocity for each in moving if each.velocity and math.isfinite(each.velocity)]
     if not given:
         return []
@@ -217,7 +217,11 @@ def speeds(urdf: UrdfText) -> list[Finding]:
 
 def lost_elements(urdf: UrdfText) -> list[Finding]:
     """Return findings on elements that nothing reads."""
-    return [Finding("left out", f"{count} <{tag}>", f"{LOST[tag]}") for tag, count in urdf.lost.items() if tag in LOST]
+    return [
+        Finding("left out", f"{count} <{tag}>", f"{UNREAD_ELEMENTS[tag]}")
+        for tag, count in urdf.lost.items()
+        if tag in UNREAD_ELEMENTS
+    ]
 
 
 def lost_mimics(urdf: UrdfText, kept: Sequence[str]) -> tuple[tuple[Mimic, ...], list[Finding]]:

@@ -23,23 +23,23 @@ from symphys.types import Array
 Law = tuple[float, float, float]
 """Friction, torsion [m], rolling [m]."""
 KEYS = ("friction", "torsion", "rolling")
-Meetings = dict[tuple[str, str], Law]
+PairLaws = dict[tuple[str, str], Law]
 """The law of every two surfaces that may touch, by their names in alphabetical order."""
 Tables = Mapping[str, dict[str, Any]]
 """Tables of surfaces by their names."""
 Statement = tuple[tuple[str, Any], ...]
 """The keys of a [[pair]] table; empty where none is needed."""
-APART: Statement = (("collide", False),)
-POINTS = {
+NO_CONTACT: Statement = (("collide", False),)
+POINT_COUNTS = {
     "sphere": {"sphere": 1, "box": 1, "capsule": 1, "cylinder": 1, "ellipsoid": 1, "convex": 1},
     "box": {"box": 16, "capsule": 8},
     "capsule": {"capsule": 5, "cylinder": 3, "ellipsoid": 3},
     "plane": {"sphere": 1, "box": 8, "capsule": 2, "cylinder": 6, "ellipsoid": 1, "convex": 8},
 }
 """Number of points in which two shapes may touch; terrain is like a plane. Other pairs have no rule."""
-MOST_POINTS = 2000
+MAX_POINTS = 2000
 """Points of contact that a world may have."""
-OVERLAP = 5e-4
+MAX_START_OVERLAP = 5e-4
 """[m] Overlap at the start beyond which contact is left out, since it would be pushed out in the first steps."""
 
 
@@ -48,7 +48,7 @@ def read_contacts(
 ) -> dict[str, Any]:
     """Return [[pair]] tables, and as "touching" the bodies that may touch; surfaces get ``friction`` and groups."""
     owners = owners_of(reading, shapes)
-    meet = {} if reading.off("CONTACT") else meetings(reading, owners)
+    meet = {} if reading.off("CONTACT") else touching_pairs(reading, owners)
     for table in bodies:
         if table["name"] in reading.seen:
             table["collides_with"] = []
@@ -98,7 +98,7 @@ def classes_of(reading: ModelReading, owners: dict[int, str]) -> dict[str, Hasha
     return {name: frozenset(kinds) for name, kinds in found.items()}
 
 
-def meetings(reading: ModelReading, owners: dict[int, str]) -> Meetings:
+def touching_pairs(reading: ModelReading, owners: dict[int, str]) -> PairLaws:
     """Return the pairs of surfaces that may touch: by the types of their geoms, or by an explicit pair."""
     model, found = reading.model, dict[tuple[str, str], list[Law]]()
     still = set(reading.static_names.values())
@@ -162,7 +162,7 @@ def pair_law(reading: ModelReading, pair: int) -> Law:
     return law_of(max(friction[:2]), friction[2], max(friction[3:5]), int(reading.model.pair_dim[pair]))
 
 
-def directed_pairs(reading: ModelReading, owners: dict[int, str], meet: Meetings) -> list[dict[str, Any]]:
+def directed_pairs(reading: ModelReading, owners: dict[int, str], meet: PairLaws) -> list[dict[str, Any]]:
     """Return [[pair]] tables with two coefficients of friction; note pairs whose directions turn with a body."""
     model, tables = reading.model, []
     geoms = Counter(owners.values())
@@ -201,14 +201,14 @@ def law_of(friction: float, torsion: float, rolling: float, directions: int) -> 
     )
 
 
-def without_overlap(reading: ModelReading, owners: dict[int, str], meet: Meetings) -> Meetings:
+def without_overlap(reading: ModelReading, owners: dict[int, str], meet: PairLaws) -> PairLaws:
     """Drop pairs that overlap at the start, which a rigid world would push apart."""
     if not meet:
         return meet
     deepest: dict[tuple[str, ...], float] = {}
     for contact in at_start(reading).contact:
         names = tuple(sorted({owners.get(contact.geom1, ""), owners.get(contact.geom2, "")}))
-        if names in meet and contact.dist < -OVERLAP:
+        if names in meet and contact.dist < -MAX_START_OVERLAP:
             deepest[names] = max(deepest.get(names, 0.0), -float(contact.dist))
     if deepest:
         listed = ", ".join(f"{' and '.join(names)} ({1e3 * depth:.3g} mm)" for names, depth in deepest.items())
@@ -218,10 +218,10 @@ def without_overlap(reading: ModelReading, owners: dict[int, str], meet: Meeting
     return {names: law for names, law in meet.items() if names not in deepest}
 
 
-def without_rule(reading: ModelReading, kinds: Mapping[str, Counter[str]], meet: Meetings) -> Meetings:
+def without_rule(reading: ModelReading, kinds: Mapping[str, Counter[str]], meet: PairLaws) -> PairLaws:
     """Drop pairs of surfaces whose shapes cannot touch; ``kinds``: how many shapes of each kind a surface has."""
     lost: Counter[str] = Counter()
-    kept: Meetings = {}
+    kept: PairLaws = {}
     for names, law in meet.items():
         bare = {tuple(sorted((a, b))) for a in kinds[names[0]] for b in kinds[names[1]] if not contact_points(a, b)}
         lost.update(" and ".join(pair) for pair in bare)
@@ -244,12 +244,12 @@ def kinds_of(table: Mapping[str, Any]) -> Counter[str]:
 
 def contact_points(one: str, other: str) -> int:
     """Return the number of contact points of two kinds of surfaces; 0: no rule covers them."""
-    return POINTS.get(one, {}).get(other, 0) or POINTS.get(other, {}).get(one, 0)
+    return POINT_COUNTS.get(one, {}).get(other, 0) or POINT_COUNTS.get(other, {}).get(one, 0)
 
 
 def few_enough(
-    reading: ModelReading, owners: dict[int, str], surfaces: Tables, kinds: Mapping[str, Counter[str]], meet: Meetings
-) -> Meetings:
+    reading: ModelReading, owners: dict[int, str], surfaces: Tables, kinds: Mapping[str, Counter[str]], meet: PairLaws
+) -> PairLaws:
     """Limit the points of contact: drop contact within robots first, then between bodies at all."""
     counts = {
         names: sum(m * n * contact_points(a, b) for a, m in kinds[names[0]].items() for b, n in kinds[names[1]].items())
@@ -260,10 +260,10 @@ def few_enough(
     inside = {names for names in meet if set(names) <= surfaces.keys() and trees[names[0]] == trees[names[1]]}
     bodies = {names for names in meet if set(names) <= surfaces.keys()}
     for lost, what in ((inside, "of one robot"), (bodies, "")):
-        if total <= MOST_POINTS:
+        if total <= MAX_POINTS:
             break
         dropped = meet.keys() & lost
-        text = f"there would be {total} points of contact, and a world may have {MOST_POINTS}"
+        text = f"there would be {total} points of contact, and a world may have {MAX_POINTS}"
         reading.note("left out", f"contact of {len(dropped)} pairs of bodies {what}".rstrip(), text)
         meet = {names: law for names, law in meet.items() if names not in dropped}
         total = sum(counts[names] for names in meet)
@@ -275,7 +275,7 @@ def few_enough(
 
 
 def write_contacts(
-    reading: ModelReading, classes: Mapping[str, Hashable], surfaces: Tables, still: Tables, meet: Meetings
+    reading: ModelReading, classes: Mapping[str, Hashable], surfaces: Tables, still: Tables, meet: PairLaws
 ) -> list[dict[str, Any]]:
     """Return the [[pair]] tables; surfaces get their friction and groups.
 
@@ -284,7 +284,7 @@ def write_contacts(
         classes: of each surface what its contacts follow from.
         surfaces: tables of bodies with shapes.
         still: tables of what stands still.
-        meet: who may touch whom.
+        meet: pairs of surfaces that may touch.
     """
     own = {name: own_law(name, still, meet) for name in surfaces}
     for name, law in own.items():
@@ -307,18 +307,18 @@ def write_contacts(
     return pairs
 
 
-def own_law(name: str, still: Tables, meet: Meetings) -> Law:
+def own_law(name: str, still: Tables, meet: PairLaws) -> Law:
     """Return the friction of a body: with static surfaces, or with other bodies if it meets no static one."""
     found = {other: law for pair, law in meet.items() if name in pair for other in pair if other != name}
     laws = Counter(law for other, law in found.items() if other in still) or Counter(found.values())
     return laws.most_common(1)[0][0] if laws else (1.0, 0.0, 0.0)
 
 
-def statement(names: tuple[str, str], own: Mapping[str, Law], meet: Meetings) -> Statement:
+def statement(names: tuple[str, str], own: Mapping[str, Law], meet: PairLaws) -> Statement:
     """Return the keys of a [[pair]] table that two surfaces need besides their own friction."""
     law = meet.get(names)
     if law is None:
-        return APART
+        return NO_CONTACT
     stated = list(zip(KEYS, zip(*(own[name] for name in names if name in own), strict=True), strict=True))
     follows = [each[0] if len(each) == 1 else COMBINE[key](list(each)) for key, each in stated]
     off = [key for key, x, y in zip(KEYS, law, follows, strict=True) if abs(x - y) > 1e-12]

@@ -24,9 +24,9 @@ from symphys.importing.tables.reading import (
 from symphys.model.gimbal import Screw, locks
 from symphys.types import Array
 
-PARALLEL = 1e-9
+PARALLEL_TOLERANCE = 1e-9
 """Largest deviation of the cosine between the axes of a screw's two joints from 1."""
-ROTOR, LEAST_ROTOR = 0.1, 1e-6
+ROTOR_SHARE, MIN_ROTOR = 0.1, 1e-6
 """Armature against gimbal lock: a share of a body's largest moment of inertia, at least LEAST_ROTOR [kg m^2]."""
 FIXED, AFFINE = 0, 1
 """MuJoCo's types of gains; biases have NONE = 0 and AFFINE = 1."""
@@ -51,7 +51,7 @@ MAX_LOOP_GAP = 1e-6
 def read_joints(reading: ModelReading) -> tuple[dict[int, list[dict[str, Any]]], list[dict[str, Any]]]:
     """Return (frames before each link, by its top body; [[joint]] tables)."""
     frames, joints = dict[int, list[dict[str, Any]]](), list[dict[str, Any]]()
-    found = threads(reading)
+    found = find_screws(reading)
     for top, link in reading.links.items():
         if top == link.top:
             frames[top], more = chain(reading, link, found)
@@ -60,7 +60,7 @@ def read_joints(reading: ModelReading) -> tuple[dict[int, list[dict[str, Any]]],
 
 
 @dataclass(frozen=True)
-class Thread:
+class ThreadedPair:
     """A slide that follows a hinge about the same axis: indices of joints and of the equality, ``pitch`` [m]."""
 
     hinge: int
@@ -69,9 +69,9 @@ class Thread:
     pitch: float
 
 
-def threads(reading: ModelReading) -> list[Thread]:
+def find_screws(reading: ModelReading) -> list[ThreadedPair]:
     """Find the screws of a model: a hinge and a slide tied by an equality, with nothing else on the slide."""
-    model, found = reading.model, list[Thread]()
+    model, found = reading.model, list[ThreadedPair]()
     for equality in range(model.neq):
         if int(model.eq_type[equality]) != int(reading.library.mjtEq.mjEQ_JOINT) or not reading.holds(equality):
             continue
@@ -82,9 +82,9 @@ def threads(reading: ModelReading) -> list[Thread]:
         slide, hinge = ids if types[0] == SLIDE else ids[::-1]
         cosine = float(np.dot(reading.data.xaxis[slide], reading.data.xaxis[hinge]))
         next_to = abs(slide - hinge) == 1 and model.jnt_bodyid[slide] == model.jnt_bodyid[hinge]
-        if next_to and abs(cosine) > 1 - PARALLEL and not burdened(reading, slide, equality):
+        if next_to and abs(cosine) > 1 - PARALLEL_TOLERANCE and not burdened(reading, slide, equality):
             lead = float(ratio if types[0] == SLIDE else 1 / ratio) * np.sign(cosine)
-            found.append(Thread(hinge, slide, equality, 2 * np.pi * lead))
+            found.append(ThreadedPair(hinge, slide, equality, 2 * np.pi * lead))
     return found
 
 
@@ -102,7 +102,7 @@ def burdened(reading: ModelReading, joint: int, equality: int) -> bool:
 
 
 def chain(
-    reading: ModelReading, link: WeldedLink, found: Sequence[Thread]
+    reading: ModelReading, link: WeldedLink, found: Sequence[ThreadedPair]
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Make the frames and joints from the parent of a link to it; ``found``: the screws of the model."""
     pitches, slides = {each.hinge: each.pitch for each in found}, {each.slide for each in found}
@@ -136,7 +136,7 @@ def chain(
     if len(indices) > 1 and locks(
         [screw for joint in indices for screw in screws_of(reading, joint, pitches.get(joint, 0.0))]
     ):
-        carried = max(ROTOR * float(np.max(model.body_inertia[link.top])), LEAST_ROTOR)
+        carried = max(ROTOR_SHARE * float(np.max(model.body_inertia[link.top])), MIN_ROTOR)
         joints[0]["armature"] = numbers(carried)
         text = "axes of several joints of one body can come together, where frames without mass have no inertia"
         reading.note("approximated", f"armature of {reading.called('joint', indices[0])}", text, f"{carried:.3g}")
@@ -358,7 +358,7 @@ def force_range(reading: ModelReading, actuator: int, joint: int, gear: float) -
 def read_couplings(reading: ModelReading) -> list[dict[str, Any]]:
     """Make the [[coupling]] tables, of the equality constraints of coordinates."""
     model, found = reading.model, list[dict[str, Any]]()
-    screws = [each.equality for each in threads(reading)]
+    screws = [each.equality for each in find_screws(reading)]
     for equality in (k for k in range(model.neq) if k not in screws):
         if int(model.eq_type[equality]) == int(reading.library.mjtEq.mjEQ_JOINT) and reading.holds(equality):
             table = coupling(reading, equality)

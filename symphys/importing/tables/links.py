@@ -11,13 +11,13 @@ from symphys.importing.records import Inertial
 from symphys.importing.tables.reading import FREE, ModelReading, WeldedLink, is_upright, numbers, quaternion
 from symphys.types import Array
 
-LIGHT, THICK = 1e-6, 0.1
+MIN_MASS_SHARE, MASSLESS_RADIUS = 1e-6, 0.1
 """For a floating body without mass: its share of the model's mass, and its radius of gyration [m]."""
 MIN_MOMENT = 1e-6
 """Least moment of inertia, as a share of the largest."""
 INERTIA_TOLERANCE = 1e-9
 """Tolerance of the inequality of moments of inertia, as a share of the largest."""
-SMALL = 1e-12
+PRODUCT_ROUNDING = 1e-12
 """Product of inertia that counts as rounding, as a share of the largest moment."""
 
 
@@ -68,10 +68,10 @@ def merged(reading: ModelReading, top: int, bodies: list[int], inertials: Mappin
     if mass <= 0 and not any(reading.model.jnt_type[joint] == FREE for joint in reading.joints_of(top)):
         return WeldedLink(top, tuple(bodies), name, 0.0, place, axes, np.zeros((3, 3)))
     if mass <= 0:
-        mass = LIGHT * float(reading.model.body_subtreemass[0] or 1.0)
+        mass = MIN_MASS_SHARE * float(reading.model.body_subtreemass[0] or 1.0)
         text = "it floats, and has no mass in the model; it gets a small one"
         reading.note("approximated", f"mass of {name}", text, f"{mass:.3g} kg")
-        return WeldedLink(top, tuple(bodies), name, mass, place, axes, mass * THICK**2 * np.eye(3))
+        return WeldedLink(top, tuple(bodies), name, mass, place, axes, mass * MASSLESS_RADIUS**2 * np.eye(3))
     centre = sum((m * c for m, c, _ in parts), start=np.zeros(3)) / mass
     total = np.zeros((3, 3))
     for m, c, inertia in parts:
@@ -130,7 +130,7 @@ def inertia_of(tensor: Array) -> Any:
     """Return three principal moments if they are along the axes, else the matrix."""
     tensor = (tensor + tensor.T) / 2
     moments = np.diag(tensor)
-    if np.abs(tensor - np.diag(moments)).max() <= SMALL * moments.max():
+    if np.abs(tensor - np.diag(moments)).max() <= PRODUCT_ROUNDING * moments.max():
         return numbers(moments, 0.0)
     return numbers(tensor, 0.0)
 

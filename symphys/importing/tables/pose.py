@@ -12,9 +12,9 @@ from symphys.suggest import hint
 
 PLANE = 0
 """MuJoCo's type of a geom that is a plane."""
-LIFTS = 3
+MAX_LIFTS = 3
 """Times that a robot is lifted out of the ground; once is enough unless MuJoCo could not list all contacts."""
-SUNK = 1e-4
+MAX_SUNK_DEPTH = 1e-4
 """[m] Overlap with the ground that stays."""
 
 
@@ -82,7 +82,7 @@ def at_start(reading: ModelReading) -> Any:
 def lift(reading: ModelReading) -> None:
     """Lift floating robots that begin below the ground onto it."""
     model, lifted = reading.model, dict[int, float]()
-    for _ in range(LIFTS):
+    for _ in range(MAX_LIFTS):
         data, depths = at_start(reading), dict[int, float]()
         for contact in data.contact:
             joint = sunk(reading, data, contact)
@@ -105,7 +105,7 @@ def sunk(reading: ModelReading, data: Any, contact: Any) -> int | None:
     model = reading.model
     for one, other in ((contact.geom1, contact.geom2), (contact.geom2, contact.geom1)):
         level = min(one, other) >= 0 and model.geom_type[one] == PLANE and data.geom_xmat[one][8] > 1 - 1e-9
-        if level and contact.dist < -SUNK:
+        if level and contact.dist < -MAX_SUNK_DEPTH:
             root = int(model.body_rootid[model.geom_bodyid[other]])
             joint = int(model.body_jntadr[root])
             return joint if joint >= 0 and model.jnt_type[joint] == FREE else None

@@ -16,12 +16,13 @@ import numpy as np
 from symphys.importing.records import Finding, ImportOptions, JointMotor, Kind
 from symphys.types import Array
 
-LONGEST = 64
+MAX_NAME_LENGTH = 64
+"""Largest number of characters of a name."""
 WORDS = (
     "sin cos tan asin acos atan atan2 sinh cosh tanh sqrt exp log abs sign min max clip hypot norm sumsqr sum mean dot "
     "cross rotate world ground gravity time pi alive"
 )
-TAKEN = (*keyword.kwlist, *WORDS.split())
+RESERVED_WORDS = (*keyword.kwlist, *WORDS.split())
 """Words that mean something in formulas or tables."""
 FREE, BALL, SLIDE, HINGE = range(4)
 """MuJoCo's types of joints."""
@@ -40,13 +41,13 @@ class Names:
 
     def __init__(self) -> None:
         """Start with the words that have a meaning taken."""
-        self._taken = {word.casefold() for word in TAKEN}
+        self._taken = {word.casefold() for word in RESERVED_WORDS}
         self.renamed: list[tuple[str, str]] = []
 
     def give(self, kind: str, wanted: str, fallback: str = "") -> str:
         """Return a new name like the wanted one; ``fallback`` for a part without a name."""
-        base = re.sub(r"\W+", "_", wanted, flags=re.ASCII).strip("_")[: LONGEST - 8] or fallback or kind
-        base = base if base[0].isascii() and base[0].isalpha() else f"{kind}_{base}"[: LONGEST - 8]
+        base = re.sub(r"\W+", "_", wanted, flags=re.ASCII).strip("_")[: MAX_NAME_LENGTH - 8] or fallback or kind
+        base = base if base[0].isascii() and base[0].isalpha() else f"{kind}_{base}"[: MAX_NAME_LENGTH - 8]
         found = next(name for name in self._offers(kind, base) if name.casefold() not in self._taken)
         self._taken.add(found.casefold())
         if wanted and found != wanted and kind != "group":
@@ -101,9 +102,9 @@ class ModelReading:
     Attributes:
         library: the module ``mujoco``.
         model, data: MjModel, and MjData at the reference pose.
-        options: what the caller chose.
-        names: that are given.
-        findings: what became of parts, in order.
+        options: of the caller.
+        names: of all parts.
+        findings: the fate of each part, in order.
         links: by the index of each body, the link that it belongs to; bodies that the world holds have none.
         joint_names: of joints, by index; of a free joint that of its body.
         rigid: number of equality constraints that were taken over.

@@ -22,7 +22,7 @@ from symphys.types import Array
 
 MIN_ARM = 1e-6
 """[m] An accelerometer that is farther from the centre of mass is approximated."""
-MOST_BODIES = 100
+MAX_BODIES = 100
 """Bodies in the formula of a centre of mass, at most."""
 JOINTS = ("JOINTPOS", "JOINTVEL", "JOINTACTFRC")
 AXES = {"FRAMEXAXIS": "[1, 0, 0]", "FRAMEYAXIS": "[0, 1, 0]", "FRAMEZAXIS": "[0, 0, 1]"}
@@ -132,7 +132,7 @@ def of_subtree(reading: ModelReading, body: int, field: str) -> str | None:
     whole = all(set(link.members) <= inside for link in links.values())
     heavy = [link for link in links.values() if link.mass]
     still = any(model.body_mass[each] and each not in reading.links for each in inside)
-    if not whole or still or not 0 < len(heavy) <= MOST_BODIES:
+    if not whole or still or not 0 < len(heavy) <= MAX_BODIES:
         return None
     parts = " + ".join(f"{numbers(link.mass)} * {link.name}.{field}" for link in heavy)
     return f"({parts}) / {numbers(sum(link.mass for link in heavy))}"

@@ -15,13 +15,13 @@ from symphys.types import Array
 
 MIN_THICKNESS = 1e-9
 """Share of a mesh's length below which it has no volume."""
-MOST_POINTS = 64
+MAX_HULL_POINTS = 64
 """Vertices of the hull of a mesh, at most."""
 FITTED = ("sphere", "box", "capsule", "spheres", "capsules")
 """Kinds of shapes that may stand in for a mesh, all of which touch each other."""
 Solid = dict[str, Any]
 """A shape by its sizes; ``centre`` and ``orientation`` in the frame of the mesh."""
-MOST_HEIGHTS = 1024
+MAX_HEIGHTS = 1024
 """Heights of a terrain, at most, since each takes part in every contact with it."""
 MIN_RELIEF = 1e-9
 """[m] Heights that differ by less make a plane."""
@@ -120,7 +120,7 @@ class Meshes:
         mesh = int(self.reading.model.geom_dataid[geom])
         if mesh not in self.hulls:
             try:
-                points, self.off[mesh] = hull_points(self.vertices(mesh), MOST_POINTS)
+                points, self.off[mesh] = hull_points(self.vertices(mesh), MAX_HULL_POINTS)
                 self.hulls[mesh] = {"convex": {"points": numbers(points)}}
             except ValueError as error:
                 self.refuse(mesh, str(error))
@@ -172,7 +172,9 @@ class Meshes:
         """Note the deviations of all hulls together, and the meshes that are left out."""
         if self.off:
             exact = sum(not deviation for deviation in self.off.values())
-            text = f"their convex hulls, with at most {MOST_POINTS} of their vertices each; {exact} have all of them"
+            text = (
+                f"their convex hulls, with at most {MAX_HULL_POINTS} of their vertices each; {exact} have all of them"
+            )
             worst = max(self.off, key=lambda mesh: self.off[mesh])
             amount = f"up to {self.off[worst]:.2g} mm ({self.called(worst)})"
             self.reading.note("approximated", f"{len(self.off)} meshes", text, amount if self.off[worst] else "")
@@ -291,13 +293,13 @@ def terrain(reading: ModelReading, geom: int, place: Array, axes: Array, found: 
 
 
 def thinned(heights: Array) -> Array:
-    """Return at most ``MOST_HEIGHTS`` heights over the same area."""
+    """Return at most ``MAX_HEIGHTS`` heights over the same area."""
     rows, columns = heights.shape
-    if rows * columns <= MOST_HEIGHTS:
+    if rows * columns <= MAX_HEIGHTS:
         return heights
-    shrink = sqrt(MOST_HEIGHTS / (rows * columns))
-    few = min(max(2, int(rows * shrink)), MOST_HEIGHTS // 2)
-    return resampled(heights, few, min(columns, MOST_HEIGHTS // few))
+    shrink = sqrt(MAX_HEIGHTS / (rows * columns))
+    few = min(max(2, int(rows * shrink)), MAX_HEIGHTS // 2)
+    return resampled(heights, few, min(columns, MAX_HEIGHTS // few))
 
 
 def resampled(heights: Array, rows: int, columns: int) -> Array:

@@ -34,7 +34,7 @@ from symphys.report.pages.markup import (
     table,
     tag,
 )
-from symphys.results.case_name import settings_words
+from symphys.results.config import settings_words
 from symphys.results.result import CheckRecord, Result, StageRecord, VariableRecord, smoothed
 from symphys.results.run import Run
 from symphys.results.trace import OUTPUT

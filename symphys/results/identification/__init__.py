@@ -1,4 +1,4 @@
-"""What a folder of an identification holds: one definition for who writes and who reads."""
+"""The contents of an identification folder: one definition for writer and reader."""
 
 from symphys.results.identification.record import (
     ARRAYS,

@@ -1,4 +1,4 @@
-"""identification.json and identification.npz of a run folder: one definition for who writes and who reads.
+"""identification.json and identification.npz of a run folder: one definition for writer and reader.
 
 | file | holds |
 |---|---|
@@ -17,14 +17,13 @@ import numpy as np
 
 from symphys import files
 from symphys import json_values as values
-from symphys.results.archives import read_archive
-from symphys.results.text_files import ReportError, read_table
+from symphys.results.text_files import ReportError, read_archive, read_table
 from symphys.types import Array
 
 
 @dataclass(frozen=True)
 class ParameterEstimate:
-    """A shared number; nan is what is not known.
+    """The estimate of a shared number; nan where unknown.
 
     Attributes:
         name, unit: as reports show them.
@@ -56,13 +55,13 @@ class ParameterEstimate:
 
 @dataclass(frozen=True)
 class OpenDirection:
-    """Numbers that the recordings do not determine.
+    """A direction of numbers that the recordings do not determine.
 
     Attributes:
         names: of the shared numbers that take part.
         own_names: of own numbers that move along.
-        text: what is open, in words.
-        advice: which recording would determine it, in a sentence.
+        text: description of the direction.
+        advice: the recording that would determine it, in a sentence.
         error: standard error of the least determined direction, in units of the numbers; inf: no information.
         by_prior: whether a prior determines it.
     """
@@ -77,7 +76,7 @@ class OpenDirection:
 
 @dataclass(frozen=True)
 class QuantityResiduals:
-    """The residuals that the fit leaves of a measured quantity; nan is what is not known.
+    """The residuals of a measured quantity after the fit; nan where unknown.
 
     Attributes:
         name, unit: of the quantity.
@@ -144,7 +143,7 @@ class GlobalSearch:
         lower: whether that is lower by more than one standard error makes.
         values: (s,) where, by name.
         evaluations: of all recordings.
-        text: what that means, in a sentence.
+        text: the interpretation, in a sentence.
     """
 
     merit: float
@@ -158,7 +157,7 @@ class GlobalSearch:
 IDENTIFICATION, ARRAYS = "identification.json", "identification.npz"
 FORMAT = 1
 HISTORY = ("iteration", "merit", "left", "damping", "step", "simulations", "jacobians", "seconds")
-"""Columns of the iterations: ``left`` are standard errors to where the Jacobian puts the minimum."""
+"""Columns of the iterations: ``left`` are standard errors to the minimum of the quadratic model."""
 ARRAY = {"array": True}
 """Metadata of fields in the archive."""
 
@@ -176,7 +175,7 @@ class Identification:
         parameters: the shared numbers.
         own_names: of the own numbers.
         open: directions that the recordings do not determine.
-        quantities: what is left of each measured quantity, in the recordings that were fitted to.
+        quantities: residuals of each measured quantity, in the fitted recordings.
         fitted_errors, held_back_errors: how far simulations are from the recordings that were fitted to, and from those
             that were held back.
         recordings: (K,) names.
@@ -242,7 +241,7 @@ class Identification:
         return found[name]
 
     def own_numbers(self, recording: str) -> dict[str, tuple[float, float]]:
-        """Own numbers of a recording by name, each with its standard error; KeyError without such a recording."""
+        """Return own numbers of a recording by name, each with its standard error; KeyError if unknown."""
         if recording not in self.recordings:
             raise KeyError(
                 f"no recording {recording}: there are {len(self.recordings)}, the first {self.recordings[:1]}"

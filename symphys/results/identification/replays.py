@@ -1,4 +1,4 @@
-"""What a folder of an identification holds of single recordings: what was measured, and what is simulated instead.
+"""Recordings in an identification folder: the measured and the simulated motion.
 
 | file | holds |
 |---|---|
@@ -18,10 +18,9 @@ import numpy as np
 
 from symphys import files
 from symphys import json_values as values
-from symphys.results.archives import read_archive
 from symphys.results.file_names import SCENE
 from symphys.results.scene import Scene
-from symphys.results.text_files import ReportError, read_table
+from symphys.results.text_files import ReportError, read_archive, read_table
 from symphys.results.trajectories import read_trajectory
 from symphys.trajectory import Trajectory
 from symphys.types import Array
@@ -55,7 +54,7 @@ class RecordingReplay:
         held_back: whether it was held back.
         ratio: root mean square of its residuals by noise.
         time: (n,) [s] of the samples, on the simulation's clock.
-        quantities: that were measured.
+        quantities: the measured ones.
         bodies: b bodies whose positions were measured.
         position, orientation: (n, b, 3) [m], (n, b, 4) of these; nan where a sample is missing.
         motion: the simulation.

@@ -9,11 +9,11 @@ import numpy as np
 from symphys.results.identification.record import Identification, ParameterEstimate, PredictionErrors
 
 STRONG_CORRELATION = 0.9
-"""Correlations that are named."""
+"""Correlation from which pairs are listed."""
 
 
 def summary(found: Identification) -> str:
-    """Estimates, what is not determined, what is left, predictions, and how the fit went; a text of several lines."""
+    """Return estimates, open directions, residuals, predictions and the course of the fit, as text of several lines."""
     parts = [
         heading(found),
         table(("", "estimate", "95 % interval", "bootstrap", ""), [parameter_row(each) for each in found.parameters]),
@@ -32,7 +32,7 @@ def summary(found: Identification) -> str:
 
 
 def heading(found: Identification) -> str:
-    """Say how the fit ended, and from how much."""
+    """Describe how the fit ended, and its data."""
     back = int(np.sum(found.held_back))
     count = f"{len(found.recordings) - back} recordings" + (f", {back} more held back" if back else "")
     work = f"{max(len(found.history) - 1, 0)} iterations, {sum(found.seconds.values()):.3g} s"
@@ -59,19 +59,19 @@ def parameter_row(each: ParameterEstimate) -> tuple[str, ...]:
 
 
 def significant(value: float, error: float) -> int:
-    """Digits that show a number up to the second digit of its standard error."""
+    """Return the digits that show a number up to the second digit of its standard error."""
     if not (np.isfinite(error) and error > 0 and value != 0):
         return 6
     return int(np.clip(np.floor(np.log10(abs(value))) - np.floor(np.log10(error)) + 2, 2, 12))
 
 
 def interval(lower: float, upper: float, digits: int) -> str:
-    """Write ``0.17 to 0.19``; empty where it is not known."""
+    """Write ``0.17 to 0.19``; empty where unknown."""
     return "" if np.isnan(lower) or np.isnan(upper) else f"{lower:.{digits}g} to {upper:.{digits}g}"
 
 
 def correlations(found: Identification) -> list[str]:
-    """Pairs of shared numbers that the recordings hardly tell apart."""
+    """Describe pairs of shared numbers that the recordings hardly distinguish."""
     names = [each.name for each in found.parameters]
     pairs = [
         (names[i], names[j], float(found.correlation[i, j]))
@@ -83,7 +83,7 @@ def correlations(found: Identification) -> list[str]:
 
 
 def own_lines(found: Identification) -> list[str]:
-    """Own numbers that some recordings do not determine, or that a bound holds."""
+    """Describe own numbers that recordings do not determine, or that a bound holds."""
     lines = []
     for j, name in enumerate(found.own_names):
         left, held = np.isinf(found.own_error[:, j]), found.own_at_bound[:, j] != 0
@@ -109,7 +109,7 @@ def residuals(found: Identification) -> str:
 
 
 def predictions(what: str, errors: Sequence[PredictionErrors]) -> str:
-    """Return a table of how far simulations are from recordings."""
+    """Return a table of the errors of simulations against recordings."""
     rows = [
         (
             each.name,
@@ -138,7 +138,7 @@ def with_unit(number: float, unit: str) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns that are as wide as they need to be."""
+    """Align columns."""
     lines = [list(head), *map(list, rows)]
     widths = [max(len(line[j]) for line in lines) for j in range(len(head))]
     return "\n".join(

@@ -1,4 +1,4 @@
-"""One table of all runs below a folder: read from the run folders, and kept beside them so that it is read quickly.
+"""The table of all runs below a folder: read from the run folders, and cached beside them.
 
 The run folders are the only truth. ``Journal(out).add(folder)`` keeps the row of a run that has ended;
 ``read_rows(out)`` takes a kept row only where it was made from the result.json that is there now, and reads the folder

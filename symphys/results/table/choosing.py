@@ -1,4 +1,4 @@
-"""Which rows of the table: those that meet conditions, in an order, and the best ones."""
+"""Selection of rows of the table: conditions, order, and the best rows."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TRUTHS = {"true": True, "yes": True, "false": False, "no": False}
 
 
 class BadCondition(SymphysError):
-    """A condition that cannot be read; says how one is written."""
+    """Raised for an unreadable condition; says how one is written."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Condition:
     text: str
 
     def holds(self, row: Row) -> bool:
-        """Whether a row meets it; what is not known equals nothing but an empty text, and is neither more nor less."""
+        """Whether a row meets the condition; an unknown value only equals an empty text."""
         value, compare = row.get(self.column), OPERATORS[self.sign]
         if isinstance(value, bool):
             return compare in EQUALITY and compare(value, TRUTHS.get(self.text.lower()))
@@ -127,7 +127,7 @@ def ranked(column: str, row: Row) -> tuple[bool, Any]:
 
 
 def rank(value: Any) -> tuple[bool, Any]:
-    """Numbers before texts: a setting may be either."""
+    """Return a sort key with numbers before texts: a setting may be either."""
     return isinstance(value, str), value
 
 

@@ -1,4 +1,4 @@
-"""The columns of the table of runs: their names, their order, and what a user may call them."""
+"""The columns of the table of runs: names, order, and the names that users may give."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Row = dict[str, Any]
 """A run by column: texts, numbers and booleans; no entry where nothing is known."""
 
 OUTPUT, COST, SETTING = "output: ", "cost: ", "set: "
-"""Before the names of outputs and costs, and of settings whose key has no table."""
+"""Prefixes of the names of outputs and costs, and of settings whose key has no table."""
 UNFINISHED, UNREADABLE = "unfinished", "unreadable"
 """Verdicts of folders without a result that can be read."""
 ASKED = ("run", "problem", "case", "solver", "seed")
@@ -24,16 +24,16 @@ ORIGIN = ("backend", "host", "when", "why", "fault")
 FIXED = (*ASKED, *FOUND, *SPENT, *ORIGIN)
 """Columns that every table has; settings come after ASKED, outputs and costs after FOUND."""
 NUMBERS = frozenset(("seed", "objective", "worst", *SPENT))
-"""Those of FIXED that hold numbers."""
-MOST_EXACT = 2**53
-"""Whole numbers below are doubles, too; a column holds no larger ones as whole."""
+"""Columns of FIXED that hold numbers."""
+MAX_EXACT_INTEGER = 2**53
+"""Bound of integers that are doubles, too; a column holds no larger ones as integers."""
 UNITS = {"solve_seconds": "s", "compile_seconds": "s", "build_seconds": "s", "peak_memory": "bytes"}
-"""Where they have one; the names of outputs have their own."""
+"""Units of columns; the names of outputs contain theirs."""
 UNIT = re.compile(r" \[[^\]]*\]$")
 
 
 class UnknownColumn(SymphysError):
-    """There is no such column; says which there are."""
+    """Raised for an unknown column; lists the known ones."""
 
 
 def setting_column(key: str) -> str:
@@ -56,7 +56,7 @@ def columns(rows: Iterable[Mapping[str, Any]]) -> list[str]:
 
 
 def find_column(name: str, known: Sequence[str]) -> str:
-    """Return the column that a user means: by its name, or that of an output or a cost without what is around it.
+    """Return the column that a user means: by its name, or by that of an output or a cost without prefix and unit.
 
     Raises:
         UnknownColumn: none or several have that name.

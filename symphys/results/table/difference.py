@@ -1,4 +1,4 @@
-"""What differs between two runs: what was asked for, the problem's text, what was found, and where both come from."""
+"""Differences between two runs: settings, the problem's text, results, and provenance."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ T = TypeVar("T")
 CONFIGURED = ("problem", "solver", "seed", "backend")
 FOUND = ("verdict", "status", "objective", "iterations", "equivalents")
 VOLATILE = ("pid", "peak_memory")
-"""Of the provenance: what differs from run to run."""
+"""Fields of the provenance that differ from run to run."""
 TEXT = "problem.toml"
 """The part whose differences are lines of a unified diff."""
 FILES = "files"
-"""The part that says what could not be read."""
+"""The part of unreadable files."""
 CONTEXT = 3
 """Lines around a change."""
 

@@ -1,4 +1,4 @@
-"""Rows kept beside the run folders, one JSON line each, to which any number of processes and machines may append.
+"""The journal: rows cached beside the run folders, one JSON line each; any number of processes may append.
 
 A line is written by a single append, and begins with a checksum. So a line that was torn, or written into by another
 machine, is recognised and skipped: its run is read again. Of several lines of one run the last counts. A row counts
@@ -22,22 +22,22 @@ from typing import Any
 from symphys import files
 from symphys.json_values import UNPRINTABLE
 from symphys.results.file_names import RESULT
-from symphys.results.table.columns import FIXED, MOST_EXACT, NUMBERS, numeric
+from symphys.results.table.columns import FIXED, MAX_EXACT_INTEGER, NUMBERS, numeric
 
-NAME = ".runs.jsonl"
-"""Of the journal, in the folder that `symphys solve --out` names."""
-ROWS = 1
-"""The format of rows: lines of another are skipped."""
-MARK = b'{"crc":"'
-"""What every line begins with; eight digits follow, then ``",``, then what they are the checksum of."""
-BODY = len(MARK) + 10
-"""Where that begins."""
+JOURNAL_FILE = ".runs.jsonl"
+"""The name of the journal, in the folder that `symphys solve --out` names."""
+ROW_FORMAT = 1
+"""The format of rows; lines of another format are skipped."""
+LINE_PREFIX = b'{"crc":"'
+"""The beginning of every line; eight digits follow, then ``",``, then the text of their checksum."""
+BODY_START = len(LINE_PREFIX) + 10
+"""The offset of the checksummed text."""
 TEXTS = frozenset(FIXED) - NUMBERS - {"solved"}
 """Columns that hold texts."""
 REQUIRED = ("problem", "case", "solver", "verdict")
-"""Those that every row has, beside "solved"."""
+"""Columns that every row has, besides "solved"."""
 INFINITE = ("inf", "-inf")
-"""Numbers that JSON has no other way to write; what is nan has no entry."""
+"""Texts for numbers that JSON cannot write; nan has no entry."""
 Stamp = tuple[int, int]
 """Time of change [ns] and size [bytes] of a result.json."""
 
@@ -59,7 +59,7 @@ class Journal:
     @property
     def path(self) -> Path:
         """Return the file."""
-        return self.out / NAME
+        return self.out / JOURNAL_FILE
 
     def add(self, folder: Path, written: tuple[dict[str, Any], dict[str, Any]] | None = None) -> None:
         """Keep the row of a run that has ended, once its result.json is written.
@@ -82,7 +82,7 @@ class Journal:
             self.append({place: Kept(stamp, row)})
 
     def append(self, found: Mapping[str, Kept]) -> bool:
-        """Add lines by one write; whether that could be done. What could not be added is read from the folders."""
+        """Add lines by one write; return whether that succeeded. Lost rows are read from the folders."""
         text = b"".join(line(place, kept) for place, kept in found.items())
         try:
             handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
@@ -125,32 +125,32 @@ def stamp_of(status: os.stat_result) -> Stamp:
 
 def line(place: str, kept: Kept) -> bytes:
     """Return a line with its end."""
-    content = {"rows": ROWS, "run": place, "stamp": kept.stamp, "row": kept.row}
+    content = {"rows": ROW_FORMAT, "run": place, "stamp": kept.stamp, "row": kept.row}
     try:
         text = json.dumps(content, separators=(",", ":"), allow_nan=False)
     except ValueError:  # few rows have a number that is not finite
         text = json.dumps(files.strict(content), separators=(",", ":"), allow_nan=False)
     body = text[1:].encode()
-    return MARK + b'%08x",' % zlib.crc32(body) + body + b"\n"
+    return LINE_PREFIX + b'%08x",' % zlib.crc32(body) + body + b"\n"
 
 
 def entry(text: bytes) -> Iterable[tuple[str, Kept]]:
-    """Return the run and its row in a line; nothing for one that is damaged. What a torn line was glued to is found."""
-    text = text[max(text.rfind(MARK), 0) :].rstrip(b"\n")
-    body = text[BODY:]
-    if not text.startswith(MARK) or text[len(MARK) : BODY] != b'%08x",' % zlib.crc32(body):
+    """Return the run and its row in a line; nothing for a damaged one. A line after a torn one is found."""
+    text = text[max(text.rfind(LINE_PREFIX), 0) :].rstrip(b"\n")
+    body = text[BODY_START:]
+    if not text.startswith(LINE_PREFIX) or text[len(LINE_PREFIX) : BODY_START] != b'%08x",' % zlib.crc32(body):
         return []
     try:
         match json.loads(b"{" + body):
             case {"rows": int(rows), "run": str(run), "stamp": [int(time), int(size)], "row": dict(row)}:
-                return [(run, Kept((time, size), row))] if rows == ROWS and sound(row) else []
+                return [(run, Kept((time, size), row))] if rows == ROW_FORMAT and sound(row) else []
     except (ValueError, RecursionError):  # a right checksum of what is no JSON, or is nested too deep
         return []
     return []
 
 
 def sound(row: Mapping[str, Any]) -> bool:
-    """Whether a row has what every row has, and the types that its columns have."""
+    """Whether a row has the required columns with their types."""
     for column, value in row.items():
         kind = type(value)
         if kind is str:
@@ -158,7 +158,7 @@ def sound(row: Mapping[str, Any]) -> bool:
         elif kind is float:
             odd = column in TEXTS or not math.isfinite(value)
         elif kind is int:
-            odd = column in TEXTS or abs(value) >= MOST_EXACT
+            odd = column in TEXTS or abs(value) >= MAX_EXACT_INTEGER
         else:
             odd = kind is not bool or numeric(column) or column in TEXTS
         if odd or UNPRINTABLE.search(column):

@@ -1,4 +1,4 @@
-"""The row of one run: what result.json and config.json say of it, without what takes long to read.
+"""The row of one run, from result.json and config.json without their large fields.
 
 The variables and the numbers of the examination are most of a result.json and no row has them. They are cut out of the
 text before it is parsed, where it is laid out as this program lays it out.
@@ -15,11 +15,11 @@ from typing import Any
 from symphys import json_values as values
 from symphys.files import strict
 from symphys.findings.verdict import NOT_SOLVED
-from symphys.results.case_name import case_name
+from symphys.results.config import case_name
 from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.result import CheckRecord, Result
 from symphys.results.run import is_result, read_or_note
-from symphys.results.table.columns import COST, MOST_EXACT, OUTPUT, UNFINISHED, UNREADABLE, Row, setting_column
+from symphys.results.table.columns import COST, MAX_EXACT_INTEGER, OUTPUT, UNFINISHED, UNREADABLE, Row, setting_column
 from symphys.results.text_files import ReportError, read_light_table
 
 WAITING = "there is no result yet: the run goes on, or was stopped before its end"
@@ -94,7 +94,7 @@ def without_result(folder: Path, config: Mapping[str, Any], word: str, why: str,
 
 
 def asked(folder: Path, config: Mapping[str, Any], result: Mapping[str, Any]) -> Row:
-    """Problem, case, solver, seed and settings; where no file says so, problem and solver by the folders' names."""
+    """Return problem, case, solver, seed and settings; unknown problem and solver follow from the folders' names."""
     both = {**config, **result}
     problem = values.name(both.get("problem")) or folder.absolute().parent.name
     settings = table(config.get("settings"))
@@ -108,7 +108,7 @@ def asked(folder: Path, config: Mapping[str, Any], result: Mapping[str, Any]) ->
 
 
 def named(prefix: str, numbers: object) -> Row:
-    """Numbers by the names of their columns."""
+    """Return numbers by the names of their columns."""
     return {prefix + values.name(key): number(value) for key, value in table(numbers).items()}
 
 
@@ -118,15 +118,15 @@ def table(value: object) -> Mapping[str, Any]:
 
 
 def number(value: object) -> float | int | None:
-    """Return a number, whole where it is; None for what is not known."""
-    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < MOST_EXACT:
+    """Return a number, as an integer if it is one; None where unknown."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) < MAX_EXACT_INTEGER:
         return value
     read = values.number(value)
     return None if math.isnan(read) else read
 
 
 def plain(value: object) -> bool | float | int | str | None:
-    """Return a setting as it is; a list or table as JSON text."""
+    """Return a setting unchanged; a list or table as JSON text."""
     if isinstance(value, bool) or value is None:
         return value
     if isinstance(value, int | float):
@@ -135,7 +135,7 @@ def plain(value: object) -> bool | float | int | str | None:
 
 
 def worst(checks: object) -> float | int | None:
-    """Return the largest error / tolerance, inf where one is not known; None without checks."""
+    """Return the largest error / tolerance, inf where one is unknown; None without checks."""
     asked = [check for check in checks if isinstance(check, dict)] if isinstance(checks, list) else []
     if not asked:
         return None

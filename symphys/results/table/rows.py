@@ -1,4 +1,4 @@
-"""The rows of all runs below a folder: those that are kept and still right, and the others from their folders."""
+"""The rows of all runs below a folder: cached ones that are valid, and the others from their folders."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from pathlib import Path
 from symphys import files
 from symphys.results.file_names import CONFIG, FIGURES, PROBLEM, RESULT
 from symphys.results.table.columns import Row, numeric
-from symphys.results.table.journal import NAME, Journal, Kept, Stamp, stamp_of
+from symphys.results.table.journal import JOURNAL_FILE, Journal, Kept, Stamp, stamp_of
 
 Progress = Callable[[int, int], None]
 """A function of the number of folders that are read, and of those that must be read."""
-ANCESTORS = 2
-"""How far above a folder its journal may lie: that of a run is two above."""
+MAX_ANCESTORS = 2
+"""Levels above a folder that may hold its journal: that of a run is two above."""
 MIN_UNKEPT = 100
-"""A journal is begun where so many folders had to be read: fewer take no time."""
+"""Number of uncached folders from which a journal is begun: fewer take no time."""
 ROWS_PER_WRITE = 500
-"""Rows that are kept by one write, so that an interruption loses few."""
+"""Rows that one write adds, so that an interruption loses few."""
 MAX_LINE_RATIO = 2
-"""A journal with so many times as many lines as runs is written anew."""
+"""Ratio of lines to runs from which a journal is rewritten."""
 
 
 @dataclass
@@ -95,7 +95,7 @@ def scanned(root: Path) -> Scan:
         except OSError as error:
             found.faults.append(f"{root / place}: {files.reason(error)}")
             continue
-        if NAME in entries:
+        if JOURNAL_FILE in entries:
             found.journals.append(place)
         if RESULT in entries or (CONFIG in entries and PROBLEM in entries):
             found.runs[place or "."] = stamp(entries.get(RESULT))
@@ -116,8 +116,8 @@ def stamp(entry: os.DirEntry[str] | None) -> Stamp | None:
 def journal_of(root: Path) -> Journal:
     """Return the journal of the folder, or of the nearest above it that has one; its own where there is none."""
     here = root.resolve()
-    for folder in (here, *here.parents[:ANCESTORS]):
-        if (folder / NAME).is_file():
+    for folder in (here, *here.parents[:MAX_ANCESTORS]):
+        if (folder / JOURNAL_FILE).is_file():
             return Journal(folder)
     return Journal(here)
 
@@ -152,7 +152,7 @@ def is_right(kept: Kept | None, now: Stamp) -> bool:
 
 @dataclass
 class Keeper:
-    """Appends to a journal what was read, many rows at once; where it is worth it, and as long as that can be done."""
+    """Appends rows to a journal in blocks, where it pays and as long as it can be written."""
 
     journal: Journal
     prefix: str

@@ -21,7 +21,7 @@ NEEDED = 'this needs {0}: pip install {0}, or pip install "symphys[tables]" for 
 
 
 class MissingPackage(SymphysError):
-    """A package that need not be there is needed; says how to get it."""
+    """Raised for a missing optional package; says how to install it."""
 
 
 def write_table(out: Path, tell: Progress | None = None) -> list[Path]:
@@ -49,7 +49,7 @@ def write_table(out: Path, tell: Progress | None = None) -> list[Path]:
 
 
 def csv_text(rows: Sequence[Row], names: Sequence[str]) -> str:
-    """A line for each row under a header; empty where nothing is known, ``true`` and ``false`` for booleans."""
+    """Return a line for each row under a header; empty where unknown, ``true`` and ``false`` for booleans."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(names)
@@ -58,12 +58,12 @@ def csv_text(rows: Sequence[Row], names: Sequence[str]) -> str:
 
 
 def cell(value: object) -> object:
-    """A value as CSV has it: every digit of a number."""
+    """Return a value as CSV, with every digit of a number."""
     return str(value).lower() if isinstance(value, bool) else value
 
 
 def json_lines(rows: Sequence[Row], names: Sequence[str]) -> Iterator[str]:
-    """A JSON list, an object for each row on a line of its own; what is not known is left out."""
+    """Return a JSON list, an object for each row on a line of its own; unknown values are left out."""
     yield "["
     for number, row in enumerate(rows, 1):
         known = {name: row[name] for name in names if name in row}
@@ -73,12 +73,12 @@ def json_lines(rows: Sequence[Row], names: Sequence[str]) -> Iterator[str]:
 
 
 def data(rows: Sequence[Row], names: Sequence[str]) -> dict[str, list[Any]]:
-    """The columns: numbers, booleans or texts, and None where nothing is known."""
+    """Return the columns: numbers, booleans or texts, and None where unknown."""
     return {name: alike(name, [row.get(name) for row in rows]) for name in names}
 
 
 def alike(name: str, values: list[Any]) -> list[Any]:
-    """The values of a column, all of one type or None. A setting may be a number in one run and a text in another."""
+    """Return the values of a column, all of one type or None: a setting may be a number or a text."""
     known = [value for value in values if value is not None]
     kinds = {type(value) for value in known}
     if kinds == {bool} or (kinds == {int} and len(known) == len(values)):
@@ -89,7 +89,7 @@ def alike(name: str, values: list[Any]) -> list[Any]:
 
 
 def parquet_bytes(rows: Sequence[Row], names: Sequence[str]) -> bytes:
-    """The content of a Parquet file. Raises MissingPackage where there is no pyarrow."""
+    """Return the content of a Parquet file. Raises MissingPackage without pyarrow."""
     try:
         import pyarrow as arrow  # late: most need none, and it takes its time
         from pyarrow import parquet
@@ -111,7 +111,7 @@ def frame(folder: str | Path, where: str | Sequence[str] = (), sort: str = "") -
 
 
 def best_frame(folder: str | Path, by: str = "objective", overall: bool = False) -> Any:
-    """The best runs below a folder as a pandas.DataFrame; see ``symphys.results.table.best``."""
+    """Return the best runs below a folder as a pandas.DataFrame, as ``symphys.results.table.best`` selects them."""
     found = read_rows(Path(folder))
     return framed(best(found.rows, by, overall), found)
 

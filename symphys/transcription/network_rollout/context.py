@@ -1,4 +1,4 @@
-"""Everything that a problem with large nets is computed with."""
+"""The parts of a problem with large nets from which rollouts are computed."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from symphys.types import Array, Expr
 
 
 class RolloutObjectives:
-    """What a problem asks of a rollout as functions of (z, p, x and u at moments, series), and their slopes.
+    """The objectives of a rollout as functions of (z, p, x and u at moments, series), and their slopes.
 
     ``value`` gives merit, objective, errors, costs and outputs, ``slopes`` the derivatives of the merit; ``probe`` and
     ``probe_slopes`` are the same of what is differentiated to examine gradients.
     """
 
     def __init__(self, rollout: Rollout) -> None:
-        """Build them."""
+        """Build the functions."""
         self.samples = FormulaSamples(rollout)
         asked = terms(self.samples)
         self.terms = asked
@@ -40,12 +40,12 @@ class RolloutObjectives:
         self.probe, self.probe_slopes = ca.Function("probe", self.arguments, [number]), self._slopes(number)
 
     def stage(self, rollout: Rollout, sensors: Sequence[str]) -> Stage:
-        """A step; ``asked`` are the values of the formulas of ``samples.series``, one after the other."""
+        """Return a stage; its ``asked`` are the values of the formulas of ``samples.series`` in order."""
 
         def ask(value: Value) -> dict[str, Expr]:
             return {"asked": ca.vertcat(ca.SX(0, 1), *(value(*each) for each in self.samples.series))}
 
-        return Stage(rollout, sense_function(rollout, sensors), ask, shows_inputs=True)
+        return Stage(rollout, sense_function(rollout, sensors), ask, with_inputs=True)
 
     def _slopes(self, number: Expr) -> ca.Function:
         slopes = [ca.densify(ca.gradient(number, symbol)) for symbol in self.arguments]
@@ -53,7 +53,7 @@ class RolloutObjectives:
 
 
 def start_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
-    """Z -> x0, the inputs of all steps one after the other, p, what the sensors read at the start, the time step."""
+    """Return z -> x0, the inputs of all steps, p, the sensor readings at the start, and the time step."""
     start = start_of(rollout.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
     x0 = rollout.memory.start(start.x0)
     interval = rollout.parameters.step_length(rollout.problem.simulation, start.p)
@@ -63,11 +63,11 @@ def start_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
 
 @dataclass(frozen=True, eq=False)
 class RolloutContext:
-    """A problem with large nets, ready to be rolled out.
+    """A problem with large nets, ready to be simulated.
 
     Attributes:
         partition: the problem taken apart.
-        objectives: what is asked of a rollout.
+        objectives: of a rollout.
         sensors: names of those that large nets use.
         columns: for each net, which columns of what they read it takes.
     """
@@ -89,7 +89,7 @@ class RolloutContext:
 
     @cached_property
     def pull(self) -> ca.Function:
-        """The adjoint of ``start``."""
+        """Return the adjoint of ``start``."""
         return self.start.reverse(1)
 
     @cached_property
@@ -98,27 +98,27 @@ class RolloutContext:
         return sense_function(self.rollout, self.sensors)
 
     def alive(self, x: Array) -> Array | float:
-        """Return for states (B, nx) whether a motion is not over, (B, 1); 1 where none ever is."""
+        """Return (B, 1) whether motions with states (B, nx) go on; 1 without termination."""
         memory = self.rollout.memory
         return x[:, memory.columns[ALIVE]] if memory.terminates else 1.0
 
     @cached_property
     def stage(self) -> Stage:
-        """One step."""
+        """Return the stage of one step."""
         return self.objectives.stage(self.rollout, self.sensors)
 
     @cached_property
     def plain(self) -> BatchStep:
-        """The step on casadi's virtual machine."""
+        """Return the step on casadi's virtual machine."""
         return self.stage.interpreted()
 
     def compiled(self, exact: bool, backend: str) -> KernelStep:
-        """The step as a kernel of a backend, of one thread; KernelUnavailable if that cannot be."""
+        """Return the step as a kernel of a backend with one thread; KernelUnavailable if that fails."""
         return self.stage.compiled(exact, backend, threads=1)
 
 
 def make_context(problem: Problem) -> RolloutContext:
-    """Take a problem apart and say what is asked of it."""
+    """Partition a problem and build its objectives."""
     parts = partition(problem)
     sensors = tuple(dict.fromkeys(name for controller in parts.nets for name in controller.senses))
     sizes = {sensor.name: sensor.size for sensor in problem.sensors}

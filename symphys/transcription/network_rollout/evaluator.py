@@ -1,4 +1,4 @@
-"""Evaluates problems with large nets: one decision vector at a time, or many robots that share their weights."""
+"""Evaluation of problems with large nets: one decision vector at a time, or many robots that share weights."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from symphys.transcription.network_rollout.forward_backward import (
     forward,
     objective_arguments,
 )
-from symphys.transcription.network_rollout.layers import KEPT_NUMBERS, Layers
+from symphys.transcription.network_rollout.layers import MAX_KEPT_NUMBERS, Layers
 from symphys.transcription.stage import BatchStep
 from symphys.types import Array
 
-LEAST_ROBOTS = 8
-"""In a thread: what fills the lanes of a kernel."""
+MIN_ROBOTS_PER_THREAD = 8
+"""Least number of robots in a thread, which fills the lanes of a kernel."""
 
 
 @dataclass(frozen=True)
 class Shared:
-    """Robots with shared weights.
+    """The results of robots with shared weights.
 
     Attributes:
         merit, objective: (B,).
@@ -50,7 +50,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Backward:
-    """How a gradient is taken.
+    """Options of a gradient.
 
     Attributes:
         discount: share of its adjoint that a state loses in each step back; 0: the exact gradient.
@@ -65,7 +65,7 @@ EXACT = Backward()
 
 
 class LargeEvaluator(WithoutResiduals):
-    """See ``Evaluator``; and ``shared`` for robots that share their weights."""
+    """An ``Evaluator``; ``shared`` evaluates robots that share their weights."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class LargeEvaluator(WithoutResiduals):
         real: Any = np.float64,
         device: Device | None = None,
     ) -> None:
-        """``threads`` share the robots of a call; the nets have their precision, ``real``, and may be on a device."""
+        """Use ``threads`` threads for the robots; nets have the precision ``real``, and may be on a device."""
         self.context, self.batch_step, self.threads, self.real, self.device = context, batch_step, threads, real, device
 
     def shared(
@@ -87,7 +87,7 @@ class LargeEvaluator(WithoutResiduals):
         backward: Backward = EXACT,
         skipped: int = 0,
     ) -> Shared:
-        """Roll out robots.
+        """Simulate robots.
 
         Args:
             weights: of each net, in the order of the file, shared by all robots.
@@ -97,9 +97,9 @@ class LargeEvaluator(WithoutResiduals):
             backward: how they are taken.
             skipped: steps at the end that are not computed.
         """
-        count = max(1, min(self.threads, len(Z) // LEAST_ROBOTS))
+        count = max(1, min(self.threads, len(Z) // MIN_ROBOTS_PER_THREAD))
         nets = self._nets(weights, len(Z) // count)
-        room = KEPT_NUMBERS // count if gradient else 0
+        room = MAX_KEPT_NUMBERS // count if gradient else 0
 
         def part(rows: Array) -> Shared:
             return self._part(nets, rows, smoothing, room, backward, skipped)
@@ -117,13 +117,13 @@ class LargeEvaluator(WithoutResiduals):
         return replace(common, small=small, weights=slopes)
 
     def forward_pass(self, z: Array, smoothing: float, room: int = 0) -> ForwardPass:
-        """The motion of one decision vector; ``room``: see ``values_of``."""
+        """Return the motion of one decision vector; ``room``: see ``values_of``."""
         parts = self.context.partition
         small = parts.whole(z[None])[:, parts.small]
         return forward(self.context, self.batch_step, self.nets_at(z), small, smoothing, room)
 
     def nets_at(self, z: Array) -> list[Layers]:
-        """The nets of one decision vector."""
+        """Return the nets of one decision vector."""
         return self._nets([own.at(z) for own in self.context.partition.weights], 1)
 
     def _nets(self, weights: Sequence[Array], robots: int) -> list[Layers]:
@@ -194,7 +194,7 @@ class LargeEvaluator(WithoutResiduals):
         return replace(_values(stacked(found)), gradient=np.array(slopes).reshape(len(slopes), partition.n))
 
     def _alike(self, Z: Array) -> list[Array]:
-        """Rows that share their weights, together; row by row where they do not."""
+        """Group rows that share their weights; single rows where they do not."""
         entries = np.concatenate([own.of_z for own in self.context.partition.weights])
         return [Z] if np.array_equal(Z[:, entries], np.tile(Z[:1, entries], (len(Z), 1))) else list(Z[:, None])
 
@@ -203,7 +203,7 @@ class LargeEvaluator(WithoutResiduals):
 
 
 def stacked(parts: Sequence[Shared]) -> Shared:
-    """Put the values of all robots together, without gradients."""
+    """Concatenate the values of all robots, without gradients."""
     names = ("merit", "objective", "errors", "outputs", *(("alive",) if parts[0].alive is not None else ()))
     whole: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     return Shared(**whole)
@@ -214,7 +214,7 @@ def _values(found: Shared) -> Values:
 
 
 class LargeProbe:
-    """See ``Probe``; by the passes that solvers' gradients are made of."""
+    """A ``Probe`` by the same passes as the solvers' gradients."""
 
     def __init__(self, evaluator: LargeEvaluator) -> None:
         """Use the nets and steps of an evaluator."""
@@ -233,7 +233,7 @@ class LargeProbe:
     def gradient(self, z: Array) -> Array:
         """Implement ``Probe.gradient``."""
         evaluator = self._evaluator
-        nets, motion = evaluator.nets_at(z), evaluator.forward_pass(z, 0.0, KEPT_NUMBERS)
+        nets, motion = evaluator.nets_at(z), evaluator.forward_pass(z, 0.0, MAX_KEPT_NUMBERS)
         slopes = self._context.objectives.probe_slopes
         small, weights = BackwardPass(self._context, evaluator.batch_step, nets, motion, 0.0, slopes).run()
         return self._context.partition.joined(small[0], [own[0] for own in weights])[: z.size]

@@ -1,4 +1,4 @@
-"""Forwards and backwards through time, for robots that share the weights of their nets.
+"""Forward and backward passes through time, for robots that share the weights of their nets.
 
 Forwards, states and what is sensed are kept, and values of nets while there is room. Backwards, a segment of time after
 the other, other values are computed again for a whole segment at once, steps are differentiated one by one, and the
@@ -24,7 +24,7 @@ from symphys.types import Array
 
 @dataclass(frozen=True)
 class ForwardPass:
-    """What a pass forwards leaves, for B robots.
+    """The stored values of a forward pass of B robots.
 
     Attributes:
         rows: (N + 1, B, m) what each step is computed from: x, given, p, the times of the step, z.
@@ -64,7 +64,7 @@ def forward(
     kept: Collection[int] | None = None,
     skipped: int = 0,
 ) -> ForwardPass:
-    """Roll out robots (B, s) that share these nets.
+    """Simulate robots (B, s) that share these nets.
 
     Args:
         context: of the problem.
@@ -76,6 +76,7 @@ def forward(
         kept: the numbers of the states that are wanted, after which there is no pass backwards; None: all.
         skipped: steps at the end that are not computed: the state stays, and what is summed over them is 0.
     """
+    # Arrays of all steps, or of one step where only the states ``kept`` are stored.
     steps = context.rollout.steps
     x0, flat, p, sensed0, interval = row_by_row(context.start, Z)
     nx, nu, whole = x0.shape[1], context.rollout.given.shape[0], kept is None
@@ -96,6 +97,7 @@ def forward(
         values=values_of(nets, len(Z), steps, room),
     )
     x[0], motion.sensed[0], parts[2][:], parts[4][:] = x0, sensed0, p, Z
+    # Each step: nets on the readings, then the compiled step.
     beside = list(zip(nets, motion.values, context.columns, context.partition.places, strict=True))
     for k, (now, then) in enumerate(pairwise(at[: motion.last + 1])):
         given[now], times[now] = flat[:, k * nu : (k + 1) * nu], interval * (k, k + 1)
@@ -110,6 +112,7 @@ def forward(
             motion.x[k + 1] = found["after"]
         if "asked" in found:
             motion.asked[k] = found["asked"]
+    # Steps that are left out repeat the last state.
     for k in range(motion.last + 1, steps + 1):
         if kept is None or k in kept:
             motion.x[k] = x[at[motion.last]]
@@ -129,7 +132,7 @@ def objective_arguments(context: RolloutContext, motion: ForwardPass, b: int) ->
 
 
 class BackwardPass:
-    """Backwards along a ``ForwardPass``: the gradient of the sum over robots of what ``slopes`` are the slopes of."""
+    """The backward pass of a ``ForwardPass``: the gradient of the sum over robots."""
 
     def __init__(
         self,
@@ -142,11 +145,11 @@ class BackwardPass:
         discount: float = 0.0,
         each: bool = False,
     ) -> None:
-        """Begin with what ``slopes``, one of those of ``context.objectives``, say of the robots' motions.
+        """Begin with ``slopes``, one of those of ``context.objectives``, at the robots' motions.
 
         Args:
             context: of the problem.
-            batch_step: that the motion was made with.
+            batch_step: the step of the motion.
             nets: likewise.
             motion: forwards.
             smoothing: of it [m/s].
@@ -170,7 +173,7 @@ class BackwardPass:
             self.start_robot(b, slopes)
 
     def start_robot(self, b: int, slopes: ca.Function) -> None:
-        """Slopes at one robot's motion."""
+        """Add the slopes at one robot's motion."""
         motion, samples = self.motion, self.context.objectives.samples
         found = [np.array(part) for part in slopes.call(objective_arguments(self.context, motion, b))]
         self.z[b], self.p[b], others = found[0].ravel(), found[1].ravel(), found[2:]
@@ -184,7 +187,7 @@ class BackwardPass:
             start += len(series)
 
     def run(self) -> tuple[Array, list[Array]]:
-        """Return the gradients (B, s) of what robots do not share, and for each net those of the weights.
+        """Return the gradients (B, s) of the robots' own numbers, and for each net those of the weights.
 
         They are (B, w), or (1, w) and summed over the robots.
         """
@@ -201,7 +204,7 @@ class BackwardPass:
         return self.z, self.weights
 
     def segment(self, number: int, end: int, x: Array, sensed: Array, given: Array) -> tuple[Array, Array]:
-        """Go from step ``end`` back to the first of a segment; return the adjoints of its state and sensor readings."""
+        """Step back from ``end`` to the first step of a segment; return adjoints of state and readings."""
         first, robots = number * self.motion.values[0].length, len(x)
         values = [own.again(number) for own in self.motion.values]
         for k in range(end - 1, first - 1, -1):
@@ -224,7 +227,7 @@ class BackwardPass:
         return x, sensed
 
     def step(self, k: int, x: Array, sensed: Array) -> tuple[Array, Array, Array]:
-        """One step back: adjoints of the state, of the inputs, and zeros for what is sensed before it."""
+        """Step back once: adjoints of the state and inputs, and zeros for the previous readings."""
         parts = {"after": x, "sensed": sensed, "asked": self.asked[k]}
         parts["inputs"] = self.at_u.get(k, np.zeros_like(self.motion.u[0]))
         seeds = np.concatenate([parts[name] for name in self.batch_step.sizes], axis=1)
@@ -266,5 +269,5 @@ def back(
 
 
 def _flat(given: Array) -> Array:
-    """(N, B, nu) -> (B, N * nu)."""
+    """Reshape (N, B, nu) to (B, N * nu)."""
     return given.swapaxes(0, 1).reshape(given.shape[1], -1)

@@ -1,4 +1,4 @@
-"""A net over a batch: forwards, backwards, and the gradient of its weights as one product for many steps.
+"""A net over a batch: forward and backward, and the gradient of its weights as one product for many steps.
 
 Values of a layer are a matrix with a column for each robot, or for each robot and step. Arrays of a device know numpy's
 functions.
@@ -18,12 +18,12 @@ from symphys.model.controllers import Net
 from symphys.model.controllers.net import Activation
 
 Array = NDArray[Any]
-FEW = 8
-"""Robots at a time for which a transposed copy of the matrices is not worth making."""
-PAGE = 2**12
-"""[bytes] Rows of so many or more have ``PADDING``; shorter ones follow each other, and are one run of numbers."""
-PADDING = 16
-"""More columns than are used: rows a power of two apart would share few lines of a cache."""
+MAX_UNCOPIED_ROBOTS = 8
+"""Robots in a batch for which transposed copies of the matrices do not pay."""
+MIN_PADDED_ROW = 2**12
+"""[bytes] Shortest row that gets ``PADDING_COLUMNS``; shorter rows are contiguous."""
+PADDING_COLUMNS = 16
+"""Unused columns: rows a power of two apart would share few cache lines."""
 
 
 class Layers:
@@ -41,29 +41,29 @@ class Layers:
         self.biases = [weights[layer.biases][:, None] for layer in self.layers]
         self.straight = weights[net.straight].reshape(net.outputs, net.senses) if net.skip else None
         self.rows = self.real == np.float32 and robots > 1
-        self.copied = robots >= FEW
+        self.copied = robots >= MAX_UNCOPIED_ROBOTS
         self.widths = (net.senses, *(layer.outputs for layer in self.layers))
 
     def put(self, values: Array) -> Any:
-        """Numbers in this precision, where products are computed."""
+        """Convert numbers to this precision and device."""
         own = np.asarray(values, self.real)
         return own if self.device is None else self.device.put(own)
 
     def set(self, into: Any, values: Array) -> None:
-        """Write numbers (columns, width) from here to where products are computed, (width, columns)."""
+        """Write host numbers (columns, width) into an array (width, columns) of the device."""
         into[...] = values.T if self.device is None else self.put(values.T)
 
     def get(self, values: Any) -> Array:
-        """Numbers here."""
+        """Return numbers on the host."""
         return np.asarray(values if self.device is None else self.device.get(values))
 
     def room(self, width: int, columns: int) -> Any:
-        """(width, columns) that is not set."""
+        """Return an uninitialised array (width, columns)."""
         return self.rooms(1, width, columns)[0]
 
     def rooms(self, count: int, width: int, columns: int) -> list[Any]:
         """Allocate several arrays as one block, for which the system uses large pages and fewer page faults."""
-        padding = PADDING if columns * self.real.itemsize >= PAGE else 0
+        padding = PADDING_COLUMNS if columns * self.real.itemsize >= MIN_PADDED_ROW else 0
         shape = (count, width, columns + padding) if self.rows else (count, columns, width)
         made = np.empty(shape, self.real) if self.device is None else self.device.empty(shape, self.real)
         return [(made[i] if self.rows else made[i].T)[:, :columns] for i in range(count)]
@@ -73,20 +73,20 @@ class Layers:
         return [matrix.T.copy() for matrix in self.matrices]
 
     def _product(self, number: int, values: Any, turned: bool, out: Any) -> Any:
-        """A matrix, or its transpose, times (width, columns)."""
+        """Multiply a matrix, or its transpose, with (width, columns)."""
         stored = turned == self.rows and self.copied
         matrix = (self._turned if stored else self.matrices)[number]
         return np.matmul(matrix.T if turned != stored else matrix, values, out=out)
 
     def sense(self, sensed: Array) -> list[Any]:
-        """(columns, n) what is sensed -> the values of every layer."""
+        """Convert readings (columns, n) to the first values of ``forward``."""
         given = self.put(sensed.T)
         values = [given, *(self.room(width, given.shape[1]) for width in self.widths[1:])]
         self.forward(values)
         return values
 
     def forward(self, values: Sequence[Any], chosen: Sequence[bool] | None = None) -> None:
-        """Compute the values of every layer, the first of which are what is sensed; of the last one before ``skip``.
+        """Compute the values of every layer from the readings; those of the last one before ``skip``.
 
         They stay where they are computed, as all that is handed on between the methods does. ``chosen``: the layers
         that are computed; the others have been; None: all.
@@ -99,11 +99,11 @@ class Layers:
                 activate(layer.activation, raw)
 
     def outputs(self, values: Sequence[Any]) -> Array:
-        """(columns, m) from the values of ``forward``."""
+        """Return outputs (columns, m) from the values of ``forward``."""
         return self.get(values[-1] if self.straight is None else values[-1] + self.straight @ values[0]).T
 
     def pull(self, values: Sequence[Any], adjoint: Any, deltas: Sequence[Any]) -> Array:
-        """Backwards through the net.
+        """Propagate adjoints backward through the net.
 
         Args:
             values: of ``forward``.
@@ -120,7 +120,7 @@ class Layers:
         return self.get(back if self.straight is None else back + self.straight.T @ adjoint).T
 
     def gradient(self, values: Sequence[Any], deltas: Sequence[Any], adjoint: Any) -> Array:
-        """(w,) of all weights: a product a layer over all columns of the arguments of ``pull``."""
+        """Return (w,) of all weights: one product a layer over all columns of the arguments of ``pull``."""
         parts = []
         for value, delta in zip(values, deltas, strict=False):
             parts.append((delta @ value.T).ravel())
@@ -132,7 +132,7 @@ class Layers:
 
 
 def activate(activation: Activation, raw: Any) -> None:
-    """The activation of every number, in place."""
+    """Apply the activation in place."""
     if activation == "tanh":
         np.tanh(raw, out=raw)
     elif activation == "relu":
@@ -140,7 +140,7 @@ def activate(activation: Activation, raw: Any) -> None:
 
 
 def through(activation: Activation, value: Any, back: Any, out: Any) -> None:
-    """Adjoints (width, columns) before an activation where its value is this, from those after it."""
+    """Return adjoints (width, columns) before an activation with this value, from those after it."""
     if activation == "tanh":
         slope = value * value  # one run of numbers, unlike ``out``
         np.subtract(1, slope, out=slope)
@@ -152,8 +152,8 @@ def through(activation: Activation, value: Any, back: Any, out: Any) -> None:
 
 
 SEGMENT_COLUMNS = 1024
-"""Robots times steps of a segment: few enough that values are still in the cache for the gradient of the weights."""
-KEPT_NUMBERS = 2**27
+"""Robots times steps of a segment, whose values then stay in the cache for the gradient of the weights."""
+MAX_KEPT_NUMBERS = 2**27
 """Of values, which all threads may keep: enough not to compute 1024 neurons of 128 robots in 1000 steps twice."""
 
 
@@ -163,12 +163,12 @@ class NetValues:
     Of layers that are kept there are those of all steps, of others those of one segment.
 
     Attributes:
-        net: whose.
+        net: the net.
         length: steps of a segment.
     """
 
     def __init__(self, net: Layers, robots: int, steps: int, kept: Sequence[bool], length: int) -> None:
-        """``kept``: for what is sensed and each layer whether its values are kept; ``length``: steps of a segment."""
+        """Set which values are kept, for readings and each layer; ``length``: steps of a segment."""
         self.net, self.length, self._robots, self._steps, self._kept = net, length, robots, steps, tuple(kept)
         segments = -(-steps // length) if any(kept) else 0
         columns = robots * min(length, steps)
@@ -197,7 +197,7 @@ class NetValues:
 
 
 def segment_length(robots: int, steps: int) -> int:
-    """Steps of a segment."""
+    """Return the steps of a segment."""
     return max(1, min(steps, SEGMENT_COLUMNS // robots))
 
 

@@ -1,4 +1,4 @@
-"""A problem with large nets taken apart: what steps compute, and the nets beside them."""
+"""Partition of a problem with large nets: the part that steps compute, and the nets."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from symphys.errors import Issue, ProblemError
 from symphys.model.controllers import Net
 from symphys.problem import Constraint, Cost, FeedbackController, Output, Problem, Target
 from symphys.transcription.formula_names import input_names, spans
-from symphys.transcription.randomization.sampler import swept_inputs
 from symphys.transcription.rollout import Rollout, symbolic_rollout
+from symphys.transcription.sampler import swept_inputs
 from symphys.types import Array
 
 Indices = NDArray[np.intp]
-MOST_WEIGHTS = 4096
-"""Of a net that is computed within the compiled step, where every lane holds weights of its own."""
-MOST_WITHIN = 100_000
-"""The same where only the step itself can have the net, as in exported code: the compiler takes half a minute."""
+MAX_STEP_WEIGHTS = 4096
+"""Largest number of weights of a net within the compiled step, where every lane has its own."""
+MAX_EXPORTED_WEIGHTS = 100_000
+"""The same bound for exported code, which has only the step; compiling takes half a minute."""
 
 
 def is_large(controller: FeedbackController) -> bool:
     """Whether a controller is a net that matrix products should compute."""
-    return isinstance(controller.law, Net) and controller.law.sizes["weights"] > MOST_WEIGHTS
+    return isinstance(controller.law, Net) and controller.law.sizes["weights"] > MAX_STEP_WEIGHTS
 
 
 def has_large_nets(problem: Problem) -> bool:
-    """Whether any is."""
+    """Whether some controller is a large net."""
     return bool(large_nets(problem))
 
 
@@ -40,11 +40,11 @@ def large_nets(problem: Problem) -> tuple[FeedbackController, ...]:
 
 
 def require_small_nets(problem: Problem, what: str) -> None:
-    """Refuse nets that are too large for a compiled step by a ProblemError; ``what`` compiles it."""
+    """Raise ProblemError for nets that are too large for a compiled step; ``what`` compiles it."""
     issues = [
-        Issue(f'controller "{net.name}".net', f"has {count} weights; {what} takes up to {MOST_WITHIN}")
+        Issue(f'controller "{net.name}".net', f"has {count} weights; {what} takes up to {MAX_EXPORTED_WEIGHTS}")
         for net in large_nets(problem)
-        if (count := net.law.sizes["weights"]) > MOST_WITHIN
+        if (count := net.law.sizes["weights"]) > MAX_EXPORTED_WEIGHTS
     ]
     if issues:
         raise ProblemError(problem.file, issues)
@@ -52,7 +52,7 @@ def require_small_nets(problem: Problem, what: str) -> None:
 
 @dataclass(frozen=True)
 class Weights:
-    """Where the weights of one net come from.
+    """The sources of the weights of one net.
 
     Attributes:
         nominal: (w,) as the file has them.
@@ -64,7 +64,7 @@ class Weights:
     of_net: Indices
 
     def at(self, z: Array) -> Array:
-        """(w,) at a decision vector."""
+        """Return the weights (w,) at a decision vector."""
         weights = self.nominal.copy()
         weights[self.of_net] = z[self.of_z]
         return weights
@@ -76,7 +76,7 @@ class Weights:
 
 @dataclass(frozen=True)
 class Partition:
-    """A problem taken apart.
+    """A partitioned problem.
 
     Attributes:
         rollout: of the problem without its large nets, whose inputs they add to.
@@ -98,11 +98,11 @@ class Partition:
     behind: Array
 
     def whole(self, Z: Array) -> Array:
-        """Return points (B, n) with what stands behind z."""
+        """Return points (B, n) with the given numbers after z."""
         return np.concatenate([Z, np.broadcast_to(self.behind, (len(Z), self.behind.size))], axis=1)
 
     def joined(self, small: Array, weights: Sequence[Array]) -> Array:
-        """(n,) a gradient from those of what is small and of the weights of each net."""
+        """Return the gradient (n,) from those of the small numbers and of the weights of each net."""
         gradient = np.zeros(self.n)
         gradient[self.small] = small
         for own, slope in zip(self.weights, weights, strict=True):
@@ -111,7 +111,7 @@ class Partition:
 
 
 def partition(problem: Problem) -> Partition:
-    """Take a problem apart; ProblemError if its formulas look at the weights of large nets."""
+    """Partition a problem; ProblemError if its formulas read the weights of large nets."""
     nets, swept = large_nets(problem), swept_inputs(problem)
     problem = replace(problem, variables=(*problem.variables, *swept))
     names = {name for controller in nets for name in controller.weights}
@@ -144,7 +144,7 @@ def _weights(problem: Problem, controller: FeedbackController) -> Weights:
 
 
 def refuse_formulas(problem: Problem, names: Sequence[str]) -> None:
-    """ProblemError if a formula looks at the weights of large nets, by these names of variables or numbers."""
+    """Raise ProblemError if a formula reads the weights of large nets, by these names of variables or numbers."""
     issues = [
         Issue(f'{kind} "{each.name}"', f"looks at {name}, the weights of a net that is too large for formulas")
         for kind, each in _formulas(problem)

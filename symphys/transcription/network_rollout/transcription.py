@@ -27,18 +27,18 @@ from symphys.transcription.simulation import Record, simulate
 from symphys.transcription.transcription import Transcription, gradient_prices
 from symphys.types import Array
 
-PLAIN = ("casadi", "c")
-REALS = {"double": np.float64, "single": np.float32}
-STEPPING = {BEST: "simd", "simd": "simd", "simd32": "simd", "cuda": "cuda", "cuda32": "cuda"}
-"""What computes steps."""
+INTERPRETED_BACKENDS = ("casadi", "c")
+NET_PRECISIONS = {"double": np.float64, "single": np.float32}
+STEP_BACKENDS = {BEST: "simd", "simd": "simd", "simd32": "simd", "cuda": "cuda", "cuda32": "cuda"}
+"""The backend of the steps by that of the problem."""
 
 
 @dataclass(frozen=True, eq=False)
 class LargeTranscription(Transcription):
-    """See ``Transcription``; ``rollout`` is that of the problem without its large nets.
+    """A ``Transcription`` whose ``rollout`` is that of the problem without its large nets.
 
     Attributes:
-        context: what it is computed with.
+        context: the data of its rollouts.
     """
 
     context: RolloutContext
@@ -81,7 +81,7 @@ class LargeTranscription(Transcription):
 
     @cached_property
     def _plain(self) -> LargeEvaluator:
-        """The judge's: casadi's virtual machine."""
+        """The judge's evaluator, on casadi's virtual machine."""
         return LargeEvaluator(self.context, self.context.plain, 1)
 
     def _happened(self, motion: ForwardPass, smoothing: float) -> list[Any]:
@@ -95,7 +95,7 @@ class LargeTranscription(Transcription):
 def transcribe_large(
     problem: Problem, exact: bool = False, backend: str = BEST, threads: int | None = None
 ) -> LargeTranscription:
-    """Transcribe a problem with large nets; with "simd32" nets are in single precision, steps in double."""
+    """Transcribe a problem with large nets; "simd32": nets in single precision, steps in double."""
     began = perf_counter()
     context = make_context(problem)
     built = perf_counter() - began
@@ -121,8 +121,8 @@ def transcribe_large(
 def evaluator_or_plain(
     context: RolloutContext, exact: bool, backend: str, threads: int
 ) -> tuple[LargeEvaluator, Description]:
-    """The evaluator that is asked for, or casadi's with a note."""
-    if backend in PLAIN:
+    """Return the requested evaluator, or casadi's with a note."""
+    if backend in INTERPRETED_BACKENDS:
         return LargeEvaluator(context, context.plain, threads), Description("casadi", threads=threads)
     try:
         return large_evaluator(context, exact, backend, threads)
@@ -134,9 +134,9 @@ def evaluator_or_plain(
 def large_evaluator(
     context: RolloutContext, exact: bool, backend: str, threads: int
 ) -> tuple[LargeEvaluator, Description]:
-    """An evaluator whose steps are a kernel, in double precision always; KernelUnavailable if that cannot be."""
+    """Return an evaluator whose steps are a double-precision kernel; KernelUnavailable if that fails."""
     began = perf_counter()
-    step = context.compiled(exact, STEPPING[backend])
+    step = context.compiled(exact, STEP_BACKENDS[backend])
     kernel, precision = step.kernel, PRECISIONS[backend]
     device = kernel.device if isinstance(kernel, DeviceKernel) else None
     shared, nets = threads if device is None else 1, "nets by matrix products"
@@ -145,4 +145,4 @@ def large_evaluator(
     if device is not None and (lack := device.lacks()):
         device, nets = None, f"{nets}, which the processor computes: {lack}"
     description = replace(described(kernel, perf_counter() - began, precision, nets), threads=shared)
-    return LargeEvaluator(context, step, shared, REALS[precision], device), description
+    return LargeEvaluator(context, step, shared, NET_PRECISIONS[precision], device), description

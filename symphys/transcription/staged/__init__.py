@@ -1,1 +1,1 @@
-"""A problem step by step: tangents of states, and how steps change them."""
+"""A problem step by step: tangents of states, and derivatives of steps in them."""

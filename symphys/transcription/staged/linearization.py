@@ -1,4 +1,4 @@
-"""A rollout's motion and the slopes of all its steps, from a decision vector."""
+"""The motion of a decision vector, and the derivatives of all its steps."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from symphys.transcription.staged.linearized_step import LinearizedStep, Slopes
 from symphys.transcription.staged.tangent import Tangent
 from symphys.types import Array, Ints
 
-ROUNDING = 1e-13
-"""Of the slopes of the first state: what is smaller is on its tangent."""
+OFF_TANGENT_TOLERANCE = 1e-13
+"""Relative size of slopes of the first state that counts as rounding: smaller ones lie on the tangent."""
 
 
 class Linearization:
-    """Motions of decision vectors, state by state, and slopes about them.
+    """Motions of decision vectors, step by step, and derivatives about them.
 
     Attributes:
         rollout: of a problem.
@@ -32,22 +32,22 @@ class Linearization:
     """
 
     def __init__(self, rollout: Rollout, backend: str = BEST, threads: int | None = None, exact: bool = False) -> None:
-        """``exact``: for smoothing 0 only."""
+        """Compile the step; ``exact``: for smoothing 0 only."""
         self.rollout, self.tangent = rollout, Tangent(rollout)
         self.statics = statics_of(rollout)
         self.step = LinearizedStep(rollout, self.tangent, backend, threads, exact)
 
     def motion(self, z: ArrayLike, smoothing: float, start: Array | None = None) -> StagedMotion:
-        """The motion of z (len(z),), from its own first state or another one (nx,)."""
+        """Return the motion of z (len(z),), from its own first state or another one (nx,)."""
         given = np.asarray(z, float)
-        x0, u, p = self.begun(given)
+        x0, u, p = self.start(given)
         states = [x0 if start is None else start]
         for k in range(self.rollout.steps):
             states.append(self.step.step(k, states[-1][None], u[None, k], p, smoothing)[0])
         return StagedMotion(given, np.array(states), u, smoothing, gapless=True)
 
     def linearize(self, motion: StagedMotion) -> Linearized:
-        """Slopes of all steps about a motion.
+        """Return the derivatives of all steps about a motion.
 
         What the static entries do to the first state beside its tangent, such as the velocity of one body of a robot,
         is part of the first of ``c``: with it sums over the steps are exact.
@@ -57,13 +57,13 @@ class Linearization:
         return next(self._by_statics(motion, p, iter([slopes])))
 
     def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
-        """Yield slopes of runs of steps, the last run first; all runs start at once."""
+        """Yield derivatives of runs of steps, the last run first; all runs start at once."""
         p, after = self.parameters(motion.z), motion.x[1:] if motion.gapless else None
         runs = self.step.slopes_from_end(motion.x[:-1], motion.u, p, motion.smoothing, after)
         return self._by_statics(motion, p, runs)
 
     def _by_statics(self, motion: StagedMotion, p: Array, runs: Iterator[Slopes]) -> Iterator[Linearized]:
-        """Slopes of runs of steps, the last run first, with those by parameters made those by static entries."""
+        """Convert derivatives by parameters to those by static entries, run by run from the end."""
         start, left, parameters = self.start_slopes(motion)
         if not len(self.statics):
             for a, b, by_p in runs:
@@ -74,7 +74,7 @@ class Linearization:
             c = by_p[:, :, varied] @ parameters[varied]
             end -= len(a)
             if not end and len(c) and left.any():
-                c[0] += self.step.beside(motion.x[0], motion.u[0], p, motion.smoothing) @ left
+                c[0] += self.step.full_state_slopes(motion.x[0], motion.u[0], p, motion.smoothing) @ left
             yield Linearized(a, b, c, start)
 
     def start_slopes(self, motion: StagedMotion) -> tuple[Array, Array, Array]:
@@ -82,23 +82,27 @@ class Linearization:
         if not len(self.statics):
             nx, n, _, np_ = self.step.arguments.sizes
             return np.zeros((n, 0)), np.zeros((nx, 0)), np.zeros((np_, 0))
-        x0, p = motion.x[0], self.begun(motion.z)[2]
+        x0, p = motion.x[0], self.start(motion.z)[2]
         first, parameters = (np.array(ca.DM(part)) for part in self._start_slopes(motion.z))
         first = first - self._sparse(self.tangent.shift, x0, p) @ parameters
         start = self._sparse(self.tangent.projection, x0, p) @ first
         left = first - self._sparse(self.tangent.basis, x0, p) @ start
-        return start, np.where(np.abs(left) > ROUNDING * np.abs(first).max(initial=0.0), left, 0.0), parameters
+        return (
+            start,
+            np.where(np.abs(left) > OFF_TANGENT_TOLERANCE * np.abs(first).max(initial=0.0), left, 0.0),
+            parameters,
+        )
 
     def parameters(self, z: Array) -> Array:
-        """P (np,): without static entries the same for all z."""
-        return self.begun(z)[2] if len(self.statics) else self._parameters
+        """Return p (np,): without static entries the same for all z."""
+        return self.start(z)[2] if len(self.statics) else self._parameters
 
     @cached_property
     def _parameters(self) -> Array:
-        return self.begun(np.zeros(int(self.rollout.z.shape[0])))[2]
+        return self.start(np.zeros(int(self.rollout.z.shape[0])))[2]
 
-    def begun(self, z: Array) -> tuple[Array, Array, Array]:
-        """First state (nx,), inputs (N, m) without shares of phases, and p (np,)."""
+    def start(self, z: Array) -> tuple[Array, Array, Array]:
+        """Return first state (nx,), inputs (N, m) without shares of phases, and p (np,)."""
         x0, u, p = (np.array(part) for part in self._start.call([z]))
         return x0.ravel(), np.ascontiguousarray(u[: self.rollout.controls].T), p.ravel()
 
@@ -109,7 +113,7 @@ class Linearization:
 
     @cached_property
     def _start_slopes(self) -> ca.Function:
-        """(z) -> first state and p by the static entries."""
+        """(z) -> derivatives of first state and p by the static entries."""
         rollout = self.rollout
         slopes = [ca.jacobian(part, rollout.z)[:, self.statics.tolist()] for part in (rollout.x0, rollout.p)]
         return ca.Function("slopes", [rollout.z], slopes)
@@ -119,7 +123,7 @@ class Linearization:
 
 
 def statics_of(rollout: Rollout) -> Ints:
-    """The entries of z that are no knots of a control."""
+    """Return the entries of z that are not knots of a control."""
     variables = rollout.problem.variables
     found = [range(*span) for v, span in zip(variables, spans(variables), strict=True) if v.kind != "control"]
     return np.array([i for each in found for i in each], np.int64)

@@ -1,4 +1,4 @@
-"""How a step changes with its state, inputs and parameters: exact slopes, in tangents, of all steps of a motion."""
+"""Exact derivatives of a step by state, inputs and parameters, in tangents, for all steps of a motion."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ from symphys.transcription.staged.tangent import Tangent
 from symphys.types import Array
 
 Slopes = tuple[Array, Array, Array]
-"""(N, n, n), (N, n, m) and (N, n, np): the next state's tangent by the state's, by inputs and by parameters."""
-NOTHING = np.zeros(1)
-NOTHING.flags.writeable = False
-"""What slopes by parameters consist of where no parameter varies."""
-FEW = 16
-"""Rows of a batch for which what a call prepares takes longer than what it computes."""
+"""(N, n, n), (N, n, m), (N, n, np): derivatives of the next tangent by the tangent, inputs and parameters."""
+ZERO = np.zeros(1)
+ZERO.flags.writeable = False
+"""The buffer of derivatives by parameters where no parameter varies."""
+MAX_LENT_ROWS = 16
+"""Rows up to which preparing a call takes longer than computing it."""
 
 
 @dataclass(eq=False)
 class LinearizedStep:
-    """One step of a rollout, its controllers in it, for batches of states: values, and slopes in tangents.
+    """One step of a rollout with its controllers, for batches of states: values, and derivatives in tangents.
 
     What evaluates is built when it is first asked for.
 
     Attributes:
-        rollout, tangent: whose step it is, and in what its slopes are.
+        rollout, tangent: of the step and of its derivatives.
         backend: the name of a backend that is a kernel; other names mean casadi's virtual machine.
-        threads: that share a batch; None: one for each processor.
+        threads: their number for a batch; None: one for each processor.
         exact: whether it is for smoothing 0 only.
         parameters: whether there are slopes by p; without, those are 0.
         clock: [s] the time at which step 0 begins; of a rollout whose duration does not vary.
@@ -66,7 +66,7 @@ class LinearizedStep:
         return StepArguments(self.rollout, self.tangent, self.parameters)
 
     def step(self, k: int | NDArray[np.int64], X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Array:
-        """(B, nx), (B, m), (B, np) or (np,) -> (B, nx): states after step ``k``, or after steps k (B,)."""
+        """Return states (B, nx) after step ``k``, or steps k (B,), from X (B, nx), U (B, m), P (B, np) or (np,)."""
         states = np.asarray(X, float)
         if isinstance(self._step, _ByKernel) and self._step.lends(len(states)):
             return self._step.lend(len(states), lambda batch: self._few(batch, k, states, U, P, smoothing))
@@ -86,7 +86,7 @@ class LinearizedStep:
         return self._apart.lend(len(first), put)
 
     def _few(self, batch: FixedBatch, k: Any, X: Array, U: ArrayLike, P: ArrayLike, smoothing: float) -> None:
-        """Put the arguments of few steps where the kernel reads them; see ``rows``."""
+        """Write the arguments of a small batch where the kernel reads them; see ``rows``."""
         nx, n, m, np_ = self.arguments.sizes
         self._check(smoothing)
         varying, given, p = batch.z, batch.parameters, np.asarray(P, float)
@@ -99,7 +99,7 @@ class LinearizedStep:
     def slopes(
         self, X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float, after: ArrayLike | None = None
     ) -> Slopes:
-        """Slopes of the steps 0, 1, .. from the states X (N, nx) with inputs U (N, m) and parameters P (np,).
+        """Return derivatives of the steps 0, 1, .. at states X (N, nx), inputs U (N, m), parameters P (np,).
 
         ``after``: (N, nx) the states that they lead to, where these are known. Numbers that are not finite are
         returned as they are.
@@ -130,13 +130,13 @@ class LinearizedStep:
         _, n, m, np_ = self.arguments.sizes
         a, b, varied = jacobians[:, :, :n], jacobians[:, :, n : n + m], jacobians[:, :, n + m :]
         if not varied.shape[2]:
-            return a, b, np.ndarray((len(jacobians), n, np_), buffer=NOTHING, strides=(0, 0, 0))
+            return a, b, np.ndarray((len(jacobians), n, np_), buffer=ZERO, strides=(0, 0, 0))
         c = np.zeros((len(jacobians), n, np_))
         c[:, :, self.arguments.varied] = varied
         return a, b, c
 
-    def beside(self, x: Array, u: Array, p: Array, smoothing: float) -> Array:
-        """(n, nx): the slope of step 0 by each number of a state (nx,), on its tangent or not."""
+    def full_state_slopes(self, x: Array, u: Array, p: Array, smoothing: float) -> Array:
+        """Return (n, nx) derivatives of step 0 by each number of a state (nx,), also off its tangent."""
         after = self.step(0, x[None], u[None], p, smoothing)
         varying, given = self.rows(0, x[None], after, u[None], p, smoothing)
         return self._off.jacobians(varying, given, varying.shape[1])[0, :, -self.arguments.sizes[0] :]
@@ -155,7 +155,7 @@ class LinearizedStep:
         return varying, np.concatenate([x, aim, tick, p, np.full((count, 1), smoothing)], axis=1)
 
     def _ticks(self, k: Any) -> Array:
-        """The numbers of the steps, from when the clock was 0."""
+        """Return the numbers of the steps, counted from clock 0."""
         return np.asarray(self.clock / self.rollout.dt + np.asarray(k, float))
 
     def _check(self, smoothing: float) -> None:
@@ -215,13 +215,13 @@ class LinearizedStep:
         return build_kernel(self.backend, source, [], self._count, wait=True)
 
     def _refuse(self) -> None:
-        """KernelUnavailable where the backend is no kernel."""
+        """Raise KernelUnavailable where the backend is no kernel."""
         if self.backend not in PRECISIONS:
             raise KernelUnavailable("the backend is no kernel")
 
 
 class _ByKernel:
-    """Lanes hold states."""
+    """Evaluates by a kernel whose lanes are states."""
 
     def __init__(self, kernel: Kernel) -> None:
         self.kernel = kernel
@@ -231,11 +231,11 @@ class _ByKernel:
         return np.array(self.kernel.forward(varying, given)["after"])
 
     def lends(self, rows: int) -> bool:
-        """Whether a batch is so small that it is prepared once."""
-        return 0 < rows <= FEW and isinstance(self.kernel, ProcessorKernel)
+        """Whether a batch is so small that its buffers are kept."""
+        return 0 < rows <= MAX_LENT_ROWS and isinstance(self.kernel, ProcessorKernel)
 
     def lend(self, rows: int, put: Callable[[FixedBatch], None]) -> Array:
-        """The outputs of a small batch, once ``put`` has written its arguments."""
+        """Return the outputs of a small batch, after ``put`` has written its arguments."""
         assert isinstance(self.kernel, ProcessorKernel)
         free = self._free.setdefault(rows, [])
         try:
@@ -251,7 +251,7 @@ class _ByKernel:
 
 
 class _BySlopes:
-    """Lanes hold states, then rows of one Jacobian."""
+    """Evaluates by a kernel whose lanes are states, then rows of one Jacobian."""
 
     def __init__(self, kernel: SlopeKernel) -> None:
         self.kernel = kernel
@@ -264,7 +264,7 @@ class _BySlopes:
 
 
 class _ByCasadi:
-    """One state after the other, on casadi's virtual machine: for machines without a compiler."""
+    """Evaluates state by state on casadi's virtual machine, for machines without a compiler."""
 
     def __init__(self, function: ca.Function) -> None:
         self.function = function

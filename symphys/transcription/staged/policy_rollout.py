@@ -1,4 +1,4 @@
-"""Rollouts under a policy, compiled: all steps of several step lengths in one call, lanes hold step lengths.
+"""Compiled rollouts under a policy: all steps of several step lengths in one call, lanes are step lengths.
 
 The new knots of step k are v = clip(v_k + a ahead_k + b back_k d). There d is how far the state is from x_k in its
 tangent, how far knots are that were decided before and still act, and how far static entries are; a is the step length,
@@ -38,7 +38,7 @@ from symphys.types import Array, Expr
 
 
 class RunningCosts(NamedTuple):
-    """What a motion costs, as functions (state looked at, state before, inputs, p, number of the state) -> (1,).
+    """The cost of a motion as functions (state, state before, inputs, p, number of the state) -> (1,).
 
     Attributes:
         before, after: at the start and at the end of each step.
@@ -51,7 +51,7 @@ class RunningCosts(NamedTuple):
 
 
 def running_costs(symbols: StageSymbols, terms: Sequence[StageTerm]) -> RunningCosts | None:
-    """Return the merit of a motion, limits by their squared violations; None where terms ask for more than a step has.
+    """Return the merit with limits as squared violations; None where terms need more than one step.
 
     That is sums, entries of z, and instants other than the end.
     """
@@ -76,7 +76,7 @@ def running_costs(symbols: StageSymbols, terms: Sequence[StageTerm]) -> RunningC
 
 
 class PolicySizes(NamedTuple):
-    """How many knots are at most ``old`` and ``new`` in a step, how many ``inputs`` it has, how many static entries."""
+    """Largest numbers of ``old`` and ``new`` knots in a step, of ``inputs`` and of static entries."""
 
     old: int
     new: int
@@ -85,7 +85,7 @@ class PolicySizes(NamedTuple):
 
 
 class PolicyMotions(NamedTuple):
-    """Motions side by side: ``x`` (B, N + 1, nx), ``u`` (B, N, m), new knots (B, N, w), and their ``cost`` (B,)."""
+    """A batch: ``x`` (B, N + 1, nx), ``u`` (B, N, m), new knots (B, N, w), and ``cost`` (B,)."""
 
     x: Array
     u: Array
@@ -95,13 +95,13 @@ class PolicyMotions(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PolicyRollout:
-    """Motions under policies of one size.
+    """Rollouts under policies of one size.
 
     Attributes:
-        step: which is taken.
+        step: the step of the rollout.
         sizes: of the policies.
         costs: of the motion; without, it costs 0.
-        threads: that share step lengths.
+        threads: their number for the step lengths.
     """
 
     step: LinearizedStep
@@ -131,12 +131,12 @@ class PolicyRollout:
         statics: ArrayLike = 0.0,
         shares: ArrayLike = 1.0,
     ) -> PolicyMotions:
-        """The motions of step lengths (B,); one that is not finite stays so.
+        """Return the motions of step lengths (B,); one that is not finite stays so.
 
         Args:
             start: (nx,) or (B, nx) first states.
             p: (np,) or (B, np) parameters.
-            policy: that they follow.
+            policy: of the motions.
             lengths: (B,).
             smoothing: of the steps.
             clock: [s] the time at the start.
@@ -151,7 +151,7 @@ class PolicyRollout:
             parts[-1][:] = each
             first += size
         assert self.kernel is not None, "there is a compiler"
-        shared = [policy.old[0], *(getattr(policy, name).ravel() for name in SERIES), self.step.tangent.nominal]
+        shared = [policy.old[0], *(getattr(policy, name).ravel() for name in POLICY_SERIES), self.step.tangent.nominal]
         found = self.kernel.forward(row, np.concatenate([*shared, (clock, smoothing)]))
         x, u, new = (
             found[name].reshape(count, more, -1) if name in found else np.zeros((count, more, 0))
@@ -160,12 +160,12 @@ class PolicyRollout:
         return PolicyMotions(x, u, new, found["cost"][:, 0])
 
 
-SERIES = ("x", "old", "new", "ahead", "back", "weights", "keep", "lower", "upper")
+POLICY_SERIES = ("x", "old", "new", "ahead", "back", "weights", "keep", "lower", "upper")
 """Of ``AffinePolicy``, in the order in which the program has them."""
 
 
 class PolicyPlaces:
-    """Where the program keeps a rollout; see ``controller_calls.Places``.
+    """The places of a rollout under a policy in a program; see ``Places``.
 
     What differs from lane to lane is (step length, share of the feedback, change of static entries, p, first state).
     What all share is the policy, step after step, then the nominal p, the clock and the smoothing; the body reads it
@@ -173,7 +173,7 @@ class PolicyPlaces:
     """
 
     def __init__(self, step: LinearizedStep, sizes: PolicySizes) -> None:
-        """Places for policies of these sizes."""
+        """Reserve policies of these sizes."""
         self.rollout: Rollout = step.rollout
         self.layout = layout = MemoryLayout()
         nx, n, m, np_ = step.arguments.sizes
@@ -183,7 +183,7 @@ class PolicyPlaces:
         begun = layout.size
         self.first_held = layout.take(old)
         counts = (nx, old, new, new, new * (n + old + s), inputs * acting, old * acting, new, new)
-        self.policy = {name: layout.series(size, steps) for name, size in zip(SERIES, counts, strict=True)}
+        self.policy = {name: layout.series(size, steps) for name, size in zip(POLICY_SERIES, counts, strict=True)}
         self.nominal, self.clock, self.smoothing = layout.take(np_), layout.take(1), layout.take(1)
         self.shared = Place(begun, layout.size - begun)
         self.length, self.share, self.statics, self.p = (layout.take(size) for size in (1, 1, s, np_))
@@ -199,7 +199,7 @@ class PolicyPlaces:
         self.time, self.tick = layout.series(1, steps + 1), layout.series(1, steps + 1)
 
     def outputs(self) -> dict[str, Place]:
-        """All steps of each series, one after the other; those of no size are left out."""
+        """Return all steps of each series in order; empty series are left out."""
         steps = self.rollout.steps
         series = {"x": (self.x, steps + 1), "u": (self.inputs, steps), "new": (self.v, steps)}
         whole = {name: Place(place.offset, place.size * count) for name, (place, count) in series.items()}
@@ -207,20 +207,22 @@ class PolicyPlaces:
 
 
 def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts | None) -> Program:
-    """The program of a rollout under a policy, with the outputs ``x``, ``u``, ``new`` and ``cost``."""
+    """Return the program of a rollout under a policy, with the outputs ``x``, ``u``, ``new`` and ``cost``."""
     places = PolicyPlaces(step, sizes)
     steps, tangent, policy = step.rollout.steps, step.tangent, places.policy
     decided = (places.length, places.share, places.statics, places.off, places.held)
+    # Each step: deviation from the plan, decision of the policy, controllers and physics.
     body = [
         FunctionCall(tangent.distance, (policy["x"], places.x, places.nominal), (places.off,)),
         FunctionCall(
             decide(sizes, tangent.size),
-            (*decided, *(policy[name] for name in SERIES[1:])),
+            (*decided, *(policy[name] for name in POLICY_SERIES[1:])),
             (places.v, places.inputs, places.held.later()),
         ),
         *step_calls(places, step.exact),
     ]
     epilogue: tuple[FunctionCall, ...] = ()
+    # Costs of the states before and after each step, and of the last state.
     if costs is not None:
         here = (places.x, places.x, places.given, places.p, places.tick)
         there = (places.x.later(), places.x, places.given, places.p, places.tick.later())
@@ -269,16 +271,18 @@ def _prologue(step: LinearizedStep, places: PolicyPlaces) -> tuple[FunctionCall,
 
 
 def decide(sizes: PolicySizes, n: int) -> ca.Function:
-    """(length, share, statics, off, held, then ``SERIES`` but x) -> new knots, inputs, and what is held after it.
+    """Return (length, share, statics, off, held, ``POLICY_SERIES`` without x) -> new knots, inputs, held knots.
 
     Matrices are row by row.
     """
+    # Symbols; matrices are given row by row.
     old, new, inputs, s = sizes
     acting, beside = old + new, n + old + s
     length, share = ca.SX.sym("length"), ca.SX.sym("share")
     statics, off, held = ca.SX.sym("statics", s), ca.SX.sym("off", n), ca.SX.sym("held", old)
     about, v, ahead, lower, upper = (ca.SX.sym("a", size) for size in (old, new, new, new, new))
     back, weights, keep = (ca.SX.sym("m", size) for size in (new * beside, inputs * acting, old * acting))
+    # New knots = clip(v + length ahead + share back (deviation)); inputs are weighted knots.
     answer = _product(back, new, ca.vertcat(off, held - about, statics))
     chosen = ca.fmin(ca.fmax(v + length * ahead + share * answer, lower), upper)
     both = ca.vertcat(held, chosen)
@@ -288,5 +292,5 @@ def decide(sizes: PolicySizes, n: int) -> ca.Function:
 
 
 def _product(matrix: Any, rows: int, column: Any) -> Any:
-    """A matrix that is given row by row, times a column."""
+    """Return a matrix, given row by row, times a column."""
     return ca.mtimes(ca.reshape(matrix, column.shape[0], rows).T, column) if rows else ca.SX(0, 1)

@@ -1,4 +1,4 @@
-"""Functions of one step for many steps at once, of the few numbers that they read: compiled, or on casadi's machine."""
+"""Functions of one step for many steps at once, of the few numbers that they read: compiled or interpreted."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ from symphys.types import Array, Expr, Ints
 
 
 class ByColumns:
-    """A casadi function of columns, for any number of them; what was built for a number of columns is kept."""
+    """A casadi function of columns for any number of them, cached by that number."""
 
     def __init__(self, function: ca.Function) -> None:
-        """Wrap a function; it is built at the first call."""
+        """Wrap a function, which is built at the first call."""
         self.function = function
         self._mapped: dict[int, ca.Function] = {}
 
     def __call__(self, *columns: Any) -> list[Array]:
-        """(size, T) each -> results (rows, T * columns), side by side."""
+        """Evaluate arguments (size, T) -> results (rows, T * columns)."""
         count = int(columns[0].shape[1])
         if count not in self._mapped:
             self._mapped[count] = self.function.map(count)
         return [np.array(result, float) for result in self._mapped[count].call(list(columns))]
 
 
-COMPILED = 30_000
-"""Operations of a horizon from which a compiler is worth its second: casadi's machine does as many in 0.2 ms."""
+MIN_COMPILED_OPERATIONS = 30_000
+"""Operations of a horizon from which compiling pays; the virtual machine does as many in 0.2 ms."""
 
 
 class StepRows(NamedTuple):
-    """Arguments of many steps, a row a step.
+    """Arguments of many steps, one row each.
 
     Attributes:
         before, after: (R, nx) the states before and after it.
@@ -65,11 +65,11 @@ class StepRows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ReadingFunction:
-    """A function of the entries of its arguments that it reads.
+    """A function of those entries of its arguments that it reads.
 
     Attributes:
         function: (entries of each argument) -> columns.
-        reads: which entries of each argument.
+        reads: the entries of each argument.
         after: whether the first argument is the state after the step, and the last the number of that.
     """
 
@@ -85,7 +85,7 @@ class ReadingFunction:
 
 
 def reading(results: Sequence[Expr], arguments: Sequence[Expr], after: bool) -> ReadingFunction:
-    """Results as a function of what they read of the arguments."""
+    """Return results as a function of the entries that they read."""
     whole = ca.Function("whole", list(arguments), [ca.densify(ca.vec(each)) for each in ca.cse(list(results))])
     reads = []
     for i in range(whole.n_in()):
@@ -103,7 +103,7 @@ def reading(results: Sequence[Expr], arguments: Sequence[Expr], after: bool) -> 
 
 
 class StageFunctions:
-    """Functions that are asked for at the same steps: all in one kernel, whose lanes are steps.
+    """Functions at the same steps, all in one kernel whose lanes are steps.
 
     What is small stays on casadi's virtual machine, as does everything where no compiler is found.
     """
@@ -116,21 +116,21 @@ class StageFunctions:
         threads: int | None,
         worth: int | None = None,
     ) -> None:
-        """Note them; nothing is compiled before it is asked for.
+        """Collect functions; they are compiled on demand.
 
         Args:
             functions: to evaluate together.
             steps: of a horizon.
             backend: a name of a kernel, or another for casadi's virtual machine.
-            threads: that share the steps; None: one for each processor.
-            worth: operations of a horizon above which they are compiled; None: ``COMPILED``.
+            threads: their number for the steps; None: one for each processor.
+            worth: operations of a horizon above which they are compiled; None: ``MIN_COMPILED_OPERATIONS``.
         """
         self.functions, self.backend, self.threads = list(functions), backend, threads
         keys = dict.fromkeys(segment for each in self.functions for segment in each.segments)
         order = ("before", "after", "u", "constants", "ticks", "next")
         self._segments = sorted((key for key in keys if key[1]), key=lambda key: order.index(key[0]))
         work = sum(each.function.n_instructions() for each in self.functions)
-        self._compiles = backend in PRECISIONS and work * steps > (COMPILED if worth is None else worth)
+        self._compiles = backend in PRECISIONS and work * steps > (MIN_COMPILED_OPERATIONS if worth is None else worth)
         self._gathered = {name: self._entries(name) for name in order}
         sizes = [int(each.function.numel_out(o)) for each in self.functions for o in range(each.function.n_out())]
         self._ends = np.cumsum([0, *sizes])
@@ -152,7 +152,7 @@ class StageFunctions:
         return np.array([i for source, each in self._segments if source == name for i in each], np.int64)
 
     def _table(self, rows: StepRows) -> Array:
-        """(R, w): all segments side by side."""
+        """Return (R, w): all segments side by side."""
         count, parts = len(rows.ticks), []
         for name in ("before", "after", "u", "constants"):
             entries = self._gathered[name]

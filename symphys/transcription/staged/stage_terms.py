@@ -1,4 +1,4 @@
-"""Costs, targets, constraints and sums of a problem as functions of one step: its state, its input, the state after.
+"""Costs, targets, constraints and sums of a problem as functions of one step: state, input, state after.
 
 Every term is evaluated at some steps. There it looks at the state before the step or at the state after it, with the
 input of the step. Inputs that controllers or force laws drive follow from the state before the step.
@@ -32,10 +32,10 @@ from symphys.types import Array, Expr, Ints
 
 @dataclass(frozen=True)
 class MotionSum:
-    """One number that adds up along a motion.
+    """One number that is summed along a motion.
 
     Attributes:
-        formula, component: what is added.
+        formula, component: the summed number.
         before, after: (N,) its weights at the start and at the end of each step.
     """
 
@@ -47,7 +47,7 @@ class MotionSum:
 
 @dataclass(eq=False)
 class MotionSums:
-    """The sums and the starts that a problem's formulas need; they are noted as they are asked for.
+    """The sums and initial values that a problem's formulas need, collected on demand.
 
     Attributes:
         rollout: of the problem.
@@ -79,7 +79,7 @@ class MotionSums:
         return self._known[key]
 
     def start_of(self, formula: Formula) -> slice:
-        """Return the columns of a formula of the first state among the starts."""
+        """Return the columns of a formula of the first state among the initial values."""
         key = "start", formula.text, 0
         if key not in self._known:
             size = int(self.rollout.compiled(formula).size1_out(0))
@@ -89,7 +89,7 @@ class MotionSums:
         return self._known[key]
 
     def note(self, name: str, formula: Formula, tick: int) -> None:
-        """Take note of what a formula with parts, of the table ``name``, needs at a tick.
+        """Register the sums and starts that a formula with parts, of the table ``name``, needs at a tick.
 
         Raises:
             SymphysError: for an integral of a variable over time, whose knots are not all decided while it adds up.
@@ -109,7 +109,7 @@ class MotionSums:
                 self.sum_of(parse(name), "held", tick)
 
     def local(self, formula: Formula, tick: int) -> bool:
-        """Whether it can be evaluated at its tick: at the end, or where its parts are functions of z."""
+        """Whether the formula can be evaluated at its tick: at the end, or if its parts are functions of z."""
         of_start = all(part.kind == "start" and not self.of_input(part.formula) for part in formula.parts)
         return tick == self.rollout.steps or of_start
 
@@ -119,7 +119,7 @@ class MotionSums:
         return sorted(formula.names - parts - {variable.name for variable in self.rollout.problem.variables})
 
     def constant(self, formula: Formula) -> bool:
-        """Whether a formula reads nothing but variables."""
+        """Whether a formula reads only variables."""
         return not self.own_names(formula)
 
     def of_input(self, formula: Formula) -> bool:
@@ -127,7 +127,7 @@ class MotionSums:
         return bool(self.rollout.compiled(formula).jac_sparsity(0, 1).nnz())
 
     def value(self, part: MotionPart, sums: Expr, starts: Expr, duration: Expr, at_end: Expr) -> Expr:
-        """A part: of the sums of the last state, the starts, the duration, and its formula at the end."""
+        """Return a part from the sums of the last state, starts, duration, and its formula at the end."""
         if part.kind == "end" or (part.kind == "start" and self.constant(part.formula)):
             return at_end
         if part.kind == "start" and not self.of_input(part.formula):
@@ -139,7 +139,7 @@ class MotionSums:
 
     @cached_property
     def started(self) -> ca.Function:
-        """Z -> the starts (a,)."""
+        """Return z -> the starts (a,)."""
         rollout = self.rollout
         found = [
             rollout.compiled(formula)(rollout.x0, rollout.given[:, 0], rollout.p, 0, rollout.z)
@@ -148,7 +148,7 @@ class MotionSums:
         return ca.Function("starts", [rollout.z], [ca.densify(ca.vertcat(ca.MX(0, 1), *found))])
 
     def started_slopes(self, z: Array, statics: Sequence[int]) -> Array:
-        """(a, s) the starts by the static entries of z."""
+        """Return (a, s) derivatives of the starts by the static entries of z."""
         if self._slopes is None:
             slope = ca.jacobian(self.started(self.rollout.z), self.rollout.z)[:, list(statics)]
             self._slopes = ca.Function("slopes", [self.rollout.z], [ca.densify(slope)])
@@ -158,7 +158,7 @@ class MotionSums:
 
 
 def require_inputs(problem: Problem, name: str, part: MotionPart) -> None:
-    """Refuse integrals of knots: SymphysError that names what to integrate instead."""
+    """Refuse integrals of knots: SymphysError names what to integrate instead."""
     for variable in problem.variables:
         if variable.kind == "control" and variable.name in part.formula.names:
             inputs = ", ".join(dict.fromkeys(slot.name for slot in variable.slots))
@@ -201,25 +201,25 @@ class StageTerm:
 
     @property
     def states(self) -> Ints:
-        """(T,) numbers of the states that it looks at."""
+        """Return (T,) the numbers of the states that the term reads."""
         return self.steps + 1 if self.after else self.steps
 
 
 class StageSymbols:
-    """The symbols (SX) that terms are expressions of, and what formulas are in them.
+    """The symbols (SX) of terms, and formulas as expressions of them.
 
     Attributes:
         x: the state that is looked at, with its sums.
         first: the state before the step, without sums: where it is another one.
         u: inputs as variables give them.
-        constants: what is the same all along a motion: p, the entries ``named`` of z, the starts of ``MotionSums``.
+        constants: constant along a motion: p, the entries ``named`` of z, the starts of ``MotionSums``.
         tick: the number of the state that is looked at.
         named: entries of z that some formula names by their variable.
         plain: whether the constants are p alone.
     """
 
     def __init__(self, rollout: Rollout, tangent: Tangent, sums: MotionSums) -> None:
-        """Symbols for the formulas of a problem; ``sums`` knows already what they need."""
+        """Make symbols for the formulas of a problem, with complete ``sums``."""
         self.rollout, self.tangent, self.sums = rollout, tangent, sums
         self.named = named_entries(rollout.problem)
         self.state_size, self.parameter_size = rollout.memory.size, int(rollout.p.shape[0])
@@ -247,11 +247,11 @@ class StageSymbols:
         return self.x, self.first, self.u, self.constants, self.tick
 
     def value(self, formula: Formula, after: bool) -> Expr:
-        """(r,): a formula of an instant at the state that is looked at."""
+        """Return (r,) a formula of an instant at the evaluated state."""
         return self._call(formula, after, [])
 
     def at_end(self, formula: Formula, tick: int) -> Expr:
-        """(r,): a formula with parts, at the last state or, where these follow from z, at its own ``tick``."""
+        """Return (r,) a formula with parts, at the last state or, if these follow from z, at its own ``tick``."""
         after, sums = tick == self.rollout.steps, self.x[self.state_size :]
         if self.sums.local(formula, tick):
             return self._call(formula, after, [self._part(part, after) for part in formula.parts])
@@ -274,7 +274,7 @@ class StageSymbols:
         return self.rollout.compiled(formula)(x, u, self.p, time, self.z, *more)
 
     def _inputs(self, after: bool) -> Expr:
-        """The inputs of the step, with what controllers and force laws add."""
+        """Return the inputs of the step, with those of controllers and force laws."""
         if after not in self._driven_inputs:
             feedback = self.rollout.feedback
             assert feedback is not None, "nothing else drives inputs"
@@ -289,7 +289,7 @@ class StageSymbols:
 
     @cached_property
     def bases(self) -> tuple[Expr, Expr]:
-        """The states ``x`` and ``first`` by their tangents; sums are tangents of their own."""
+        """Return bases of the tangents of ``x`` and ``first``; sums are their own tangents."""
         x, first = (self.tangent.basis(state[: self.state_size], self.p) for state in (self.x, self.first))
         return ca.diagcat(x, ca.SX.eye(len(self.sums.sums))), first
 
@@ -303,7 +303,7 @@ class StageSymbols:
 
 
 def named_entries(problem: Problem) -> Ints:
-    """The entries of z whose variables some formula names."""
+    """Return the entries of z whose variables some formula names."""
     names = frozenset[str]().union(*(each.formula.needed for each in _tables(problem)))
     found = [
         range(*span) for v, span in zip(problem.variables, spans(problem.variables), strict=True) if v.name in names
@@ -316,7 +316,7 @@ def _tables(problem: Problem) -> list[Cost | Target | Constraint]:
 
 
 def motion_sums(rollout: Rollout) -> MotionSums:
-    """The sums and starts that the formulas of a problem need."""
+    """Return the sums and starts that the formulas of a problem need."""
     problem, found = rollout.problem, MotionSums(rollout)
     for each in _tables(problem):
         if each.formula.parts:
@@ -325,7 +325,7 @@ def motion_sums(rollout: Rollout) -> MotionSums:
 
 
 def stage_terms(symbols: StageSymbols) -> list[StageTerm]:
-    """Everything that a problem asks of its motion, and the sums that this takes, term by term.
+    """Return all terms of a problem, and the sums that they need, term by term.
 
     The weighted sum of costs and squares is the objective. Limits are in the order of the problem's constraints.
     """

@@ -1,4 +1,4 @@
-"""A problem step by step, as ``symphys.shooting.StagedProblem`` has it."""
+"""A problem step by step: the implementation of ``symphys.shooting.StagedProblem``."""
 
 from __future__ import annotations
 
@@ -10,14 +10,17 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen.backends import BEST
-from symphys.problem import Constraint
+from symphys.dynamics.observation import SensedState, joint_turn, named_sensors, sensor_readings
+from symphys.model.state_layout import Layout
+from symphys.problem import DURATION, Constraint, GuessedMotion
+from symphys.problem.guess.motion import is_orientation, turn_between
+from symphys.problem.guess.names import ball_joints, guessable, rate_of
 from symphys.shooting import AffinePolicy, Expansion, Followed, Linearized, StagedMotion
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.staged.expansion_sums import ExpansionSums
+from symphys.transcription.staged.expansion import ExpansionSums, SquareStack, square_stacks
 from symphys.transcription.staged.linearization import Linearization, statics_of
 from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes, running_costs
-from symphys.transcription.staged.square_stack import SquareStack, square_stacks
-from symphys.transcription.staged.stage_functions import StepRows
+from symphys.transcription.staged.stage_functions import ByColumns, StepRows
 from symphys.transcription.staged.stage_terms import Kind, StageTerm
 from symphys.transcription.staged.term_slopes import Blocks, TermGroups, TermSlopes
 from symphys.types import Array, Ints
@@ -32,11 +35,11 @@ class SlopedTerm(NamedTuple):
     """A term along a motion.
 
     Attributes:
-        term: which.
+        term: the term.
         value: (T, r).
         blocks: its slopes.
         by_s: (T, r, s) its slopes by the static entries of z.
-        slopes, found: what its curvature is made of.
+        slopes, found: the data of its curvature.
     """
 
     term: StageTerm
@@ -48,7 +51,7 @@ class SlopedTerm(NamedTuple):
 
 
 class RolloutStages:
-    """The steps of a rollout, compiled; see ``symphys.shooting.StagedProblem`` for what is public.
+    """The compiled steps of a rollout; ``symphys.shooting.StagedProblem`` describes the public methods.
 
     A state is that of the rollout, then the sums that formulas take of a whole motion. Inputs are those of the rollout,
     then control knots that formulas name, each at the first step in which it acts.
@@ -66,8 +69,8 @@ class RolloutStages:
 
         Args:
             rollout: of a problem.
-            backend: what evaluates the step.
-            threads: that share a batch; None: one for each processor.
+            backend: the evaluator of the step.
+            threads: their number for a batch; None: one for each processor.
             exact: whether it is for smoothing 0 only.
             priced: whether motions under a policy come with their merits, and an iteration shall take least time.
         """
@@ -93,7 +96,7 @@ class RolloutStages:
         self.lower, self.upper, self.penalties = columns[0], columns[1], columns[2]
 
     def begin(self, x: Array, time: float) -> None:
-        """Let motions begin at a state (nx,) and a time [s]; the duration must not vary, and no formula take sums."""
+        """Let motions begin at a state (nx,) and time [s]; requires a fixed duration and no sums."""
         assert not self._sums and not self.rollout.problem.free_duration
         self._first, self._linearization.step.clock = x, time
         self._groups.clock = time / self.rollout.dt
@@ -102,31 +105,31 @@ class RolloutStages:
 
     @property
     def description(self) -> str:
-        """What evaluates slopes, in words."""
+        """Describe the evaluator of the derivatives."""
         return self._linearization.step.description
 
     def start(self, Z: Array) -> Array:
-        """(B, nx)."""
+        """Return first states (B, nx)."""
         return self._begun(Z)[0]
 
     def parameters(self, Z: Array) -> Array:
-        """(B, np)."""
+        """Return parameters (B, np)."""
         return self._begun(Z)[1]
 
     def _begun(self, Z: Array) -> tuple[Array, Array, Array]:
-        """First states, parameters, and the starts that formulas take, a row for each z."""
+        """Return first states, parameters, and starts of formulas, a row for each z."""
         states, p, starts = self._distinct(Z)
         if len(p) == len(Z) == len(states):
             return states, p, starts
         return np.repeat(states[:1], len(Z), axis=0), np.repeat(p, len(Z), axis=0), np.repeat(starts, len(Z), axis=0)
 
     def _distinct(self, Z: Array) -> tuple[Array, Array, Array]:
-        """The same, one row without static entries; those that were asked for last are kept."""
+        """Return ``_begun`` of distinct rows, one without static entries; the last result is cached."""
         single = not len(self.statics)  # then they are the same for all z
         key = 0 if single else len(Z), Z[:, self.statics].tobytes()
         if self._known is None or self._known[0] != key:
             rows = Z[:1] if single else Z
-            parts = [self._linearization.begun(z) for z in rows]
+            parts = [self._linearization.start(z) for z in rows]
             states = np.array([np.append(x, np.zeros(self._sums)) for x, _, _ in parts])
             starts = np.array([np.array(self._groups.symbols.sums.started(z)).ravel() for z in rows])
             self._known = key, (states, np.array([p for _, _, p in parts]), starts)
@@ -136,7 +139,7 @@ class RolloutStages:
     _known: tuple[tuple[int, bytes], tuple[Array, Array, Array]] | None = None
 
     def _constants(self, Z: Array, U: Array) -> Array:
-        """(B, c): what the terms read that is the same all along each motion; knots are those of the inputs."""
+        """Return (B, c) the numbers of terms that are constant along each motion; knots are those of U."""
         if self._groups.symbols.plain:
             return self._begun(Z)[1]
         _, p, starts = self._begun(Z)
@@ -146,7 +149,7 @@ class RolloutStages:
         return np.concatenate([p, named, starts], axis=1)
 
     def step(self, k: int, X: Array, U: Array, Z: Array, smoothing: float) -> Array:
-        """(B, nx) after step k."""
+        """Return states (B, nx) after step k."""
         plain = X[:, : X.shape[1] - self._sums]
         after = self._linearization.step.step(k, plain, U[:, : self._given], self.parameters(Z), smoothing)
         if not self._sums:
@@ -158,7 +161,7 @@ class RolloutStages:
         return self._groups.summed(StepRows(X, after, U[:, : self._given], constants, ticks))
 
     def roll_out(self, z: Array, smoothing: float) -> StagedMotion:
-        """The motion of z."""
+        """Return the motion of z."""
         motion = self._linearization.motion(z, smoothing, self._first)
         u = np.asarray(self.weights @ z).reshape(self.steps, self.input_size)
         if not self._sums:
@@ -177,7 +180,7 @@ class RolloutStages:
         smoothing: float,
         shares: Array | float = 1.0,
     ) -> Followed | None:
-        """The motions of step lengths (B,); None with sums, and without a compiler."""
+        """Return the motions of step lengths (B,); None with sums, and without a compiler."""
         if self._sums:
             return None
         sizes = PolicySizes(policy.old.shape[1], policy.new.shape[1], self.input_size, len(self.statics))
@@ -196,7 +199,7 @@ class RolloutStages:
     _rolled: PolicyRollout | None = None
 
     def linearize(self, motion: StagedMotion) -> Linearized:
-        """Slopes of all steps."""
+        """Return the derivatives of all steps."""
         found = self._with_knots(self._linearization.linearize(self._plain(motion)))
         return self._with_sums(found, motion) if self._sums else found
 
@@ -240,21 +243,21 @@ class RolloutStages:
         return Linearized(a, b, c, start)
 
     def retract(self, X: Array, D: Array) -> Array:
-        """(B, nx)."""
+        """Return states (B, nx)."""
         if not self._sums:
             return self.tangent.retract(X, D)
         moved = self.tangent.retract(X[:, : -self._sums], D[:, : -self._sums])
         return np.concatenate([moved, X[:, -self._sums :] + D[:, -self._sums :]], axis=1)
 
     def difference(self, X: Array, Y: Array) -> Array:
-        """(B, n)."""
+        """Return tangents (B, n)."""
         if not self._sums:
             return self._linearization.step.difference(X, Y)
         apart = self._linearization.step.difference(X[:, : -self._sums], Y[:, : -self._sums])
         return np.concatenate([apart, Y[:, -self._sums :] - X[:, -self._sums :]], axis=1)
 
     def measure(self, Z: Array, X: Array, U: Array) -> tuple[Array, Array]:
-        """Objectives (B,) and limits (B, c)."""
+        """Return objectives (B,) and limits (B, c)."""
         objective, limits = np.zeros(len(Z)), [np.zeros((len(Z), 0))]
         values = self._groups.values(X, U[:, :, : self._given], self._constants(Z, U))
         for term, each in values:
@@ -267,10 +270,10 @@ class RolloutStages:
         return objective, np.concatenate(limits, axis=1)
 
     def expand(self, motion: StagedMotion, multipliers: Array, penalties: Array) -> Expansion:
-        """The augmented objective to second order."""
+        """Return the augmented objective to second order."""
         sizes = self.steps, self.tangent_size, self.input_size, len(self.statics)
         sums, first = ExpansionSums(sizes, self._of_constants(motion), self._knots), 0
-        stacked = not len(self._knots[0]) and not self._beside(motion).any()
+        stacked = not len(self._knots[0]) and not self._off_tangent_slopes(motion).any()
         if stacked:
             constants, u = self._constants(motion.z[None], motion.u[None]), motion.u[:, : self._given]
             for stack in self._stacks:
@@ -307,14 +310,14 @@ class RolloutStages:
         return square_stacks(self._groups.symbols, self.terms, bounds, static, self._evaluated)
 
     def _curve(self, sums: ExpansionSums, each: SlopedTerm, weight: Array) -> None:
-        """Add the second derivative of weight (T,) times a number, as far as it is positive."""
+        """Add the positive part of the second derivative of weight (T,) times a number."""
         rows = each.slopes.curvature(each.found, np.sign(weight))
         if rows is not None:
             share = np.broadcast_to(np.abs(weight)[:, None], rows.x.slopes.shape[:2])
             sums.curvature(each.term, rows, sums.by_statics(rows), share)
 
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Any, Any, Any]:
-        """Limits, and their slopes by all states, inputs and static entries."""
+        """Return limits, and their derivatives by all states, inputs and static entries."""
         n, m, s, first = self.tangent_size, self.input_size, len(self.statics), 0
         values, by_s = [np.zeros(0)], [np.zeros((0, s))]
         x, u = (_Entries(), _Entries())
@@ -335,35 +338,35 @@ class RolloutStages:
 
         return np.concatenate(values), by_state, by_input, csr_array(np.concatenate(by_s))
 
-    def _beside(self, motion: StagedMotion) -> Array:
-        """(nx, s): what static entries do to the first state beside its tangent."""
+    def _off_tangent_slopes(self, motion: StagedMotion) -> Array:
+        """Return (nx, s) the derivatives of the first state by static entries, off its tangent."""
         return self._linearization.start_slopes(self._plain(motion))[1] if len(self.statics) else np.zeros((0, 0))
 
     def _sloped(self, motion: StagedMotion, after: Array, kinds: frozenset[Kind]) -> list[SlopedTerm]:
-        """Terms of some kinds with their slopes, from the states of a motion to the states ``after`` (N, nx)."""
+        """Return terms of some kinds with slopes, from a motion to the states ``after`` (N, nx)."""
         if not any(term.kind in kinds for term in self.terms):
             return []
         constants = self._constants(motion.z[None], motion.u[None])
         u, ticks = motion.u[:, : self._given], np.arange(self.steps)
         rows = StepRows(motion.x[:-1], after, u, constants, ticks, self._groups.clock)
-        of_constants, left = self._of_constants(motion), self._beside(motion)
+        of_constants, left = self._of_constants(motion), self._off_tangent_slopes(motion)
         result = []
         for term, slopes, found in self._groups.slopes(rows, kinds):
             value, blocks = slopes.values(found)
             by_s = blocks.constants.slopes @ of_constants[blocks.constants.columns]
             if left.any() and term.steps[0] == 0:
-                by_s[0] += self._groups.beside(term, rows) @ left
+                by_s[0] += self._groups.full_state_slopes(term, rows) @ left
             result.append(SlopedTerm(term, value, blocks, by_s, slopes, found))
         return result
 
     def _plain(self, motion: StagedMotion) -> StagedMotion:
-        """Without sums and knots."""
+        """Return the motion without sums and knots."""
         size = motion.x.shape[1] - self._sums
         u = motion.u[:, : self._given]
         return StagedMotion(motion.z, motion.x[:, :size], u, motion.smoothing, motion.gapless)
 
     def _of_constants(self, motion: StagedMotion) -> Array:
-        """(c, s): the constants of the terms by the static entries of z."""
+        """Return (c, s) derivatives of the constants of terms by the static entries of z."""
         if not len(self.statics):
             return np.zeros((int(self._groups.symbols.constants.shape[0]), 0))
         of_p = self._linearization.start_slopes(self._plain(motion))[2]
@@ -373,19 +376,19 @@ class RolloutStages:
 
 
 class _Entries:
-    """Entries of a sparse matrix that are being gathered."""
+    """Collects the entries of a sparse matrix."""
 
     def __init__(self) -> None:
         self.rows, self.columns, self.values = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
 
     def add(self, rows: Ints, columns: Ints, values: Array) -> None:
-        """Blocks (T, r, c) at rows (T, r) and columns (T or 1, 1, c)."""
+        """Add blocks (T, r, c) at rows (T, r) and columns (T or 1, 1, c)."""
         self.rows.append(np.broadcast_to(rows[:, :, None], values.shape).ravel())
         self.columns.append(np.broadcast_to(columns, values.shape).ravel())
         self.values.append(values.ravel())
 
     def matrix(self, rows: int, columns: int) -> Any:
-        """(rows, columns) scipy.sparse.csr_array."""
+        """Return a scipy.sparse.csr_array (rows, columns)."""
         from scipy.sparse import csr_array
 
         places = np.concatenate(self.rows), np.concatenate(self.columns)
@@ -393,7 +396,7 @@ class _Entries:
 
 
 def _input_weights(rollout: Rollout, named: Ints, statics: Ints) -> tuple[Any, tuple[Ints, Ints]]:
-    """(N * m, len(z)) scipy.sparse: u = weights @ z; which of ``named`` are knots, and the step and input of each.
+    """Return (N * m, len(z)) sparse: u = weights @ z; and which of ``named`` are knots, with step and input.
 
     The inputs of a step are those of the rollout, then the named knots that begin to act there.
     """
@@ -420,7 +423,74 @@ def _input_weights(rollout: Rollout, named: Ints, statics: Ints) -> tuple[Any, t
 
 
 def _limit(limit: Constraint, term: StageTerm, dt: float) -> tuple[Array, Array, Array]:
-    """(T * r,) each: bounds and weights of squared violations, tick after tick."""
+    """Return (T * r,) bounds and weights of squared violations, tick by tick."""
     ticks = len(term.steps)
     lower, upper = (np.tile(np.broadcast_to(end, (term.size,)), ticks) for end in (limit.lower, limit.upper))
     return lower, upper, np.full(len(lower), limit.penalty * (dt if limit.at == "always" else 1.0))
+
+
+def guessed_states(stages: RolloutStages, guess: GuessedMotion, z: Array, ticks: Ints, smoothing: float) -> Array:
+    """Return states (M, nx) at the ticks (M,), each at least 1.
+
+    What is named, and its rate, is moved along the tangent, so that joints stay closed; all else is that of the rollout
+    of z (n,), of its first step from where on it is not finite.
+    """
+    moved, dt = stages.roll_out(z, smoothing).x, stages.rollout.dt
+    states, times = moved[ticks], np.asarray(ticks * dt, float)
+    states[~np.isfinite(states).all(axis=1)] = moved[1]
+    off, names = np.zeros((len(ticks), stages.tangent_size)), list(stages.tangent.names)
+    now, stretch = _quantities(stages, guess, states, z), _stretch(stages, z)
+
+    def move(name: str, ahead: Array) -> None:
+        for entry, column in zip(_entries(name, names), ahead.T, strict=True):
+            off[:, entry] = column
+
+    sizes = guessable(stages.rollout.world)
+    for name in guess.columns:
+        there = guess.at(name, times)
+        move(name, turn_between(now[name], there) if is_orientation(name) else there - now[name])
+        rate = rate_of(name, sizes)
+        if rate and rate not in guess.columns:
+            move(rate, guess.rate(name, times, dt) / stretch - now[rate])
+    return stages.retract(states, off)
+
+
+def _entries(name: str, names: list[str]) -> Iterator[int]:
+    """Return the columns of a quantity in the tangent, where all joints have coordinates and rates."""
+    owner, _, field = name.rpartition(".")
+    jointed = f"{owner}.coordinate[0]" in names
+    words = {"angle": "coordinate", "position": "coordinate", "orientation": "coordinate", "angular_velocity": "rate"}
+    field = words.get(field, field) if jointed else "turn" if field == "orientation" else field
+    count = sum(each.startswith(f"{owner}.{field}[") for each in names)
+    return (names.index(f"{owner}.{field}[{k}]") for k in range(count))
+
+
+def _stretch(stages: RolloutStages, z: Array) -> float:
+    """Return the duration of the motion of z divided by that in the file."""
+    problem, columns = stages.rollout.problem, stages.rollout.parameters.columns
+    if not problem.free_duration:
+        return 1.0
+    return float(stages.parameters(z[None])[0][columns[DURATION]][0]) / problem.simulation.duration
+
+
+def _quantities(stages: RolloutStages, guess: GuessedMotion, states: Array, z: Array) -> dict[str, Array]:
+    """Return (M, components) of all quantities of the owners of the guessed ones."""
+    rollout = stages.rollout
+    world, layout = rollout.world, Layout(rollout.world)
+    x, p = ca.SX.sym("x", layout.size), ca.SX.sym("p", int(rollout.p.shape[0]))
+    owners = {name.rpartition(".")[0] for name in guess.columns}
+    found = {name: x[layout[name]] for name in layout.names() if name.rpartition(".")[0] in owners}
+    of_joints = (n for n, s in named_sensors(world).items() if s.kind.owner == "joint" and s.owner.name in owners)
+    found |= sensor_readings(SensedState(world, x), frozenset(of_joints))
+    for joint in ball_joints(world):
+        if joint.name in owners:
+            bodies = [world.bodies[i].name for i in joint.bodies]
+            fields = ("orientation", "angular_velocity")
+            parts = (tuple(x[layout[f"{body}.{field}"]] for body in bodies) for field in fields)
+            found |= dict(zip((f"{joint.name}.{field}" for field in fields), joint_turn(joint, *parts), strict=True))
+    symbols = ca.vertcat(ca.SX(0, 1), *rollout.parameters.symbols)
+    values = [ca.densify(ca.substitute(ca.SX(value), symbols, p)) for value in found.values()]
+    function = ByColumns(ca.Function("named", [x, p], values))
+    parameters = np.tile(stages.parameters(z[None]), (len(states), 1))
+    rows = function(states[:, : layout.size].T, parameters.T)
+    return {name: row.T for name, row in zip(found, rows, strict=True)}

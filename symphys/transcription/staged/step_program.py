@@ -1,4 +1,4 @@
-"""One step as programs: the next state, and how far it is from another, of a change of the state in its tangent."""
+"""One step as programs: the next state, and its distance from another in the tangent."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from symphys.types import Expr, Ints
 
 @dataclass(frozen=True, eq=False)
 class StepArguments:
-    """The arguments of one step, and which of them it is differentiated by.
+    """The arguments of one step, divided into varying ones, by which it is differentiated, and given ones.
 
     What varies is (d, u, p as far as z sets it, e), what is given (x, the state after, the number of the step, p).
     e (nx,) is what the state may have beside its tangent, as initial states do.
@@ -41,7 +41,7 @@ class StepArguments:
 
     @cached_property
     def varied(self) -> Ints:
-        """The entries of p by which it is differentiated: those that z sets."""
+        """Return the entries of p by which the step is differentiated: those that z sets."""
         if not self.parameters:
             return np.zeros(0, np.int64)
         rollout = self.rollout
@@ -51,27 +51,27 @@ class StepArguments:
 
     @property
     def varying(self) -> list[int]:
-        """Sizes of what varies."""
+        """Return the sizes of the varying arguments."""
         nx, n, m, _ = self.sizes
         return [n, m, len(self.varied), nx]
 
     @property
     def given(self) -> list[int]:
-        """Sizes of what is given."""
+        """Return the sizes of the given arguments."""
         nx, _, _, np_ = self.sizes
         return [nx, nx, 1, np_]
 
     def time(self, tick: Expr, p: Expr) -> Expr:
-        """[s] of a step by its number: the duration may be among the parameters."""
+        """Return the time [s] of a step by its number; a free duration is among the parameters."""
         return tick * self.rollout.parameters.step_length(self.rollout.problem.simulation, p)
 
     def shift(self, x: Expr, p: Expr, varied: Expr) -> Expr:
-        """(nx,) how a state moves with its joints, when p becomes what varies."""
+        """Return (nx,) the change of a state with its joints, when p takes the varied values."""
         slope = self.tangent.shift(x, p)
         return ca.mtimes(slope[:, self.varied.tolist()], varied - p[self.varied.tolist()]) if len(self.varied) else 0
 
-    def replaced(self, p: Expr, varied: Expr) -> Expr:
-        """P with the entries that vary."""
+    def with_varied(self, p: Expr, varied: Expr) -> Expr:
+        """Return p with its varying entries replaced."""
         if not len(self.varied):
             return p
         fixed = np.setdiff1d(np.arange(self.sizes[3]), self.varied)
@@ -81,10 +81,10 @@ class StepArguments:
 
 
 class TangentStepPlaces:
-    """Where a program keeps one step; see ``Places``."""
+    """The places of one step in a program; see ``Places``."""
 
     def __init__(self, arguments: StepArguments) -> None:
-        """Places for what varies, what is given and the smoothing, and for what comes of these."""
+        """Reserve the varying and given arguments, the smoothing, and the results."""
         self.rollout, self.layout = arguments.rollout, MemoryLayout()
         nx, np_, m = arguments.sizes[0], arguments.sizes[3], int(arguments.rollout.given.shape[0])
         self.varying = self.layout.take(sum(arguments.varying))
@@ -95,7 +95,7 @@ class TangentStepPlaces:
 
 
 def step_program(arguments: StepArguments, exact: bool, tangent: bool) -> Program:
-    """The program of one step, whose output is ``after``; with ``tangent`` also ``off``.
+    """Return the program of one step with the output ``after``, and with ``tangent`` also ``off``.
 
     Its vector is what varies and its parameters what is given, and the smoothing. d and e are 0 there, and the step
     begins at x to the last bit: only the slopes by d are those of retract. ``off`` (n,) has the slopes of how far the
@@ -121,29 +121,29 @@ def step_program(arguments: StepArguments, exact: bool, tangent: bool) -> Progra
 
 
 def _begun(arguments: StepArguments, tangent: bool) -> ca.Function:
-    """(varying, given) -> state, inputs, parameters, time and smoothing of the step."""
+    """Return (varying, given) -> state, inputs, parameters, time and smoothing of the step."""
     varying, given = ca.SX.sym("varying", sum(arguments.varying)), ca.SX.sym("given", sum(arguments.given) + 1)
     d, u, varied, e = parts(varying, arguments.varying)
     x, _, tick, p, smoothing = parts(given, [*arguments.given, 1])
     moved = ca.mtimes(arguments.tangent.basis(x, p), d) + e + arguments.shift(x, p, varied)
     start = x + moved if tangent else x
-    taken = arguments.replaced(p, varied)
+    taken = arguments.with_varied(p, varied)
     put = arguments.rollout.with_shares(u, tick)
     results = (start, put, taken, arguments.time(tick, taken), smoothing)
     return ca.Function("begun", [varying, given], [ca.densify(each) for each in results])
 
 
 def _off(arguments: StepArguments) -> ca.Function:
-    """(varying, given, after) -> how far ``after`` is from the state that is given."""
+    """Return (varying, given, after) -> the difference of ``after`` from the given state."""
     varying, given = ca.SX.sym("varying", sum(arguments.varying)), ca.SX.sym("given", sum(arguments.given) + 1)
     after = ca.SX.sym("after", arguments.sizes[0])
     varied, (_, aim, _, p, _) = parts(varying, arguments.varying)[2], parts(given, [*arguments.given, 1])
-    beside = after - aim - arguments.shift(aim, p, varied)
-    return ca.Function("off", [varying, given, after], [ca.mtimes(arguments.tangent.projection(aim, p), beside)])
+    difference = after - aim - arguments.shift(aim, p, varied)
+    return ca.Function("off", [varying, given, after], [ca.mtimes(arguments.tangent.projection(aim, p), difference)])
 
 
 def difference_program(tangent: Tangent) -> Program:
-    """The program of ``tangent.distance``: its vector is two states, its parameters are p, its output ``off`` (n,)."""
+    """Return the program of ``tangent.distance``: vector: two states, parameters: p, output: ``off`` (n,)."""
     layout, (nx, _, np_) = MemoryLayout(), (tangent.distance.size1_in(i) for i in range(3))
     states, p, off = layout.series(nx, 2), layout.take(np_), layout.take(tangent.size)
     call_of = FunctionCall(tangent.distance, (states.still(), states.later().still(), p), (off,))
@@ -152,21 +152,21 @@ def difference_program(tangent: Tangent) -> Program:
 
 
 def step_functions(arguments: StepArguments) -> tuple[ca.Function, ca.Function]:
-    """(varying, given with smoothing) -> after, and off: on casadi's virtual machine."""
+    """Return (varying, given with smoothing) -> after, and off, on casadi's virtual machine."""
     varying, given = ca.MX.sym("varying", sum(arguments.varying)), ca.MX.sym("given", sum(arguments.given) + 1)
     d, u, varied, e = parts(varying, arguments.varying)
     x, aim, tick, p, smoothing = parts(given, [*arguments.given, 1])
     closed, tangent = arguments.rollout.closed, arguments.tangent
-    time = arguments.time(tick, arguments.replaced(p, varied))
+    time = arguments.time(tick, arguments.with_varied(p, varied))
     u = arguments.rollout.with_shares(u, tick)
     put = u if arguments.rollout.feedback is None else ca.vertcat(u, time)
     starts = x, x + ca.mtimes(tangent.basis(x, p), d) + e + arguments.shift(x, p, varied)
-    first, moved = (call(closed, start, put, arguments.replaced(p, varied), smoothing)[0] for start in starts)
+    first, moved = (call(closed, start, put, arguments.with_varied(p, varied), smoothing)[0] for start in starts)
     off = ca.mtimes(tangent.projection(aim, p), moved - aim - arguments.shift(aim, p, varied))
     return ca.Function("step", [varying, given], [first]), ca.Function("off", [varying, given], [off])
 
 
 def parts(column: Expr, sizes: list[int]) -> list[Expr]:
-    """A column cut into parts of these sizes."""
+    """Split a column into parts of these sizes."""
     ends = np.cumsum([0, *sizes]).tolist()
     return [column[a:b] for a, b in pairwise(ends)]

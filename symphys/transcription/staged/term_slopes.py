@@ -1,4 +1,4 @@
-"""Slopes and curvature of terms, by tangents: expressions of what is not 0, and the blocks that their numbers fill."""
+"""First and second derivatives of terms in tangents: nonzero entries as expressions, and the blocks that they fill."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Blocks(NamedTuple):
 
 @dataclass(frozen=True)
 class Pattern:
-    """Where the nonzeros of a matrix go: into dense blocks of its columns that have any."""
+    """The places of a sparse matrix's nonzeros in dense blocks of its nonzero columns."""
 
     shape: tuple[int, int]
     rows: Ints
@@ -58,7 +58,7 @@ class Pattern:
         return Pattern((matrix.shape[0], len(kept)), rows, places.astype(np.int64), kept.astype(np.int64))
 
     def block(self, nonzeros: Array) -> Block:
-        """(T, nnz) -> the block."""
+        """Return the block of nonzeros (T, nnz)."""
         dense = np.zeros((len(nonzeros), *self.shape))
         dense[:, self.rows, self.places] = nonzeros
         return Block(dense, self.columns)
@@ -66,7 +66,7 @@ class Pattern:
 
 @dataclass(frozen=True, eq=False)
 class TermSlopes:
-    """What a compiled function gives of a term, and how its numbers become blocks.
+    """The compiled derivatives of a term, and the blocks of its numbers.
 
     Attributes:
         function: -> value, nonzeros of four slopes; of a cost or sum then its second derivative and the rows of the
@@ -86,11 +86,11 @@ class TermSlopes:
     acting: tuple[Ints, ...]
 
     def values(self, found: Sequence[Array]) -> tuple[Array, Blocks]:
-        """(T, r) values and their slopes."""
+        """Return values (T, r) and their slopes."""
         return found[0], Blocks(*(each.block(part) for each, part in zip(self.slopes, found[1:5], strict=True)))
 
     def curvature(self, found: Sequence[Array], sign: Array | float = 1.0) -> Blocks | None:
-        """Rows whose squares have the second derivative of ``sign`` (T,) times the value, made positive semidefinite.
+        """Return rows whose squares sum to the second derivative of ``sign`` (T,) times the value, made >= 0.
 
         None for a value that is linear.
         """
@@ -105,15 +105,17 @@ class TermSlopes:
 
 
 def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlopes]) -> TermSlopes:
-    """The slopes of a term; of a formula that looks at either side of a step they are built once, see ``known``."""
+    """Return the slopes of a term; terms of one formula before and after a step share them, see ``known``."""
     if term.key in known:
         shared = known[term.key]
         function = ReadingFunction(shared.function.function, shared.function.reads, term.after)
         return TermSlopes(function, shared.slopes, shared.curved, shared.parts, shared.bases, shared.acting)
+    # First derivatives in tangents; the second one where the term is no square.
     value, arguments = term.value, symbols.arguments[:4]
     slopes = tangent_slopes(symbols, value)
     second, acting = _second(value, arguments) if term.kind in ("cost", "sum") else (None, ())
     bases = [symbols.bases[i][acting[i].tolist(), :] if len(acting[i]) else ca.SX(0, 0) for i in (0, 1) if acting]
+    # All nonzeros as results of one function.
     results = [value, *(nonzeros(each) for each in slopes)]
     parts: tuple[slice, ...] = ()
     if second is not None:
@@ -133,25 +135,25 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
 
 
 def tangent_slopes(symbols: StageSymbols, value: Expr) -> list[Expr]:
-    """Sparse slopes of a value (r,) by the tangents of ``x`` and of ``first``, by inputs and by constants."""
+    """Return sparse slopes of a value (r,) by the tangents of ``x`` and ``first``, inputs and constants."""
     raw = [ca.sparsify(ca.jacobian(value, each)) for each in symbols.arguments[:4]]
-    moved = [_times(raw[i], symbols.bases[i]) if raw[i].nnz() else ca.SX(value.shape[0], 0) for i in (0, 1)]
+    moved = [_sparse_product(raw[i], symbols.bases[i]) if raw[i].nnz() else ca.SX(value.shape[0], 0) for i in (0, 1)]
     constants: Expr = raw[3]
     if symbols.shifts is not None:
         for slope, shift in zip(raw[:2], symbols.shifts, strict=True):
             more = symbols.constants.shape[0] - symbols.parameter_size
-            constants = constants + ca.horzcat(_times(slope, shift), ca.SX(value.shape[0], more))
+            constants = constants + ca.horzcat(_sparse_product(slope, shift), ca.SX(value.shape[0], more))
     return [*moved, raw[2], constants]
 
 
 def raw_slopes(symbols: StageSymbols, term: StageTerm) -> ReadingFunction:
-    """-> dense slopes of a term by the whole of ``x`` and of ``first``, one after the other."""
+    """Return a function to dense slopes of a term by all of ``x`` and of ``first``."""
     slopes = [ca.densify(ca.jacobian(term.value, each)) for each in symbols.arguments[:2]]
     return reading([ca.vec(each.T) for each in slopes], symbols.arguments, term.after)
 
 
 def square_roots(second: Array, components: Sequence[Ints]) -> Array:
-    """(T, a, a) rows whose squares sum to the positive part of symmetric matrices (T, a, a), component by component."""
+    """Return rows (T, a, a) whose squares sum to the positive part of symmetric matrices (T, a, a)."""
     rows = np.zeros_like(second)
     for each in components:
         if len(each) == 1:
@@ -177,7 +179,7 @@ def _components(pattern: Pattern) -> list[Ints]:
 
 
 def _second(value: Expr, arguments: Sequence[Expr]) -> tuple[Expr | None, tuple[Ints, ...]]:
-    """The second derivative of a number by the entries in which it is not linear, and which these are."""
+    """Return the second derivative of a number by the entries in which it is nonlinear, and these entries."""
     slopes = [ca.sparsify(ca.jacobian(value, each)) for each in arguments]
     used = [np.unique(np.array(each.sparsity().get_triplet()[1], np.int64)) for each in slopes]
     entries = ca.vertcat(ca.SX(0, 1), *(a[u.tolist()] for a, u in zip(arguments, used, strict=True) if len(u)))
@@ -192,8 +194,8 @@ def _second(value: Expr, arguments: Sequence[Expr]) -> tuple[Expr | None, tuple[
     return second[curved.tolist(), curved.tolist()], acting
 
 
-def _times(slope: Expr, matrix: Expr) -> Expr:
-    """Their product, of the columns that the first one has."""
+def _sparse_product(slope: Expr, matrix: Expr) -> Expr:
+    """Return the product, restricted to the nonzero columns of the first factor."""
     columns = np.unique(np.array(slope.sparsity().get_triplet()[1], np.int64)).tolist()
     return (
         ca.sparsify(ca.mtimes(slope[:, columns], matrix[columns, :]))
@@ -207,28 +209,28 @@ def nonzeros(matrix: Expr) -> Expr:
     return ca.vertcat(ca.SX(0, 1), *matrix.nonzeros())
 
 
-MOTIONS = 8
-"""Whose values are asked for at once, as a line search does with its step lengths."""
+MOTIONS_PER_CALL = 8
+"""Motions that are evaluated in one call, as the step lengths of a line search."""
 
 
 class _Group(NamedTuple):
-    """Numbers of terms that are evaluated at the same steps, and whether these are sums."""
+    """Terms that are evaluated at the same steps, and whether these are sums."""
 
     numbers: list[int]
     sums: bool
 
 
 class TermGroups:
-    """All terms, and their values and slopes at their steps.
+    """All terms, with their values and slopes at their steps.
 
     Attributes:
-        symbols: that they are expressions of.
+        symbols: the arguments of the terms.
         terms: costs, targets and constraints in the problem's order, then sums.
         clock: [steps] the time at which state 0 is.
     """
 
     def __init__(self, rollout: Rollout, tangent: Tangent, backend: str, threads: int | None) -> None:
-        """Find them; nothing is compiled before it is asked for."""
+        """Collect the terms; functions are compiled on demand."""
         self.clock = 0.0
         self.symbols = StageSymbols(rollout, tangent, motion_sums(rollout))
         self.terms = stage_terms(self.symbols)
@@ -239,7 +241,7 @@ class TermGroups:
         self._groups = [_Group(numbers, sums) for (_, sums), numbers in groups.items()]
 
     def values(self, X: Array, U: Array, constants: Array) -> list[tuple[StageTerm, Array]]:
-        """(B, N + 1, nx), (B, N, m), (B, c) -> (B, T, r) of each term but sums, in order."""
+        """Return (B, T, r) of each term but sums, from states (B, N + 1, nx), inputs (B, N, m), constants (B, c)."""
         found: dict[int, Array] = {}
         for group, functions in zip(self._groups, self._values, strict=True):
             if group.sums:
@@ -254,7 +256,7 @@ class TermGroups:
         return [(self.terms[number], found[number]) for number in sorted(found)]
 
     def summed(self, rows: StepRows) -> Array:
-        """(R, nx): the states after steps, whose sums are still those before, with what the steps add."""
+        """Return states (R, nx) after steps, whose sums are the previous ones plus those of the steps."""
         after = rows.after.copy()
         first = self.symbols.state_size
         for group, functions in zip(self._groups, self._values, strict=True):
@@ -268,24 +270,24 @@ class TermGroups:
         return after
 
     def slopes(self, rows: StepRows, kinds: frozenset[Kind]) -> Iterator[tuple[StageTerm, TermSlopes, list[Array]]]:
-        """Of the terms of some kinds, in order: what ``TermSlopes`` makes values and slopes of; a row a step."""
+        """Return the inputs of ``TermSlopes`` for terms of some kinds in order, a row for each step."""
         found: dict[int, list[Array]] = {}
         for numbers, functions in self._of_kinds(kinds):
             here = _rows(rows, self.terms[numbers[0]].steps)
             found.update(zip(numbers, functions(here), strict=True))
         return ((self.terms[number], self._slopes[number], found[number]) for number in sorted(found))
 
-    def beside(self, term: StageTerm, rows: StepRows) -> Array:
-        """(r, nx) the slopes of a term in step 0 by the state before it, number by number."""
+    def full_state_slopes(self, term: StageTerm, rows: StepRows) -> Array:
+        """Return (r, nx) slopes of a term in step 0 by all numbers of the state before it."""
         key = id(term)
-        if key not in self._beside:
-            self._beside[key] = StageFunctions([raw_slopes(self.symbols, term)], 1, "casadi", 1)
-        ((x, first),) = self._beside[key](_rows(rows, np.array([0])))
+        if key not in self._full_slope_functions:
+            self._full_slope_functions[key] = StageFunctions([raw_slopes(self.symbols, term)], 1, "casadi", 1)
+        ((x, first),) = self._full_slope_functions[key](_rows(rows, np.array([0])))
         found = first if term.after else x
         return found.reshape(term.size, -1)[:, : self.symbols.state_size]
 
     @cached_property
-    def _beside(self) -> dict[int, StageFunctions]:
+    def _full_slope_functions(self) -> dict[int, StageFunctions]:
         return {}
 
     @cached_property
@@ -295,11 +297,14 @@ class TermGroups:
         for term in self.terms:
             made = known.setdefault(term.key, reading([term.value], self.symbols.arguments, term.after))
             functions.append(ReadingFunction(made.function, made.reads, term.after))
-        return [self._together([functions[i] for i in group.numbers], group.numbers, MOTIONS) for group in self._groups]
+        return [
+            self._together([functions[i] for i in group.numbers], group.numbers, MOTIONS_PER_CALL)
+            for group in self._groups
+        ]
 
     @cached_property
     def _slopes(self) -> dict[int, TermSlopes]:
-        """By the number of a term, as they are asked for."""
+        """The slopes by the number of a term, computed on demand."""
         return {}
 
     @cached_property
@@ -308,7 +313,7 @@ class TermGroups:
 
     @cached_property
     def _sloped(self) -> dict[frozenset[Kind], list[tuple[list[int], StageFunctions]]]:
-        """By kinds of terms: numbers of terms at the same steps, and what evaluates them."""
+        """The functions by kinds of terms, with the numbers of terms at the same steps."""
         return {}
 
     def _of_kinds(self, kinds: frozenset[Kind]) -> list[tuple[list[int], StageFunctions]]:
@@ -321,12 +326,12 @@ class TermGroups:
         return self._sloped[kinds]
 
     def _together(self, functions: Sequence[ReadingFunction], numbers: list[int], motions: int) -> StageFunctions:
-        """Functions of terms at the same steps, for so many motions at once."""
+        """Return functions of terms at the same steps, for ``motions`` motions at once."""
         steps = motions * len(self.terms[numbers[0]].steps)
         return StageFunctions(functions, steps, self._backend, self._threads)
 
 
 def _rows(rows: StepRows, here: Any) -> StepRows:
-    """Some of them."""
+    """Select rows."""
     constants = rows.constants if len(rows.constants) == 1 else rows.constants[here]
     return StepRows(rows.before[here], rows.after[here], rows.u[here], constants, rows.ticks[here], rows.clock)

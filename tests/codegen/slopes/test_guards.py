@@ -41,7 +41,7 @@ def test_a_heap_is_that_of_all_calls_to_the_last_bit(name: str, tmp_path: Path, 
     made = Linearization(symbolic_rollout(problem), threads=1, exact=True)
     step = LinearizedStep(made.rollout, made.tangent, threads=1, exact=True, parameters=False)
     program = step_program(step.arguments, exact=True, tangent=True)
-    x0, u, p = made.begun(np.concatenate([variable.guess for variable in problem.variables]))
+    x0, u, p = made.start(np.concatenate([variable.guess for variable in problem.variables]))
     states = [x0]
     for k in range(20):
         states.append(made.step.step(k, states[-1][None], u[None, k], p, 0.0)[0])

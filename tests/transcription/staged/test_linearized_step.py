@@ -40,7 +40,7 @@ def chained(made: Linearization, z: np.ndarray, weights: np.ndarray, smoothing: 
     """(n,) the same from the slopes of the steps."""
     motion = made.motion(z, smoothing)
     slopes = made.linearize(motion)
-    p = made.begun(z)[2]
+    p = made.start(z)[2]
     basis, moved = (np.array(ca.DM(each(motion.x[-1], p))) for each in (made.tangent.basis, made.tangent.shift))
     adjoint, inputs = basis.T @ weights, np.zeros_like(motion.u)
     statics = np.array(ca.DM(made._start_slopes(z)[1])).T @ moved.T @ weights
@@ -123,9 +123,9 @@ def test_small_batches_are_prepared_once_and_differences_compiled() -> None:
     """Rows of small batches, again and again with other numbers, are those of large ones, and differences are right."""
     made = compiled("leg")
     motion = made.motion(guess_of(made.rollout.problem), 0.0)
-    _, u, p = made.begun(motion.z)
+    _, u, p = made.start(motion.z)
     large = made.step.step(np.arange(len(u)), motion.x[:-1], u, p, 0.0)
-    assert len(u) > linearized_step.FEW
+    assert len(u) > linearized_step.MAX_LENT_ROWS
     for first in (0, 3, 9):
         few = slice(first, first + 4)
         found = made.step.step(np.arange(first, first + 4), motion.x[few], u[few], p, 0.0)
@@ -141,7 +141,7 @@ def test_states_and_threads_do_not_change_each_others_numbers() -> None:
     motion = made[0].motion(guess_of(made[0].rollout.problem), 0.0)
     one, two = (each.linearize(motion) for each in made)
     assert np.array_equal(one.a, two.a) and np.array_equal(one.b, two.b)
-    _, u, p = made[0].begun(motion.z)
+    _, u, p = made[0].start(motion.z)
     few, _, _ = made[0].step.slopes(motion.x[:3], u[:3], p, 0.0)
     assert np.array_equal(few, one.a[:3])
 

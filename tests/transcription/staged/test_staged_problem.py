@@ -318,7 +318,7 @@ def test_compiled_terms_are_those_of_the_virtual_machine(
     case: tuple[str, int, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     transcription, staged, motion = made(*case)
-    monkeypatch.setattr(stage_functions, "COMPILED", 0)
+    monkeypatch.setattr(stage_functions, "MIN_COMPILED_OPERATIONS", 0)
     groups = TermGroups(transcription.rollout, Tangent(transcription.rollout), "simd", 1)
     monkeypatch.setattr(staged, "_groups", groups)
     Z, X, U = motion.z[None], motion.x[None], motion.u[None]

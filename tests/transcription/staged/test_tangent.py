@@ -25,7 +25,7 @@ def states_of(name: str, folder: Path) -> tuple[Tangent, np.ndarray, np.ndarray]
     problem = problem_of(name, folder)
     made = Linearization(symbolic_rollout(problem), "casadi")
     z = np.concatenate([np.zeros(0), *(variable.guess for variable in problem.variables)])
-    x0, u, p = made.begun(z)
+    x0, u, p = made.start(z)
     states = [x0]
     for k in range(min(STEPS, made.rollout.steps)):
         states.append(made.step.step(k, states[-1][None], u[None, k], p, 0.0)[0])

@@ -11,9 +11,9 @@ from tools.repeats import few
 
 import symphys
 from symphys.dynamics.observation import reading_function
-from symphys.transcription.feedback.state_reader import StateReader
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.staged.linearization import Linearization
+from symphys.transcription.state_reader import StateReader
 
 FAR = 20.0
 """[rad]: more than three turns."""
@@ -47,13 +47,13 @@ def test_tangents_go_through_whole_turns(joint: dict[str, Any]) -> None:
     """A state that is d away has an angle that is d more, and the difference of states of a rollout leads there."""
     problem = symphys.load(wheel(**joint))
     made = Linearization(symbolic_rollout(problem), "casadi")
-    tangent, p = made.tangent, made.begun(np.zeros(10))[2]
+    tangent, p = made.tangent, made.start(np.zeros(10))[2]
     read = reading_function(problem.world())
 
     def angle(x: np.ndarray) -> float:
         return float(ca.DM(read(x, p)[0]))
 
-    x0, u, _ = made.begun(np.full(10, 3.0))
+    x0, u, _ = made.start(np.full(10, 3.0))
     states = [x0]
     for k in range(10):
         states.append(made.step.step(k, states[-1][None], u[None, k], p, 0.0)[0])
@@ -71,7 +71,7 @@ def test_tangents_go_through_whole_turns(joint: dict[str, Any]) -> None:
 
 def test_measured_angles_count_turns() -> None:
     made = Linearization(symbolic_rollout(symphys.load(wheel())), "casadi")
-    x0, _, p = made.begun(np.zeros(10))
+    x0, _, p = made.start(np.zeros(10))
     reader = StateReader(made.tangent, p)
     for angle in (FAR, -FAR, 4.0):
         measured = reader({"axle.angle": angle, "axle.rate": 1.0}, x0)

@@ -1,11 +1,11 @@
-"""One step for batches of states and actions: values, and what adjoints become on their way back."""
+"""One step for batches of states and actions: values, and adjoints of the results."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -15,18 +15,225 @@ from symphys.codegen import KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS
 from symphys.codegen.backends.calls import row_by_row
 from symphys.codegen.backends.precision import warn
-from symphys.model.state_layout import GIVEN, Layout
-from symphys.problem import ALIVE, Cost, Problem, Target
+from symphys.errors import Issue, ProblemError, SymphysError
+from symphys.model.controllers import Net
+from symphys.model.joints import AffineMotor, Joint, Servo, TorqueMotor
+from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, inputs_size
+from symphys.model.world import World
+from symphys.problem import ALIVE, Cost, FeedbackController, Problem, Target, Variable
+from symphys.suggest import hint, quote
 from symphys.transcription.decision_variables import start_of
-from symphys.transcription.open_step.opening import Opening, opened
-from symphys.transcription.randomization.sampler import Sampler
+from symphys.transcription.formula_names import input_names
 from symphys.transcription.rollout import Rollout, symbolic_rollout
+from symphys.transcription.sampler import Sampler
 from symphys.transcription.stage import BatchStep, Stage, Value, sense_function
 from symphys.types import Array, Expr
 
 
-def looks_at_variables(problem: Problem) -> bool:
-    """Whether a cost or target has a variable in its formula."""
+@dataclass(frozen=True)
+class Action:
+    """One number of an action: the input that it is added to, times ``scale``, and its bounds."""
+
+    input: str
+    component: int
+    scale: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class ExternalControlProblem:
+    """A problem whose commands are external actions.
+
+    Attributes:
+        problem: without the controllers and variables whose place the actions take.
+        acting: the actions.
+        sensors: names of the sensors that are observed; empty: the states of all bodies are.
+    """
+
+    problem: Problem
+    acting: tuple[Action, ...]
+    sensors: tuple[str, ...]
+
+    def names(self) -> tuple[str, ...]:
+        """Return the input and component that each action adds to: ``knee.command``, ``ball.force[2]``."""
+        sizes = input_sizes(self.problem.world())
+        return tuple(a.input if sizes[a.input] == 1 else f"{a.input}[{a.component}]" for a in self.acting)
+
+    def bounds(self, end: Literal["lower", "upper"]) -> Array:
+        """Return bounds (m,) of the actions; may be infinite."""
+        return np.array([getattr(action, end) for action in self.acting], float)
+
+    def inputs(self, problem: Problem) -> tuple[str, ...]:
+        """Return the inputs that u stacks: those of the problem, and those that actions add to."""
+        return tuple(dict.fromkeys([*input_names(problem), *(action.input for action in self.acting)]))
+
+    def place(self, world: World, inputs: Sequence[str]) -> Array:
+        """Return (nu, m) the share of each action in u, which stacks ``inputs``."""
+        columns = input_columns(world, inputs)
+        place = np.zeros((inputs_size(world, inputs), len(self.acting)))
+        for k, action in enumerate(self.acting):
+            place[columns[action.input].start + action.component, k] = action.scale
+        return place
+
+
+def opened(
+    problem: Problem, controllers: Sequence[str] | None = None, sensors: Sequence[str] | None = None
+) -> ExternalControlProblem:
+    """Replace controllers of a problem by external actions.
+
+    Args:
+        problem: any.
+        controllers: names of those whose outputs become actions. None: those whose numbers a variable sets, or else
+            all; without any, the inputs that variables set over time; without these, the commands of all motors.
+        sensors: names of those that are observed. None: those that the controllers sense, or else all.
+
+    Raises:
+        SymphysError: there is no such controller or sensor, or nothing that could act.
+        ProblemError: a formula looks at the numbers of a controller that is taken off.
+    """
+    taken = chosen(problem, controllers)
+    names = {name for controller in taken for name in controller.weights}
+    dropped = [variable for variable in problem.variables if any(slot.name in names for slot in variable.slots)]
+    actions = [action for controller in taken for action in outputs(controller)]
+    if not taken:
+        dropped = [variable for variable in problem.variables if variable.kind == "control"]
+        actions = [action for variable in dropped for action in knots(variable)] or commands(problem)
+    if not actions:
+        text = "nothing can act: it has no controller, no motor, and no variable that sets an input over time"
+        raise SymphysError(f"{problem.name}: {text}")
+    if problem.free_duration:
+        text = "a variable sets the duration, and a single step has a length of its own; leave that variable out"
+        raise SymphysError(f"{problem.name}: {text}")
+    refuse_motion_parts(problem)
+    refuse_formulas(problem, {**dict.fromkeys(names, "nothing else"), **{v.name: slots(v) for v in dropped}})
+    rest = replace(
+        problem,
+        variables=tuple(variable for variable in problem.variables if variable not in dropped),
+        controllers=tuple(controller for controller in problem.controllers if controller not in taken),
+    )
+    return ExternalControlProblem(rest, tuple(actions), observed(problem, taken, sensors))
+
+
+def chosen(problem: Problem, names: Sequence[str] | None) -> tuple[FeedbackController, ...]:
+    """Return the controllers that are removed."""
+    known = {controller.name: controller for controller in problem.controllers}
+    if names is None:
+        varied = {slot.name for variable in problem.variables for slot in variable.slots}
+        learning = tuple(each for each in known.values() if not varied.isdisjoint(each.weights))
+        return learning or tuple(known.values())
+    return tuple(known[known_name(name, known, "controller")] for name in names)
+
+
+def observed(problem: Problem, taken: Sequence[FeedbackController], names: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the observed sensors."""
+    known = [sensor.name for sensor in problem.sensors]
+    if names is not None:
+        return tuple(known_name(name, known, "sensor") for name in names)
+    return tuple(dict.fromkeys(name for controller in taken for name in controller.senses)) or tuple(known)
+
+
+def known_name(name: str, known: Sequence[str] | dict[str, FeedbackController], kind: str) -> str:
+    """Return the name; SymphysError if it is unknown."""
+    if name not in known:
+        there = hint(name, known) if known else "there is none"
+        raise SymphysError(f"no {kind} is called {quote(name)}; {there}")
+    return name
+
+
+def outputs(controller: FeedbackController) -> list[Action]:
+    """Return the unscaled outputs of a controller as actions."""
+    law = controller.law
+    most = 1.0 if isinstance(law, Net) and law.output == "tanh" and not law.skip else np.inf
+    return [
+        Action(name, component, float(scale), -most, most)
+        for (name, component), scale in zip(controller.drives, controller.scale, strict=True)
+    ]
+
+
+def knots(variable: Variable) -> list[Action]:
+    """Return the inputs that a variable sets over time as actions, with the widest bounds of its knots."""
+    count = variable.components
+    lower, upper = variable.lower.reshape(-1, count).min(axis=0), variable.upper.reshape(-1, count).max(axis=0)
+    return [
+        Action(slot.name, component, 1.0, float(lower[k]), float(upper[k]))
+        for slot in variable.slots
+        for k, component in enumerate(slot.components)
+    ]
+
+
+def commands(problem: Problem) -> list[Action]:
+    """Return the commands of all motors as actions."""
+    found = []
+    for joint in problem.world().joints:
+        if joint.motor is not None:
+            for k in range(len(joint.kind.coordinates)):
+                found.append(Action(f"{joint.name}.command", k, 1.0, *reach(joint, k)))
+    return found
+
+
+def reach(joint: Joint, k: int) -> tuple[float, float]:
+    """Return the bounds of a command: the joint limits for a servo, else the largest torque or velocity."""
+    motor = joint.motor
+    if isinstance(motor, Servo):
+        widest = np.pi if joint.kind.coordinates[k].turns else np.inf
+        widest = widest if motor.range is None else float(motor.range)
+        lower, upper = joint.limits.lower, joint.limits.upper
+        return -widest if lower is None else float(lower), widest if upper is None else float(upper)
+    assert motor is not None, "a joint without a motor has no commands"
+    if isinstance(motor, AffineMotor):
+        return motor.command_range or (-np.inf, np.inf)
+    most = float(motor.torque if isinstance(motor, TorqueMotor) else motor.velocity)
+    return -most, most
+
+
+def slots(variable: Variable) -> str:
+    """Return the quantities that a variable sets, as formulas name them."""
+    return " or ".join(slot.name for slot in variable.slots)
+
+
+def refuse_motion_parts(problem: Problem) -> None:
+    """Raise ProblemError if a cost or target depends on the whole motion."""
+    issues = [
+        Issue(f'{kind} "{each.name}"', f"{each.formula.parts[0].name} is of a whole motion, and this is a single step")
+        for kind, every in (("cost", problem.costs), ("target", problem.targets))
+        for each in every
+        if each.formula.parts
+    ]
+    issues += [
+        Issue(f'cost "{cost.name}".during', f"{quote(cost.during.name)} is a phase of a whole motion; this is one step")
+        for cost in problem.costs
+        if cost.during is not None
+    ]
+    issues += [
+        Issue(f'phase "{phase.name}".sets', "holds in a phase of a whole motion; this is one step")
+        for phase in problem.phases
+        if phase.sets
+    ]
+    issues += [
+        Issue(f'force "{law.name}".during', "is a phase of a whole motion; this is one step")
+        for law in problem.forces
+        if law.during is not None
+    ]
+    if issues:
+        raise ProblemError(problem.file, issues)
+
+
+def refuse_formulas(problem: Problem, taken: Mapping[str, str]) -> None:
+    """Raise ProblemError if a cost or target reads a removed name; the values say what to read instead."""
+    issues = [
+        Issue(f'{kind} "{each.name}"', f"looks at {name}, whose place the actions take; it may look at {instead}")
+        for kind, every in (("cost", problem.costs), ("target", problem.targets))
+        for each in every
+        for name, instead in taken.items()
+        if name in each.formula.needed
+    ]
+    if issues:
+        raise ProblemError(problem.file, issues)
+
+
+def reads_variables(problem: Problem) -> bool:
+    """Whether the formula of a cost or target reads a variable."""
     names = {variable.name for variable in problem.variables}
     return any(not names.isdisjoint(each.formula.names) for each in asked(problem))
 
@@ -37,7 +244,7 @@ def asked(problem: Problem) -> list[Cost | Target]:
 
 
 def moments(problem: Problem) -> tuple[int, ...]:
-    """The steps, by number, in which something is asked for at one instant: at their starts, in the last at its end."""
+    """Return the numbers of the steps with a cost at one instant: at their start, in the last step at its end."""
     last = problem.simulation.steps
     instants = {each.at for each in asked(problem) if each.at != "always"}
     return tuple(sorted({last if isinstance(at, str) else round(at / problem.simulation.dt) for at in instants}))
@@ -66,21 +273,21 @@ def costs(rollout: Rollout, value: Value) -> tuple[Expr, Expr]:
 
 
 def size(value: Expr, squares: bool) -> Expr:
-    """A cost of a value: its square, or itself."""
+    """Return the cost of a value: its square, or itself."""
     return ca.sumsqr(value) if squares else value
 
 
 def open_stage(rollout: Rollout, sensors: Sequence[str]) -> Stage:
-    """A step with the costs ``running`` and ``moments``; see ``costs``."""
+    """Return a stage with the costs ``running`` and ``moments``; see ``costs``."""
 
     def ask(value: Value) -> dict[str, Expr]:
         return dict(zip(("running", "moments"), costs(rollout, value), strict=True))
 
-    return Stage(rollout, observe_function(rollout, sensors), ask, looks_at_variables(rollout.problem))
+    return Stage(rollout, observe_function(rollout, sensors), ask, reads_variables(rollout.problem))
 
 
 def observe_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
-    """(x, p, time) -> what these sensors read; without any, the states of all bodies."""
+    """Return (x, p, time) -> the readings of these sensors; without any, the states of all bodies."""
     if sensors:
         return sense_function(rollout, sensors)
     x, p, time = ca.SX.sym("x", rollout.x0.shape[0]), ca.SX.sym("p", rollout.p.shape[0]), ca.SX.sym("time")
@@ -89,13 +296,13 @@ def observe_function(rollout: Rollout, sensors: Sequence[str]) -> ca.Function:
 
 
 def body_columns(rollout: Rollout) -> list[tuple[str, slice]]:
-    """Name and columns of the state of each body."""
+    """Return name and columns of the state of each body."""
     layout = Layout(rollout.world)
     return [(f"{body.name}.{key}", layout[f"{body.name}.{key}"]) for body in rollout.world.bodies for key in GIVEN]
 
 
 class StepStart(NamedTuple):
-    """Where motions begin: ``state`` (B, s), ``observation`` (B, o), and the ``inputs`` (B, N, i) of all steps.
+    """The start of motions: ``state`` (B, s), ``observation`` (B, o), and the ``inputs`` (B, N, i) of all steps.
 
     Arrays of numpy, or of the library that they were asked of.
     """
@@ -106,7 +313,7 @@ class StepStart(NamedTuple):
 
 
 class StepResult(NamedTuple):
-    """What a step gives: ``state`` (B, s) and ``observation`` (B, o) after it, and its ``cost`` (B,)."""
+    """The results of a step: ``state`` (B, s) and ``observation`` (B, o) after it, and its ``cost`` (B,)."""
 
     state: Array
     observation: Array
@@ -122,11 +329,11 @@ class CompiledStep:
     objective of the problem; its constraints are no part of them.
 
     Attributes:
-        problem: that was opened, without the controllers whose place the actions take.
-        actions: what each action adds to, such as ``knee.command``.
+        problem: the opened problem, without the controllers whose place the actions take.
+        actions: the input of each action, such as ``knee.command``.
         lower, upper: (m,) bounds of the actions, which are not enforced; may be infinite.
         smoothing: of the contacts [m/s].
-        backend: what evaluates, in words.
+        backend: description of the evaluator.
     """
 
     problem: Problem
@@ -135,7 +342,7 @@ class CompiledStep:
     upper: Array
     smoothing: float
     backend: str
-    _opening: Opening
+    _opening: ExternalControlProblem
     _place: Array
     _rollout: Rollout
     _sampler: Sampler | None
@@ -143,22 +350,22 @@ class CompiledStep:
 
     @property
     def state_size(self) -> int:
-        """Numbers in a state."""
+        """The number of entries of a state."""
         return sum(self._sizes)
 
     @property
     def action_size(self) -> int:
-        """Numbers in an action."""
+        """The number of entries of an action."""
         return len(self.actions)
 
     @property
     def input_size(self) -> int:
-        """Numbers that act on the world in a step: forces, torques and commands, in all."""
+        """The number of forces, torques and commands that act on the world in a step."""
         return len(self._place)
 
     @cached_property
     def observation_size(self) -> int:
-        """Numbers in an observation."""
+        """The number of entries of an observation."""
         return int(self._start.size1_out(3))
 
     @cached_property
@@ -176,7 +383,7 @@ class CompiledStep:
 
     @property
     def steps(self) -> int:
-        """N, in the duration of the problem."""
+        """The number of steps N in the duration of the problem."""
         return self._rollout.steps
 
     def start(self, count: int = 1, seed: int | None = None) -> StepStart:
@@ -194,7 +401,8 @@ class CompiledStep:
         else:
             drawn = self._sampler.draw(np.random.default_rng(seed), count, 1.0)
             rows = [np.concatenate([guess, row]) for row in drawn]
-        return self.start_at(rows) if len(rows) == count else StepStart(*(tiled(p, count) for p in self.start_at(rows)))
+        start = self.start_at(rows)
+        return start if len(rows) == count else StepStart(*(np.repeat(part, count, axis=0) for part in start))
 
     def start_at(self, rows: Sequence[Array]) -> StepStart:
         """Return the initial states for values of all variables, one row each."""
@@ -234,7 +442,7 @@ class CompiledStep:
         cost: ArrayLike,
         inputs: ArrayLike | None = None,
     ) -> tuple[Array, Array, Array]:
-        """Adjoints (B, s) of the state, (B, m) of the action and (B, i) of the inputs, from those of what a step gives.
+        """Return adjoints of state (B, s), action (B, m) and inputs (B, i), from those of the results of a step.
 
         Args:
             state: (B, s), and the others as the step was called.
@@ -266,7 +474,7 @@ class CompiledStep:
         return back, u @ self._place, u
 
     def rest(self, state: ArrayLike) -> Array:
-        """(B,) what all steps that are left cost motions that are over, in which nothing moves any more."""
+        """Return (B,) the cost of all remaining steps of motions that are over."""
         states = np.array(matrix("state", state, self.state_size))
         still, special = np.zeros((len(states), self.action_size)), self._instants
         ticks, total = self._ticks(states), np.zeros(len(states))
@@ -280,7 +488,7 @@ class CompiledStep:
         return total
 
     def alive(self, state: ArrayLike) -> NDArray[np.bool_]:
-        """(B,) whether a motion is not over by the problem's [termination]."""
+        """Return (B,) whether motions are not over by the problem's [termination]."""
         states = matrix("state", state, self.state_size)
         memory = self._rollout.memory
         if not memory.terminates:
@@ -288,24 +496,24 @@ class CompiledStep:
         return np.asarray(states[:, memory.columns[ALIVE].start] > 0)
 
     def tick(self, state: ArrayLike) -> NDArray[np.int64]:
-        """(B,) how many steps lie behind a state."""
+        """Return (B,) the number of steps before a state."""
         return self._ticks(matrix("state", state, self.state_size))
 
     def _ticks(self, states: Array) -> NDArray[np.int64]:
         return np.rint(states[:, self._clock] / self._rollout.dt).astype(np.int64)
 
     def _now(self, states: Array) -> NDArray[np.bool_]:
-        """(B, moments): which instants fall into the step from here."""
+        """Return (B, moments) which instants fall into the step from here."""
         wanted = [min(tick, self.steps - 1) for tick in moments(self.problem)]
         return np.equal(self._ticks(states)[:, None], np.array(wanted, np.int64).reshape(1, -1))
 
     @cached_property
     def _instants(self) -> list[int]:
-        """The steps, by number, into which an instant falls."""
+        """The numbers of the steps with an instant."""
         return sorted({min(tick, self.steps - 1) for tick in moments(self.problem)})
 
     def _rows(self, states: Array, actions: Array, inputs: ArrayLike | None) -> Array:
-        """(B, m) of the kernel."""
+        """Return the rows (B, m) of the kernel."""
         nx, np_, count = self._sizes[0], self._sizes[1], len(states)
         if len(actions) != count:
             raise ValueError(f"{count} states and {len(actions)} actions: give one for each")
@@ -323,7 +531,7 @@ class CompiledStep:
     def _sizes(self) -> tuple[int, int, int, int]:
         """Return the columns of x, p, time and z in a state."""
         rollout = self._rollout
-        n = int(rollout.z.shape[0]) if looks_at_variables(self.problem) else 0
+        n = int(rollout.z.shape[0]) if reads_variables(self.problem) else 0
         return int(rollout.x0.shape[0]), int(rollout.p.shape[0]), 1, n
 
     @property
@@ -333,12 +541,12 @@ class CompiledStep:
 
     @cached_property
     def _nominal(self) -> Array:
-        """(N, i) what acts besides, as the guess has it."""
+        """The other inputs (N, i), those of the guess."""
         return np.asarray(self.start().inputs[0])
 
     @cached_property
     def _start(self) -> ca.Function:
-        """(z) -> x0, the inputs of all steps one after the other, p, what is observed."""
+        """(z) -> x0, the inputs of all steps in order, p, the observation."""
         rollout = self._rollout
         start = start_of(rollout.problem, rollout.world, rollout.inputs, rollout.parameters, rollout.z)
         x0 = rollout.memory.start(start.x0)
@@ -355,7 +563,7 @@ def compile_open_step(
     backend: str = BEST,
     threads: int | None = None,
 ) -> CompiledStep:
-    """The step of a problem whose commands are actions; see ``symphys.compile_step``."""
+    """Compile the step of a problem whose commands are actions; see ``symphys.compile_step``."""
     opening = opened(problem, controllers, sensors)
     sampler = None if opening.problem.scenarios is None else Sampler(opening.problem)
     whole = opening.problem if sampler is None else sampler.problem
@@ -378,7 +586,9 @@ def compile_open_step(
     )
 
 
-def evaluated_by(rollout: Rollout, opening: Opening, exact: bool, backend: str, threads: int) -> tuple[BatchStep, str]:
+def evaluated_by(
+    rollout: Rollout, opening: ExternalControlProblem, exact: bool, backend: str, threads: int
+) -> tuple[BatchStep, str]:
     """Choose a kernel, or casadi's virtual machine without a compiler, and describe the choice."""
     note, stage = "", open_stage(rollout, opening.sensors)
     if backend in PRECISIONS:
@@ -392,13 +602,8 @@ def evaluated_by(rollout: Rollout, opening: Opening, exact: bool, backend: str, 
 
 
 def matrix(name: str, value: ArrayLike, columns: int) -> Array:
-    """(B, columns); ValueError, which names the shape that fits."""
+    """Return (B, columns); ValueError names the shape that fits."""
     array = np.asarray(value, float)
     if array.ndim != 2 or array.shape[1] != columns:
         raise ValueError(f"{name} must be (batch, {columns}), not {array.shape}")
     return array
-
-
-def tiled(row: Array, count: int) -> Array:
-    """One row, as often as that."""
-    return np.repeat(row, count, axis=0)

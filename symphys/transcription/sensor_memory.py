@@ -1,4 +1,4 @@
-"""What sensors need to know of the step before: inputs and parts of the state, stored behind the world's state."""
+"""The memory of sensors: inputs and parts of the state of the previous step, stored after the world's state."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class SensorMemory:
     """Columns after those of the world's state (``Layout``).
 
     Attributes:
-        world: what is simulated.
+        world: the simulated world.
         inputs: names of the inputs that are remembered.
         states: names of the parts of the state that are remembered, such as ``torso.velocity``.
         terminates: whether the last column is ``alive``: 1 until the termination, 0 from then on; ``after`` omits it.
@@ -51,14 +51,14 @@ class SensorMemory:
         return max((part.stop for part in self.columns.values()), default=Layout(self.world).size)
 
     def start(self, x: Expr) -> Expr:
-        """The whole state at t = 0, when no command has been given and nothing has been accelerated."""
+        """Return the whole state at t = 0, before any command and with zero accelerations."""
         layout = Layout(self.world)
         commands = [type(x).zeros(input_sizes(self.world)[name]) for name in self.inputs]
         states = [x[layout[name]] for name in self.states]
         return ca.vertcat(x, *commands, *states, *([type(x)(1)] if self.terminates else []))
 
     def after(self, x: Expr, u: Expr, inputs: Sequence[str]) -> Expr:
-        """(memory,) what is remembered of a step from state x with the inputs u, which stacks ``inputs``."""
+        """Return (memory,) for a step from state x with the inputs u, which stacks ``inputs``."""
         layout, columns = Layout(self.world), input_columns(self.world, inputs)
         sizes = input_sizes(self.world)
         given = [u[columns[name]] if name in columns else type(x).zeros(sizes[name]) for name in self.inputs]

@@ -17,15 +17,15 @@ from symphys.suggest import hint, quote
 from symphys.transcription.staged.tangent import Tangent
 from symphys.types import Array
 
-UNIT = 1e-3
-"""How far the length of a measured quaternion may be from 1."""
+MAX_NORM_ERROR = 1e-3
+"""Largest deviation of the length of a measured quaternion from 1."""
 
 
 class StateReader:
-    """Turns what is measured into states.
+    """Converts measurements to states.
 
     Attributes:
-        sizes: what a state by name must have, and how many numbers each is: ``shoulder.angle`` and ``shoulder.rate``,
+        sizes: the names of a state by name with their numbers of entries: ``shoulder.angle`` and ``shoulder.rate``,
             ``rail.position``; of a body that floats ``torso.position`` [m], ``torso.orientation`` (w, x, y, z),
             ``torso.velocity`` [m/s], ``torso.angular_velocity`` [rad/s], world frame. Angles count whole turns.
         floating: names of the bodies that float.
@@ -61,7 +61,7 @@ class StateReader:
         self._unnamed = [joint for joint in balls if joint not in known]
 
     def __call__(self, state: ArrayLike | Mapping[str, ArrayLike], expected: Array) -> Array:
-        """(nx,) the state.
+        """Return the state (nx,).
 
         Args:
             state: (nx,) as this engine has it, or numbers by the names of ``sizes``.
@@ -88,7 +88,7 @@ class StateReader:
         return found | {name: world[self._layout[name]] for name in self.sizes if name not in found}
 
     def noisy(self, x: Array, noise: float, rate_noise: float, rng: np.random.Generator) -> Array:
-        """The state (nx,) with noise on coordinates and positions, and on rates and velocities."""
+        """Return the state (nx,) with noise on coordinates and positions, and on rates and velocities."""
         off = np.zeros(self._tangent.size)
         for k, name in enumerate(self._tangent.names):
             field = name.rpartition(".")[2].partition("[")[0]
@@ -120,12 +120,12 @@ class StateReader:
         return np.asarray(self._tangent.retract(expected[None], off[None], self._nominal)[0])
 
     def _float(self, body: str, given: Mapping[str, Array], world: Array, off: Array) -> None:
-        """The part of the tangent that leads a body to where it floats."""
+        """Return the part of the tangent that moves a floating body to its measured pose."""
         for field in ("position", "velocity", "angular_velocity"):
             first = self._at[f"{body}.{field}[0]"]
             off[first : first + 3] = given[f"{body}.{field}"] - world[self._layout[f"{body}.{field}"]]
         wanted = given[f"{body}.orientation"]
-        if abs(np.linalg.norm(wanted) - 1) > UNIT:
+        if abs(np.linalg.norm(wanted) - 1) > MAX_NORM_ERROR:
             raise SymphysError(f"{body}.orientation: {wanted.tolist()} is no unit quaternion w, x, y, z")
         turn, old = self._at[f"{body}.turn[0]"], ca.DM(world[self._layout[f"{body}.orientation"]])
         unit = ca.DM(wanted / np.linalg.norm(wanted))

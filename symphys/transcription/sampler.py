@@ -1,4 +1,4 @@
-"""Samples of scenarios: the numbers that differ between samples, or between problems of a sweep, one row each."""
+"""Samplers of scenarios: the numbers that differ between samples, or between problems of a sweep, one row each."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 
 State = dict[str, Array]
-"""By name, (count, k) each."""
+"""Quantities by name, (count, k) each."""
 
 
 class PoseSampler:
-    """The draws of one table: turned as a whole, joint by joint, then lifted until nothing overlaps."""
+    """Random poses of one table: a rotation of the whole robot, joint by joint, then a lift out of overlaps."""
 
     def __init__(self, problem: Problem, posed: RandomizedPose) -> None:
-        """Find what hangs on each joint, and what stands still below the robot."""
+        """Find the bodies that each joint carries, and the static surfaces below the robot."""
         self.posed, self.problem, self.world = posed, problem, problem.world()
         self.names = [f"{body}.{field}" for body in posed.bodies for field in GIVEN]
         initial = problem.initial
@@ -47,7 +47,7 @@ class PoseSampler:
         self.gaps = ca.Function("gaps", [ca.vertcat(*symbols.values())], [ca.vertcat(0, *(gaps[k] for k in below))])
 
     def draw(self, rng: np.random.Generator, count: int, width: float) -> Array:
-        """(count, numbers of the variables)."""
+        """Draw (count, numbers of the variables)."""
         posed = self.posed
         state = {name: np.tile(value, (count, 1)) for name, value in self.problem.initial.items()}
         turn_all(posed.bodies, width * posed.tilt * rng.uniform(-1, 1, (count, 3)), state)
@@ -62,21 +62,21 @@ class PoseSampler:
 
     @property
     def up(self) -> Array:
-        """(3,) against gravity; zero without any."""
+        """Return the direction (3,) against gravity; zero without gravity."""
         gravity = np.array(self.world.gravity, float)
         return -gravity / max(float(np.linalg.norm(gravity)), 1e-12)
 
     def overlap(self, state: State) -> Array:
-        """(count,) [m] how deep the robot is in what stands still."""
+        """Return (count,) [m] the overlap of the robot with static surfaces."""
         gaps = np.array(self.gaps(np.concatenate(list(state.values()), axis=1).T))
         return np.asarray(-gaps.min(axis=0))
 
 
 class SampledHinge:
-    """A joint with all that its first body carries."""
+    """A joint with all bodies that its first side carries."""
 
     def __init__(self, joint: ParametricJoint, moved: list[str], initial: State) -> None:
-        """Axis and pivot in the frame of the body that stays."""
+        """Compute axis and pivot in the frame of the second side."""
         assert joint.second is not None, "a robot hangs on nothing"
         self.base, self.moved = joint.second, moved
         placed, pivot = placed_frames(joint, initial)
@@ -86,19 +86,19 @@ class SampledHinge:
         self.pivot = still.apply(pivot - initial[f"{self.base}.position"])
 
     def bend(self, angles: Array, state: State) -> None:
-        """Turn the joint by angles (count,) [rad], in place."""
+        """Rotate the joint by angles (count,) [rad], in place."""
         lies = rotations(state[f"{self.base}.orientation"])
         pivot = state[f"{self.base}.position"] + lies.apply(self.pivot)
         turn(self.moved, pivot, angles[:, None] * lies.apply(self.axis), state)
 
 
 def turn_all(bodies: tuple[str, ...], vectors: Array, state: State) -> None:
-    """Turn a robot about the centre of its first body by rotation vectors (count, 3), in place."""
+    """Rotate a robot about the centre of its first body by rotation vectors (count, 3), in place."""
     turn(list(bodies), state[f"{bodies[0]}.position"].copy(), vectors, state)
 
 
 def turn(bodies: list[str], pivot: Array, vectors: Array, state: State) -> None:
-    """Turn bodies about points (count, 3), in place."""
+    """Rotate bodies about points (count, 3), in place."""
     from scipy.spatial.transform import Rotation  # late: most problems need none of scipy
 
     by = Rotation.from_rotvec(vectors)
@@ -114,15 +114,15 @@ def rotations(q: Array) -> Rotation:
     return Rotation.from_quat(np.roll(q, -1, axis=-1))
 
 
-LEAST = 0.05
-"""Of a factor, however wide the draws are made."""
+MIN_FACTOR = 0.05
+"""Least value of a random factor, however wide the draws are."""
 
 
 class QuantitySampler:
-    """The draws of one table."""
+    """Random quantities of one table."""
 
     def __init__(self, problem: Problem, varied: RandomizedQuantity) -> None:
-        """Look up what the numbers are without it."""
+        """Look up the nominal values."""
         self.varied, self.steps = varied, problem.simulation.steps
         self.lasts = max(1, round(varied.lasts / problem.simulation.dt)) if varied.lasts else self.steps
         values = {**problem.initial, **problem.parametric.starts(), **problem.parameters, **problem.weights}
@@ -138,10 +138,10 @@ class QuantitySampler:
         self.shape = (len(varied.slots), size)
 
     def draw(self, rng: np.random.Generator, count: int, width: float) -> Array:
-        """(count, numbers of the variables)."""
+        """Draw (count, numbers of the variables)."""
         varied, (slots, size) = self.varied, self.shape
         drawn = width * rng.uniform(-1, 1, (count, 1, 1) if varied.alike else (count, slots, size))
-        factor = np.maximum(1 + varied.factor * drawn, LEAST)
+        factor = np.maximum(1 + varied.factor * drawn, MIN_FACTOR)
         values = np.clip(self.base * factor + varied.shift * drawn, varied.lower, varied.upper)
         values = np.broadcast_to(values, (count, slots, size))
         if varied.kind != "control":
@@ -149,20 +149,20 @@ class QuantitySampler:
         return (values[:, :, None] * self.acting(rng, count)[:, None, :, None]).reshape(count, -1)
 
     def acting(self, rng: np.random.Generator, count: int) -> Array:
-        """(count, steps) 1 in the steps in which an input acts."""
+        """Draw (count, steps): 1 in the steps in which an input acts."""
         first = np.floor(rng.uniform(0, 1, count) * (self.steps - self.lasts + 1))
         step = np.arange(self.steps)
         return ((step >= first[:, None]) & (step < first[:, None] + self.lasts)).astype(float)
 
 
 def hidden(name: str, kind: str, slot: VariableSlot, guess: Array, knots: int = 1) -> Variable:
-    """A variable that no solver sees."""
+    """Return a variable that no solver sees."""
     none, one = np.full(guess.size, np.inf), np.ones(guess.size)
     return Variable(name, kind, (slot,), knots, "constant", guess, -none, none, one, 0 * one)  # type: ignore[arg-type]
 
 
 def swept_inputs(problem: Problem) -> tuple[Variable, ...]:
-    """A variable for each parameter in which the problems of its sweep differ, and that no variable of its own sets."""
+    """Return a variable for each parameter that differs in a sweep and that no variable sets."""
     own = {slot.name for variable in problem.variables for slot in variable.slots}
     values = {name: problem.parameters[name] for name in swept_parameters(problem) if name not in own}
     return tuple(
@@ -172,7 +172,7 @@ def swept_inputs(problem: Problem) -> tuple[Variable, ...]:
 
 
 class Sampler:
-    """Samples of a problem's scenarios, on one grid of time.
+    """Samples of a problem's scenarios on one time grid.
 
     Attributes:
         problem: with a variable for all that differs, behind its own.
@@ -180,7 +180,7 @@ class Sampler:
     """
 
     def __init__(self, problem: Problem) -> None:
-        """Collect the quantities and poses that differ."""
+        """Collect the varied quantities and poses."""
         scenarios = problem.scenarios
         assert scenarios is not None, "nothing differs"
         self._parts: list[QuantitySampler | PoseSampler] = [
@@ -192,7 +192,7 @@ class Sampler:
         self.nominal = np.concatenate([np.zeros(0), *(variable.guess for variable in own)])
 
     def draw(self, rng: np.random.Generator, count: int, width: float) -> Array:
-        """(count, s): the first as the file has it, the others drawn ``width`` times as wide as there."""
+        """Draw (count, s): the first is nominal, the others ``width`` times as wide as in the file."""
         drawn = np.concatenate([np.zeros((count, 0)), *(part.draw(rng, count, width) for part in self._parts)], axis=1)
         swept = self.nominal[: self.nominal.size - drawn.shape[1]]
         rows = np.concatenate([np.tile(swept, (count, 1)), drawn], axis=1)
