@@ -27,7 +27,7 @@ from symphys.solvers import solver
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, StageContext
 from symphys.solvers.core.point import Incumbent
-from symphys.solvers.ddp.backward_pass import backward_pass
+from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
 from symphys.solvers.ddp.forward_pass import forward_pass
 from symphys.solvers.methods.ilqr import STEP_LENGTHS, Ilqr
 from symphys.transcription import transcribe
@@ -170,20 +170,20 @@ def parts_of(method: Ilqr, first: Iteration[Any]) -> dict[str, Call]:
     motion = staged.roll_out(state.z, 0.0)
     slopes = [*staged.linearize_from_end(motion)]
     expanded = staged.expand(motion, state.multipliers, state.penalties)
-    bounds = method._room(state.z)
-    policy = backward_pass(slopes, expanded, knots, staged.statics, bounds, state.damping)
+    bounds = Bounds(knots.lower[:-1] - state.z, knots.upper[:-1] - state.z, method.evaluator.scale)
+    policy = backward_pass(slopes, expanded, knots.steps, staged.statics, bounds, state.damping)
     assert policy is not None
-    motions = forward_pass(staged, motion, policy, method.padded, STEP_LENGTHS)
+    motions = forward_pass(staged, motion, policy, knots, STEP_LENGTHS)
     return {
         "motion": lambda: staged.roll_out(state.z, 0.0),
         "Jacobians": lambda: [*staged.linearize_from_end(motion)],
         "slopes and curvature of costs": lambda: staged.expand(motion, state.multipliers, state.penalties),
-        "backward pass": lambda: backward_pass(slopes, expanded, knots, staged.statics, bounds, state.damping),
+        "backward pass": lambda: backward_pass(slopes, expanded, knots.steps, staged.statics, bounds, state.damping),
         "Jacobians and backward pass": lambda: backward_pass(
-            staged.linearize_from_end(motion), expanded, knots, staged.statics, bounds, state.damping
+            staged.linearize_from_end(motion), expanded, knots.steps, staged.statics, bounds, state.damping
         ),
-        "forward pass of 8": lambda: forward_pass(staged, motion, policy, method.padded, STEP_LENGTHS),
-        "costs of 8 motions": lambda: staged.measure(*motions),
+        "forward pass of 8": lambda: forward_pass(staged, motion, policy, knots, STEP_LENGTHS),
+        "costs of 8 motions": lambda: staged.measure(*motions[:3]),
         "one rollout of the evaluator": lambda: method.evaluator.value(state.z),
     }
 
