@@ -206,8 +206,9 @@ class LinearizedStep:
 
         ``how``: all that the program depends on besides the problem and what the step is built for.
         """
-        problem = program_identity(self.rollout.problem, self.exact)
-        identity = None if problem is None else identity_of(problem, what, self.parameters, *how)
+        rollout = self.rollout
+        problem, asked = program_identity(rollout.problem, self.exact), (rollout.inputs, tuple(rollout.memory.columns))
+        identity = None if problem is None else identity_of(problem, asked, what, self.parameters, *how)
         return ProgramSource(make, identity)
 
     def _kernel(self, source: ProgramSource) -> Kernel:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from symphys.codegen import FunctionCall, MemoryLayout, Program, ProgramError
+from symphys.codegen import Cache, FunctionCall, MemoryLayout, Program, ProgramError
 from symphys.codegen.slopes import SlopeKernel, compile_slopes, plan
+from symphys.codegen.slopes import kernel as slopes
 from symphys.codegen.slopes.plan import slope_plan
+from symphys.codegen.toolchain.cache import PLAN_SUFFIX
+from symphys.codegen.toolchain.warm_start import ProgramSource
 
 SIZE, ROWS = 5, 11
 
@@ -93,3 +97,33 @@ def test_what_is_wrong_is_said(kernel: SlopeKernel) -> None:
         kernel.jacobians(np.ones((2, 3)), np.ones((2, 1)))
     with pytest.raises(ProgramError, match="differ"):
         kernel.jacobians(np.ones((2, SIZE)), np.ones((3, 1)))
+
+
+def test_a_second_start_plans_nothing_and_gives_the_same_bits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own, z, given = Cache(tmp_path / "kernels"), np.random.default_rng(0).normal(size=(3, SIZE)), np.array([2.0])
+    cold = compile_slopes(ProgramSource(lambda: chain()[0], "a"), "out", own, threads=1)
+    expected = cold.jacobians(z, given)
+    with monkeypatch.context() as patch:
+        patch.setattr(slopes, "slope_plan", lambda *_: pytest.fail("it is planned again"))
+        source = ProgramSource(lambda: pytest.fail("the program is made again"), "a")
+        warm = compile_slopes(source, "out", own, threads=1)
+    np.testing.assert_array_equal(warm.jacobians(z, given), expected)
+    assert warm.report.cached
+    assert replace(cold.report, cached=True, seconds=0) == replace(warm.report, seconds=0)
+
+
+@pytest.mark.parametrize("other", ["identity", "library", "damaged"])
+def test_what_has_changed_is_planned_again(tmp_path: Path, other: str) -> None:
+    own, made = Cache(tmp_path / "kernels"), list[int]()
+
+    def make() -> Program:
+        made.append(1)
+        return chain()[0]
+
+    compile_slopes(ProgramSource(make, "a"), "out", own, threads=1)
+    if other in ("library", "damaged"):
+        (path,) = own.folder.glob("*.so" if other == "library" else f"*{PLAN_SUFFIX}")
+        path.unlink() if other == "library" else path.write_bytes(path.read_bytes()[:-7])
+    source = ProgramSource(make, "b" if other == "identity" else "a")
+    compile_slopes(source, "out", own, threads=1)
+    assert len(made) == 2
