@@ -171,16 +171,26 @@ def parts_of(method: Ilqr, first: Iteration[Any]) -> dict[str, Call]:
     slopes = [*staged.linearize_from_end(motion)]
     expanded = staged.expand(motion, state.multipliers, state.penalties)
     bounds = Bounds(knots.lower[:-1] - state.z, knots.upper[:-1] - state.z, method.evaluator.scale)
-    policy = backward_pass(slopes, expanded, knots.steps, staged.statics, bounds, state.damping)
+    policy = backward_pass(
+        slopes, expanded, knots.steps, staged.statics, bounds, state.damping, compiled=staged.recursion
+    )
     assert policy is not None
     motions = forward_pass(staged, motion, policy, knots, STEP_LENGTHS)
     return {
         "motion": lambda: staged.roll_out(state.z, 0.0),
         "Jacobians": lambda: [*staged.linearize_from_end(motion)],
         "slopes and curvature of costs": lambda: staged.expand(motion, state.multipliers, state.penalties),
-        "backward pass": lambda: backward_pass(slopes, expanded, knots.steps, staged.statics, bounds, state.damping),
+        "backward pass": lambda: backward_pass(
+            slopes, expanded, knots.steps, staged.statics, bounds, state.damping, compiled=staged.recursion
+        ),
         "Jacobians and backward pass": lambda: backward_pass(
-            staged.linearize_from_end(motion), expanded, knots.steps, staged.statics, bounds, state.damping
+            staged.linearize_from_end(motion),
+            expanded,
+            knots.steps,
+            staged.statics,
+            bounds,
+            state.damping,
+            compiled=staged.recursion,
         ),
         "forward pass of 8": lambda: forward_pass(staged, motion, policy, knots, STEP_LENGTHS),
         "costs of 8 motions": lambda: staged.measure(*motions[:3]),

@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.shooting import Expansion, Linearized
+from symphys.shooting import CompiledRecursion, Expansion, Linearized
 from symphys.solvers.ddp.box_qp import solve_box_qp
 from symphys.solvers.ddp.knots import AlignedKnots, KnotSteps
-from symphys.solvers.ddp.riccati import CostToGo, Feedback, LinearStep, riccati_recursion
+from symphys.solvers.ddp.riccati import CostToGo, Feedback, LinearSteps, riccati_recursion
 from symphys.types import Array, Bools, Ints
 
 Selection = slice | Ints
@@ -60,6 +60,7 @@ def backward_pass(
     bounds: Bounds,
     damping: float,
     gradient: bool = True,
+    compiled: CompiledRecursion | None = None,
 ) -> Policy | None:
     """Compute the policy about a motion; None where a Hessian is not positive definite.
 
@@ -71,6 +72,7 @@ def backward_pass(
         bounds: of z.
         damping: of Levenberg and Marquardt: added to the Hessian by knots, in units of their scales.
         gradient: whether it is computed. It takes a costate; without, slopes are those of the whole cost to go.
+        compiled: takes runs of small steps.
 
     Source: Tassa, Erez, Todorov, Synthesis and stabilization of complex behaviors through online trajectory
     optimization, IROS 2012. Theirs has one slope of the cost to go; here it is a costate and what decisions add to
@@ -79,7 +81,7 @@ def backward_pass(
     # Eliminate all knots, backwards over the steps.
     costate = gradient or knots.aligned is None or bool(len(statics))
     made = _Steps(costs, knots, statics, bounds, damping, costate)
-    found = riccati_recursion(made.from_end(slopes), made.last())
+    found = riccati_recursion(made.from_end(slopes), made.last(), compiled)
     if found is None:
         return None
     # The static entries remain: minimise over them, then close the loop.
@@ -136,8 +138,8 @@ class _Steps:
             curve = np.block([[curve, by_statics.T], [by_statics, np.zeros((s, s))]])
         return CostToGo(np.zeros(len(curve)) if self._with_costate else self.costs.x[-1][live], curve)
 
-    def from_end(self, slopes: Iterable[Linearized]) -> Iterator[LinearStep]:
-        """Yield the steps from the last to the first."""
+    def from_end(self, slopes: Iterable[Linearized]) -> Iterator[LinearSteps]:
+        """Yield runs of steps, from the last to the first."""
         end = len(self.knots)
         for run in slopes:
             first = end - len(run.a)
@@ -177,8 +179,8 @@ class _Steps:
         back[:, :n][:, self._lives[k]], back[:, n:] = feedback.back[:, :live], feedback.back[:, live:]
         return Feedback(feedback.ahead, back)
 
-    def _run(self, first: int, end: int, run: Linearized, knots: AlignedKnots) -> Iterator[LinearStep]:
-        """Yield a run of steps with knots of their own and no static entries, as arrays; the last step first."""
+    def _run(self, first: int, end: int, run: Linearized, knots: AlignedKnots) -> Iterator[LinearSteps]:
+        """Yield a run of steps with knots of their own and no static entries; alone its last one, if sizes differ."""
         steps, n = slice(first, end), run.a.shape[1]
         # Slopes of the next state by (state, knots), and costs of the steps by the same.
         after = np.concatenate([run.a, run.b if knots.plain else run.b @ knots.weights[steps]], axis=2)
@@ -193,16 +195,17 @@ class _Steps:
             curves[:, n:] += crossed
             curves[:, :, n:] += crossed.transpose(0, 2, 1)
         # Restrict the states to the tangent entries on which later costs depend.
-        live, later = self._lives[first], self._lives[end]
-        through: Array | list[Array] = after
+        live, later, room = self._lives[first], self._lives[end], [each[steps] for each in self._room]
         if not _is_whole(live, n):
             columns = np.concatenate([np.arange(n)[live], np.arange(n, after.shape[2])])
             after, slopes, curves = after[:, :, columns], slopes[:, columns], curves[:, columns][:, :, columns]
-            through = [*after[:-1, live], after[-1, later]]
-        elif not _is_whole(later, n):
-            through = [*after[:-1], after[-1, later]]
-        parts = (through, slopes, curves, *(each[steps] for each in self._room))
-        yield from map(LinearStep, *(each[::-1] for each in parts))
+        parts, last = (slopes, curves, *room), len(after) - 1
+        if _is_same(live, later):
+            yield LinearSteps(after[:, live], *parts)
+            return
+        yield LinearSteps(after[last:, later], *(each[last:] for each in parts))
+        if last:
+            yield LinearSteps(after[:last, live], *(each[:last] for each in parts))
 
     def _aligned_costs(self, knots: AlignedKnots) -> tuple[Array, Array]:
         """Return slopes (N, n + w) and curvatures (N, n + w, n + w) of all costs by the state and the knots."""
@@ -227,7 +230,7 @@ class _Steps:
         slopes[:, run.a.shape[1] :] = (by_inputs[:, None] @ weights)[:, 0]
         return slopes
 
-    def _step(self, k: int, a: Array, b: Array, c: Array) -> LinearStep:
+    def _step(self, k: int, a: Array, b: Array, c: Array) -> LinearSteps:
         """Return the step and the costs of the state and inputs before it; columns: (state, old, statics, new)."""
         costs, knot, costate, live = self.costs, self.knots[k], self._costate, self._lives[k]
         # Adjoint step: gradient of the objective by the knots and the static entries.
@@ -252,7 +255,8 @@ class _Steps:
             through[: len(a)] = after
             beside = np.concatenate([np.arange(n + o + s + len(new))[acting][knot.kept], np.arange(n + o, n + o + s)])
             through[len(a) + np.arange(len(beside)), beside] = 1.0
-        return LinearStep(through, slope, curve, self.bounds.down[new], self.bounds.up[new], self._damping[new])
+        room = (self.bounds.down[new], self.bounds.up[new], self._damping[new])
+        return LinearSteps(*(each[None] for each in (through, slope, curve, *room)))
 
     def _curve(self, k: int, after: Array, acting: Selection) -> Array:
         """Return the curvature of the costs of step k; ``after``: derivative of the state after it."""
@@ -289,6 +293,13 @@ def _selection(chosen: NDArray[np.bool_]) -> Selection:
 def _is_whole(selection: Selection, n: int) -> bool:
     """Whether all of n numbers are selected."""
     return isinstance(selection, slice) and selection == slice(0, n)
+
+
+def _is_same(one: Selection, other: Selection) -> bool:
+    """Whether two selections are of the same numbers."""
+    if isinstance(one, slice) or isinstance(other, slice):
+        return isinstance(one, slice) and isinstance(other, slice) and one == other
+    return np.array_equal(one, other)
 
 
 def _places(n: int, o: int, s: int, new: int) -> Selection:

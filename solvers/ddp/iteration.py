@@ -74,7 +74,8 @@ class LocalExpansion:
         """Run the backward pass; see ``backward_pass``."""
         runs, self._slopes = tee(self._slopes)
         statics = self.problem.statics
-        return backward_pass(runs, self._costs, self.knots.steps, statics, self.bounds, damping, gradient)
+        compiled = self.problem.recursion
+        return backward_pass(runs, self._costs, self.knots.steps, statics, self.bounds, damping, gradient, compiled)
 
     def search(self, policy: Policy, values: Callable[[MotionBatch], Array]) -> BestMotion:
         """Evaluate the policy with all step lengths in one batch; ``values`` (B,) of motions decide."""

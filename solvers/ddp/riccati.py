@@ -2,7 +2,7 @@
 
 A step leads from a state r to the state after it by r' = through @ (r, v), where v are its decisions, and costs
 slope . (r, v) + (r, v) . curve . (r, v) / 2. What a state is, and how many numbers it and the decisions have, may
-differ from step to step.
+differ from run to run of steps. A run of small matrices is taken by compiled code, where there is any.
 """
 
 from __future__ import annotations
@@ -13,19 +13,20 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import lapack
 
+from symphys.shooting import CompiledRecursion
 from symphys.solvers.ddp.box_qp import solve_box_qp
 from symphys.types import Array
 
 
-class LinearStep(NamedTuple):
-    """One linearised step about a motion.
+class LinearSteps(NamedTuple):
+    """A run of K linearised steps about a motion; only the state after a run of one may have another size.
 
     Attributes:
-        through: (r', r + w) the state after it by (state, decisions).
-        slope: (r + w,) of its costs.
-        curve: (r + w, r + w) of its costs, symmetric.
-        lower, upper: (w,) of the decisions.
-        damping: (w,) added to the diagonal of the Hessian by decisions.
+        through: (K, r', r + w) the state after each by (state, decisions).
+        slope: (K, r + w) of its costs.
+        curve: (K, r + w, r + w) of its costs, symmetric.
+        lower, upper: (K, w) of the decisions.
+        damping: (K, w) added to the diagonal of the Hessian by decisions.
     """
 
     through: Array
@@ -65,20 +66,44 @@ class RiccatiSolution(NamedTuple):
     cost: CostToGo
 
 
-def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSolution | None:
+def riccati_recursion(
+    runs: Iterable[LinearSteps], last: CostToGo, compiled: CompiledRecursion | None = None
+) -> RiccatiSolution | None:
     """Compute the optimal decisions of all steps, backwards; None where a Hessian is not positive definite.
 
     Args:
-        steps: from the last to the first.
+        runs: of steps, the last run first; the steps of a run are in the order of time.
         last: the cost of the last state.
+        compiled: takes runs that suit it.
 
     Source: Tassa, Mansard, Todorov, Control-Limited Differential Dynamic Programming, ICRA 2014, section III. The
     damping, of Levenberg and Marquardt, acts on decisions alone: cost to go is what they cost without it.
     """
-    slope, curve = last
-    found: list[Feedback | None] = []
+    cost, found = last, list[Feedback | None]()
     first = second = 0.0
-    for through, own_slope, own_curve, lower, upper, damping in steps:
+    for run in runs:
+        if compiled is not None and run.damping.shape[1] and compiled.suits(run.through):
+            made = compiled(run.through, run.slope, run.curve, (run.lower, run.upper, run.damping), cost)
+            if made is None:
+                return None
+            ahead, back, expected, (slope, curve) = made
+            found.extend(map(Feedback, ahead[::-1], back[::-1]))
+        else:
+            solved = _taken(run, cost, found)
+            if solved is None:
+                return None
+            expected, (slope, curve) = solved
+        first, second, cost = first + expected[0], second + expected[1], CostToGo(slope, curve)
+    return RiccatiSolution(found, first, second, cost)
+
+
+def _taken(
+    run: LinearSteps, cost: CostToGo, found: list[Feedback | None]
+) -> tuple[tuple[float, float], CostToGo] | None:
+    """Take a run of steps and append their feedback; return the fall that is expected, and the cost to go before it."""
+    slope, curve = cost
+    first = second = 0.0
+    for through, own_slope, own_curve, lower, upper, damping in zip(*(each[::-1] for each in run), strict=True):
         # Q = cost of the step + cost to go of the next state: slope and curvature by (state, decisions).
         total = own_slope + slope @ through
         whole = own_curve + through.T @ (curve @ through)
@@ -116,7 +141,7 @@ def riccati_recursion(steps: Iterable[LinearStep], last: CostToGo) -> RiccatiSol
         # back' hessian back = -back' cross - back' damping back, since back solves the damped system
         curve = whole[:rest, :rest] + (cross - damping[:, None] * back).T @ back
         curve = 0.5 * (curve + curve.T)
-    return RiccatiSolution(found, first, second, CostToGo(slope, curve))
+    return (first, second), CostToGo(slope, curve)
 
 
 def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: Array, upper: Array) -> Feedback | None:

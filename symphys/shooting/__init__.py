@@ -13,10 +13,19 @@ from symphys.shooting.shooting_problem import (
     VariableBlock,
     WithoutResiduals,
 )
-from symphys.shooting.staged_problem import AffinePolicy, Expansion, Followed, Linearized, StagedMotion, StagedProblem
+from symphys.shooting.staged_problem import (
+    AffinePolicy,
+    CompiledRecursion,
+    Expansion,
+    Followed,
+    Linearized,
+    StagedMotion,
+    StagedProblem,
+)
 
 __all__ = [
     "AffinePolicy",
+    "CompiledRecursion",
     "Evaluator",
     "Expansion",
     "Followed",

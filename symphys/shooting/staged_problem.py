@@ -118,6 +118,37 @@ class AffinePolicy:
     upper: Array
 
 
+class CompiledRecursion(Protocol):
+    """A run of steps of the Riccati recursion within bounds, compiled; see ``symphys.solvers.ddp.riccati``."""
+
+    def suits(self, through: Array) -> bool:
+        """Whether it is the faster way for steps of this shape (K, r, r + w)."""
+        ...
+
+    def __call__(
+        self,
+        through: Array,
+        slope: Array,
+        curve: Array,
+        bounds: tuple[Array, Array, Array],
+        cost: tuple[Array, Array],
+    ) -> tuple[Array, Array, tuple[float, float], tuple[Array, Array]] | None:
+        """Take K steps, the last one first; None where a Hessian by decisions is not positive definite.
+
+        Args:
+            through: (K, r', r + w) the state after each step by (state, decisions); r' = r unless K = 1.
+            slope: (K, r + w) of the costs of the steps.
+            curve: (K, r + w, r + w) likewise.
+            bounds: lower, upper and damping, (K, w) each.
+            cost: slope (r',) and curvature (r', r') of the cost to go after the run.
+
+        Returns:
+            Decisions (K, w) and gains (K, w, r); a and b of the fall a t + b t^2 that is expected of a step length t;
+            slope (r,) and curvature (r, r) of the cost to go before the run.
+        """
+        ...
+
+
 class StagedProblem(Protocol):
     """A problem whose horizon is a chain of N equal steps.
 
@@ -199,6 +230,11 @@ class StagedProblem(Protocol):
         That is penalty / 2 times the squared distance of g + multiplier / penalty from the bounds; ``multipliers`` and
         ``penalties`` are (c,), and a penalty of 0 leaves a limit out.
         """
+        ...
+
+    @property
+    def recursion(self) -> CompiledRecursion | None:
+        """Return compiled code for the Riccati recursion; None where there is none."""
         ...
 
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Sparse, Sparse, Sparse]:

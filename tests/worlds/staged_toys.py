@@ -204,6 +204,8 @@ class Chain(SingleSteps):
             su=costs.su + crossed(by_u, m),
         )
 
+    recursion = None
+
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Any, Any, Any]:
         P = np.tile(self.p(motion.z), (self.steps, 1))
         g, gx, gu, gp = blocks(self.f_g, motion.x[:-1], motion.u, P)

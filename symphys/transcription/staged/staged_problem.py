@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from symphys.codegen.backends import BEST
+from symphys.codegen.backends import BEST, PRECISIONS
 from symphys.dynamics.observation import SensedState, joint_turn, named_sensors, sensor_readings
 from symphys.model.state_layout import Layout
 from symphys.problem import DURATION, Constraint, GuessedMotion
 from symphys.problem.guess.motion import is_orientation, turn_between
 from symphys.problem.guess.names import ball_joints, guessable, rate_of
-from symphys.shooting import AffinePolicy, Expansion, Followed, Linearized, StagedMotion
+from symphys.shooting import AffinePolicy, CompiledRecursion, Expansion, Followed, Linearized, StagedMotion
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.expansion import ExpansionSums, SquareStack, square_stacks
 from symphys.transcription.staged.linearization import Linearization, statics_of
@@ -315,6 +315,13 @@ class RolloutStages:
         if rows is not None:
             share = np.broadcast_to(np.abs(weight)[:, None], rows.x.slopes.shape[:2])
             sums.curvature(each.term, rows, sums.by_statics(rows), share)
+
+    @property
+    def recursion(self) -> CompiledRecursion | None:
+        """Implement ``StagedProblem.recursion``."""
+        from symphys.codegen.runtime.riccati import compiled_riccati  # late: it needs what writes C
+
+        return compiled_riccati() if self._linearization.step.backend in PRECISIONS else None
 
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Any, Any, Any]:
         """Return limits, and their derivatives by all states, inputs and static entries."""

@@ -1,0 +1,62 @@
+"""The Riccati recursion in C, for problems so small that what numpy needs for a call outweighs what it computes."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+
+import numpy as np
+
+from symphys.codegen.emit.source import SourceFile, resource
+from symphys.codegen.errors import KernelUnavailable
+from symphys.codegen.runtime.library import loaded
+from symphys.codegen.toolchain.build import shared_library
+from symphys.codegen.toolchain.cache import default_cache
+from symphys.types import Array
+
+MAX_WORK = 64**3
+"""Products of matrices with so many multiplications are left to numpy, whose library is faster then."""
+
+
+class CompiledRiccati:
+    """Implements ``symphys.shooting.CompiledRecursion``."""
+
+    def __init__(self, library: ctypes.CDLL) -> None:
+        """Wrap the compiled ``riccati.c``."""
+        self._library = library
+        self._call = library.riccati
+        self._call.argtypes, self._call.restype = (*[ctypes.c_int64] * 4, *[ctypes.c_void_p] * 13), ctypes.c_int
+
+    def suits(self, through: Array) -> bool:
+        """Whether steps of this shape (K, r, c) take less time here than by numpy."""
+        return bool(through.shape[1] * through.shape[2] ** 2 <= MAX_WORK)
+
+    def __call__(
+        self,
+        through: Array,
+        slope: Array,
+        curve: Array,
+        bounds: tuple[Array, Array, Array],
+        cost: tuple[Array, Array],
+    ) -> tuple[Array, Array, tuple[float, float], tuple[Array, Array]] | None:
+        """Implement ``CompiledRecursion``."""
+        steps, after, columns = through.shape
+        w = bounds[0].shape[1]
+        n = columns - w
+        given = [np.ascontiguousarray(each, np.float64) for each in (through, slope, curve, *bounds, *cost)]
+        ahead, back, expected = np.empty((steps, w)), np.empty((steps, w, n)), np.zeros(2)
+        first, second = np.empty(n), np.empty((n, n))
+        arrays = (*given, ahead, back, expected, first, second)
+        if not self._call(steps, after, n, w, *(each.ctypes.data for each in arrays)):
+            return None
+        return ahead, back, (float(expected[0]), float(expected[1])), (first, second)
+
+
+@cache
+def compiled_riccati() -> CompiledRiccati | None:
+    """Return the compiled recursion; None without a compiler. It is built once for a machine."""
+    try:
+        with shared_library([SourceFile(resource("riccati.c"))], default_cache()) as built:
+            return CompiledRiccati(loaded(built.path))
+    except KernelUnavailable:
+        return None
