@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symphys.shooting import CompiledRecursion, Expansion, Linearized
 from symphys.solvers.ddp.box_qp import solve_box_qp
-from symphys.solvers.ddp.knots import AlignedKnots, KnotSteps
+from symphys.solvers.ddp.knots import KnotSteps
 from symphys.solvers.ddp.riccati import CostToGo, Feedback, LinearSteps, riccati_recursion
 from symphys.types import Array, Bools, Ints
 
@@ -79,7 +79,7 @@ def backward_pass(
     that. Numbers of the state on which nothing later depends are left out of the recursion.
     """
     # Eliminate all knots, backwards over the steps.
-    costate = gradient or knots.aligned is None or bool(len(statics))
+    costate = gradient or bool(knots.padded.old.size or len(statics))
     made = _Steps(costs, knots, statics, bounds, damping, costate)
     found = riccati_recursion(made.from_end(slopes), made.last(), compiled)
     if found is None:
@@ -106,20 +106,25 @@ class _Steps:
     def __init__(
         self, costs: Expansion, knots: KnotSteps, statics: Ints, bounds: Bounds, damping: float, costate: bool
     ) -> None:
-        self.costs, self.knots, self.statics, self.bounds = costs, knots, statics, bounds
-        self._aligned = None if len(statics) else knots.aligned
+        self.costs, self.knots, self.statics, self.padded = costs, knots, statics, knots.padded
         self._with_costate = costate
         self.gradient = np.zeros(len(bounds.scale))
-        self._damping = damping / bounds.scale**2
+        self._by_knots = np.zeros(len(bounds.scale) + 1)  # the last of knots that are none
         self._costate = costs.x[-1]
         self._mixed = bool(costs.ux.any()), bool(costs.uy.any())
-        if self._aligned is not None:
-            self._own_slopes, self._own_curves = self._aligned_costs(self._aligned)
-            self._room = [each[self._aligned.new] for each in (bounds.down, bounds.up, self._damping)]
+        damped = damping / bounds.scale**2
+        room = ((bounds.down, 0.0), (bounds.up, 0.0), (damped, 1.0))  # knots that are none stay at 0
+        self._room = [np.append(each, none)[self.padded.new] for each, none in room]
+        self._curves = self._curves_of_costs()
         self._asked: Bools | None = self._in_costs() if costate else None
         last = slice(0, costs.x.shape[1]) if self._asked is None else _selection(self._asked[-1])
         self._lives = [last] * (len(knots) + 1)
         self._start = np.zeros((costs.x.shape[1], len(statics)))
+
+    @property
+    def _sizes(self) -> tuple[int, int, int, int]:
+        """Return the numbers of the tangent, old knots, static entries and new knots."""
+        return self.costs.x.shape[1], self.padded.old.shape[1], len(self.statics), self.padded.new.shape[1]
 
     def _in_costs(self) -> Bools:
         """Return (N + 1, n) which tangent entries have curvature in some cost; the costate has the slopes."""
@@ -132,11 +137,14 @@ class _Steps:
 
     def last(self) -> CostToGo:
         """Return the cost to go of the state after the last step, without its costate."""
-        live, s = self._lives[-1], len(self.statics)
+        live, (_, o, s, _) = self._lives[-1], self._sizes
         curve, by_statics = self.costs.xx[-1][live][:, live], self.costs.sx[-1][:, live]
-        if s:
-            curve = np.block([[curve, by_statics.T], [by_statics, np.zeros((s, s))]])
-        return CostToGo(np.zeros(len(curve)) if self._with_costate else self.costs.x[-1][live], curve)
+        n = len(curve)
+        whole, slope = np.zeros((n + o + s, n + o + s)), np.zeros(n + o + s)
+        whole[:n, :n], whole[n + o :, :n], whole[:n, n + o :] = curve, by_statics, by_statics.T
+        if not self._with_costate:
+            slope[:n] = self.costs.x[-1][live]
+        return CostToGo(slope, whole)
 
     def from_end(self, slopes: Iterable[Linearized]) -> Iterator[LinearSteps]:
         """Yield runs of steps, from the last to the first."""
@@ -147,138 +155,115 @@ class _Steps:
                 in_steps = run.a.reshape(-1, run.a.shape[2]).any(axis=0)
                 live = _selection(np.asarray(in_steps | self._asked[first:end].any(axis=0)))
                 self._lives[first:end] = [live] * len(run.a)
-            if self._aligned is not None:
-                yield from self._run(first, end, run, self._aligned)
-            else:
-                for k in reversed(range(first, end)):
-                    yield self._step(k, run.a[k - first], run.b[k - first], run.c[k - first])
+            yield from self._run(first, end, run)
             end, self._start = first, run.start
+        self.gradient += self._by_knots[:-1]
         self.gradient[self.statics] += self.costs.s + self._start.T @ self._costate
 
     def at_start(self, cost: CostToGo) -> tuple[Array, Array]:
         """Return slope (s,) and curvature (s, s) of the whole motion by the static entries, after the recursion."""
-        start = np.concatenate([self._start[self._lives[0]], np.eye(len(self.statics))])
+        _, o, s, _ = self._sizes
+        start = np.concatenate([self._start[self._lives[0]], np.zeros((o, s)), np.eye(s)])
         slope = cost.slope @ start + self._start.T @ self._costate + self.costs.s
         return slope, start.T @ cost.curve @ start + self.costs.ss
 
     def gains(self, feedback: Sequence[Feedback | None]) -> Sequence[Feedback | None]:
-        """Return the feedback of all steps by the whole tangent."""
-        n = self.costs.x.shape[1]
+        """Return the feedback of all steps by the whole tangent and the knots that there are."""
+        n, o, s, _ = self._sizes
         lives = {id(each): each for each in self._lives[:-1]}.values()
-        if self._aligned is not None and all(_is_whole(each, n) for each in lives):
+        if not o and not s and (self.padded.new >= 0).all() and all(_is_whole(each, n) for each in lives):
             return feedback
         return [self._gain(k, each) for k, each in enumerate(feedback)]
 
     def _gain(self, k: int, feedback: Feedback | None) -> Feedback | None:
-        """Return the feedback of step k by the whole tangent."""
-        if feedback is None:
+        """Return the feedback of step k by the whole tangent; None where it decides nothing."""
+        w, o, (n, most, s, _) = len(self.knots[k].new), len(self.knots[k].old), self._sizes
+        if feedback is None or not w:
             return None
-        n, beside = self.costs.x.shape[1], len(self.knots[k].old) + len(self.statics)
-        back = np.zeros((len(feedback.ahead), n + beside))
-        live = feedback.back.shape[1] - beside
-        back[:, :n][:, self._lives[k]], back[:, n:] = feedback.back[:, :live], feedback.back[:, live:]
-        return Feedback(feedback.ahead, back)
+        back = np.zeros((w, n + o + s))
+        live = feedback.back.shape[1] - most - s
+        back[:, :n][:, self._lives[k]] = feedback.back[:w, :live]
+        back[:, n : n + o] = feedback.back[:w, live : live + o]
+        back[:, n + o :] = feedback.back[:w, live + most :]
+        return Feedback(feedback.ahead[:w], back)
 
-    def _run(self, first: int, end: int, run: Linearized, knots: AlignedKnots) -> Iterator[LinearSteps]:
-        """Yield a run of steps with knots of their own and no static entries; alone its last one, if sizes differ."""
-        steps, n = slice(first, end), run.a.shape[1]
-        # Slopes of the next state by (state, knots), and costs of the steps by the same.
-        after = np.concatenate([run.a, run.b if knots.plain else run.b @ knots.weights[steps]], axis=2)
-        slopes, curves = self._own_slopes[steps], self._own_curves[steps]
+    def _curves_of_costs(self) -> Array:
+        """Return the curvatures (N, c, c) of all costs by the columns (state, old knots, static entries, new knots)."""
+        costs, weights, (n, o, s, w) = self.costs, self.padded.weights, self._sizes
+        acting, statics, across = _places(n, o, s, w), slice(n + o, n + o + s), weights.transpose(0, 2, 1)
+        curves = np.zeros((len(weights), n + o + s + w, n + o + s + w))
+        curves[:, :n, :n] = costs.xx[:-1]
+        crossed = np.zeros((len(weights), o + w, curves.shape[2]))
+        crossed[:, :, acting] = across @ costs.uu @ weights / 2
+        if self._mixed[0]:
+            crossed[:, :, :n] = across @ costs.ux
+        if s:
+            crossed[:, :, statics] = (costs.su @ weights).transpose(0, 2, 1)
+            curves[:, statics, :n] = costs.sx[:-1]
+            curves[:, :n, statics] = costs.sx[:-1].transpose(0, 2, 1)
+        curves[:, acting] += crossed
+        curves[:, :, acting] += crossed.transpose(0, 2, 1)
+        return curves
+
+    def _run(self, first: int, end: int, run: Linearized) -> Iterator[LinearSteps]:
+        """Yield a run of steps; alone its last one where other entries of the tangent are live after it."""
+        costs, steps, (n, o, s, w) = self.costs, slice(first, end), self._sizes
+        weights, acting = self.padded.weights[steps], _places(n, o, s, w)
+        # Slopes of costs; those by the state are in the costate, if there is one.
+        slopes = np.zeros((end - first, n + o + s + w))
+        by_inputs, by_statics = costs.u[steps], np.zeros((end - first, s))
         if self._with_costate:
-            slopes = self._by_costate(first, run, knots.weights[steps])
-            self.gradient[knots.new[steps]] = slopes[:, n:]
-        # Mixed second derivatives of costs by inputs and the next state.
+            by_inputs, by_statics = self._by_costate(first, run)
+            self.gradient[self.statics] += by_statics.sum(axis=0)
+        else:
+            slopes[:, :n] = costs.x[steps]
+        by_knots = (by_inputs[:, None] @ weights)[:, 0]
+        slopes[:, acting], slopes[:, n + o : n + o + s] = by_knots, by_statics
+        np.add.at(self._by_knots, np.concatenate([self.padded.old[steps], self.padded.new[steps]], axis=1), by_knots)
+        # Slopes of the next state by (state, old knots, static entries, new knots).
+        b = run.b @ weights
+        after = np.concatenate([run.a, b[:, :, :o], run.c, b[:, :, o:]], axis=2)
+        curves = self._curves[steps]
         if self._mixed[1]:
-            crossed = (knots.weights[steps].transpose(0, 2, 1) @ self.costs.uy[steps]) @ after
+            crossed = (weights.transpose(0, 2, 1) @ costs.uy[steps]) @ after
             curves = curves.copy()
-            curves[:, n:] += crossed
-            curves[:, :, n:] += crossed.transpose(0, 2, 1)
+            curves[:, acting] += crossed
+            curves[:, :, acting] += crossed.transpose(0, 2, 1)
         # Restrict the states to the tangent entries on which later costs depend.
         live, later, room = self._lives[first], self._lives[end], [each[steps] for each in self._room]
+        beside = self._carried(first, end)
         if not _is_whole(live, n):
             columns = np.concatenate([np.arange(n)[live], np.arange(n, after.shape[2])])
             after, slopes, curves = after[:, :, columns], slopes[:, columns], curves[:, columns][:, :, columns]
-        parts, last = (slopes, curves, *room), len(after) - 1
+            beside = beside[:, :, columns]
+        parts, last = (slopes, curves, *room), end - first - 1
         if _is_same(live, later):
-            yield LinearSteps(after[:, live], *parts)
+            yield LinearSteps(np.concatenate([after[:, live], beside], axis=1), *parts)
             return
-        yield LinearSteps(after[last:, later], *(each[last:] for each in parts))
+        through = np.concatenate([after[last:, later], beside[last:]], axis=1)
+        yield LinearSteps(through, *(each[last:] for each in parts))
         if last:
-            yield LinearSteps(after[:last, live], *(each[:last] for each in parts))
+            through = np.concatenate([after[:last, live], beside[:last]], axis=1)
+            yield LinearSteps(through, *(each[:last] for each in parts))
 
-    def _aligned_costs(self, knots: AlignedKnots) -> tuple[Array, Array]:
-        """Return slopes (N, n + w) and curvatures (N, n + w, n + w) of all costs by the state and the knots."""
-        costs, n, across = self.costs, self.costs.x.shape[1], knots.weights.transpose(0, 2, 1)
-        by_knots = costs.u if knots.plain else (costs.u[:, None] @ knots.weights)[:, 0]
-        slopes = np.concatenate([costs.x[:-1], by_knots], axis=1)
-        curves = np.zeros((*slopes.shape, slopes.shape[1]))
-        curves[:, :n, :n] = costs.xx[:-1]
-        curves[:, n:, n:] = costs.uu if knots.plain else across @ costs.uu @ knots.weights
-        if self._mixed[0]:
-            curves[:, n:, :n] = costs.ux if knots.plain else across @ costs.ux
-            curves[:, :n, n:] = curves[:, n:, :n].transpose(0, 2, 1)
-        return slopes, curves
+    def _carried(self, first: int, end: int) -> Array:
+        """Return the rows (K, o + s, c) that carry knots which act again, and static entries, to the next state."""
+        n, o, s, w = self._sizes
+        rows = np.zeros((end - first, o + s, n + o + s + w))
+        rows[:, :o, _places(n, o, s, w)] = self.padded.keep[first:end]
+        rows[:, o + np.arange(s), n + o + np.arange(s)] = 1.0
+        return rows
 
-    def _by_costate(self, first: int, run: Linearized, weights: Array) -> Array:
-        """Return (K, n + w) slopes of a run of steps by its knots; those by the state are in the costate."""
+    def _by_costate(self, first: int, run: Linearized) -> tuple[Array, Array]:
+        """Return slopes (K, m) by inputs and (K, s) by static entries of the objective, and move on the costate."""
         costs, by_inputs = self.costs, np.empty((len(run.a), run.b.shape[2]))
+        by_statics = np.zeros((len(run.a), len(self.statics)))
         for k in reversed(range(len(run.a))):
             by_inputs[k] = costs.u[first + k] + self._costate @ run.b[k]
+            if by_statics.size:
+                by_statics[k] = self._costate @ run.c[k]
             self._costate = costs.x[first + k] + self._costate @ run.a[k]
-        slopes = np.zeros((len(run.a), run.a.shape[1] + weights.shape[2]))
-        slopes[:, run.a.shape[1] :] = (by_inputs[:, None] @ weights)[:, 0]
-        return slopes
-
-    def _step(self, k: int, a: Array, b: Array, c: Array) -> LinearSteps:
-        """Return the step and the costs of the state and inputs before it; columns: (state, old, statics, new)."""
-        costs, knot, costate, live = self.costs, self.knots[k], self._costate, self._lives[k]
-        # Adjoint step: gradient of the objective by the knots and the static entries.
-        self._costate = costs.x[k] + costate @ a
-        by_inputs, by_statics = costs.u[k] + costate @ b, costate @ c
-        by_knots = knot.weights.T @ by_inputs
-        self.gradient[knot.acting] += by_knots
-        self.gradient[self.statics] += by_statics
-        # Slopes of the next state by the columns (state, old knots, statics, new knots).
-        rows = self._lives[k + 1]
-        a, b, c = a[rows][:, live], b[rows] @ knot.weights, c[rows]
-        n, o, s, new = a.shape[1], len(knot.old), len(self.statics), knot.new
-        after = np.concatenate([a, b[:, :o], c, b[:, o:]], axis=1)
-        acting, statics = _places(n, o, s, len(new)), slice(n + o, n + o + s)
-        slope = np.zeros(after.shape[1])
-        slope[acting], slope[statics] = by_knots, by_statics
-        # Costs by the same columns; knots that act again and statics are carried on unchanged.
-        curve = self._curve(k, after, acting)
-        through = after
-        if s or len(knot.kept):
-            through = np.zeros((len(a) + len(knot.kept) + s, after.shape[1]))
-            through[: len(a)] = after
-            beside = np.concatenate([np.arange(n + o + s + len(new))[acting][knot.kept], np.arange(n + o, n + o + s)])
-            through[len(a) + np.arange(len(beside)), beside] = 1.0
-        room = (self.bounds.down[new], self.bounds.up[new], self._damping[new])
-        return LinearSteps(*(each[None] for each in (through, slope, curve, *room)))
-
-    def _curve(self, k: int, after: Array, acting: Selection) -> Array:
-        """Return the curvature of the costs of step k; ``after``: derivative of the state after it."""
-        costs, knot, live, s = self.costs, self.knots[k], self._lives[k], len(self.statics)
-        size, w = after.shape[1], knot.weights
-        own = costs.xx[k][live][:, live]
-        n, statics = len(own), slice(size - len(knot.new) - s, size - len(knot.new))
-        curve = np.zeros((size, size))
-        curve[:n, :n] = own
-        crossed = np.zeros((w.shape[1], size))
-        crossed[:, acting] = w.T @ costs.uu[k] @ w / 2
-        if self._mixed[0]:
-            crossed[:, :n] += w.T @ costs.ux[k][:, live]
-        if self._mixed[1]:
-            crossed += (w.T @ costs.uy[k][:, self._lives[k + 1]]) @ after
-        if s:
-            crossed[:, statics] += (costs.su[k] @ w).T
-            curve[statics, :n] = costs.sx[k][:, live]
-            curve[:n, statics] = curve[statics, :n].T
-        curve[acting] += crossed
-        curve[:, acting] += crossed.T
-        return curve
+        return by_inputs, by_statics
 
 
 def _selection(chosen: NDArray[np.bool_]) -> Selection:

@@ -46,6 +46,36 @@ class KnotSteps(list[KnotStep]):
         plain = weights.shape[1] == weights.shape[2] and bool((weights == np.eye(weights.shape[1])).all())
         return AlignedKnots(np.array([each.new for each in self]), weights, plain)
 
+    @cached_property
+    def padded(self) -> KnotArrays:
+        """Return the knots of all steps as arrays, padded with knots that are none."""
+        count = len(self)
+        o, w = (max(len(getattr(each, name)) for each in self) for name in ("old", "new"))
+        old, new = np.full((count, o), -1), np.full((count, w), -1)
+        weights, keep = np.zeros((count, self[0].weights.shape[0], o + w)), np.zeros((count, o, o + w))
+        for k, step in enumerate(self):
+            places = np.concatenate([np.arange(len(step.old)), o + np.arange(len(step.new))])
+            old[k, : len(step.old)], new[k, : len(step.new)] = step.old, step.new
+            weights[k][:, places] = step.weights
+            keep[k, np.arange(len(step.kept)), places[step.kept]] = 1.0
+        return KnotArrays(old, new, weights, keep)
+
+
+@dataclass(frozen=True)
+class KnotArrays:
+    """The knots of N steps: at most o old ones and w new ones.
+
+    Attributes:
+        old, new: (N, o) and (N, w) entries of z; -1 where there is none.
+        weights: (N, m, o + w): u = weights @ (old, new); 0 where there is none.
+        keep: (N, o, o + w): the old ones of the next step.
+    """
+
+    old: Ints
+    new: Ints
+    weights: Array
+    keep: Array
+
 
 @dataclass(frozen=True)
 class AlignedKnots:
@@ -85,15 +115,9 @@ class PaddedKnots:
     @staticmethod
     def of(steps: KnotSteps, lower: Array, upper: Array) -> PaddedKnots:
         """Make the arrays of steps, with bounds of z (len(z),)."""
-        count, none = len(steps), len(lower)
-        o, w = (max(len(getattr(each, name)) for each in steps) for name in ("old", "new"))
-        old, new = np.full((count, o), none), np.full((count, w), none)
-        weights, keep = np.zeros((count, steps[0].weights.shape[0], o + w)), np.zeros((count, o, o + w))
-        for k, step in enumerate(steps):
-            places = np.concatenate([np.arange(len(step.old)), o + np.arange(len(step.new))])
-            old[k, : len(step.old)], new[k, : len(step.new)] = step.old, step.new
-            weights[k][:, places] = step.weights
-            keep[k, np.arange(len(step.kept)), places[step.kept]] = 1.0
+        made, none = steps.padded, len(lower)
+        old, new = (np.where(each < 0, none, each) for each in (made.old, made.new))
+        weights, keep = made.weights, made.keep
         return PaddedKnots(steps, old, new, weights, keep, np.append(lower, 0.0), np.append(upper, 0.0))
 
     @cached_property

@@ -82,12 +82,12 @@ def riccati_recursion(
     cost, found = last, list[Feedback | None]()
     first = second = 0.0
     for run in runs:
-        if compiled is not None and run.damping.shape[1] and compiled.suits(run.through):
+        if compiled is not None and compiled.suits(run.through):
             made = compiled(run.through, run.slope, run.curve, (run.lower, run.upper, run.damping), cost)
             if made is None:
                 return None
             ahead, back, expected, (slope, curve) = made
-            found.extend(map(Feedback, ahead[::-1], back[::-1]))
+            found.extend(map(Feedback, ahead[::-1], back[::-1]) if ahead.size else [None] * len(ahead))
         else:
             solved = _taken(run, cost, found)
             if solved is None:
