@@ -193,3 +193,12 @@ def test_a_narrow_page_has_its_panels_below_each_other(shown: tuple[Path, str]) 
         "charts.js",
     )
     assert len({top for _, top in wide}) == 1 and len({left for left, _ in narrow}) == 1
+
+
+@NODE
+@pytest.mark.parametrize(("edge", "drawn"), [(1.5, 1), (1e3, 0), (-1e3, 0)])
+def test_edges_beyond_the_panel_are_not_drawn(edge: float, drawn: int) -> None:
+    """Such as the largest torque of a motor that gives a thousandth of it."""
+    panel = Panel("p", lines(np.arange(2.0), np.array([[0.0], [1]]), ["y"], ["red"]), "x", edges=(edge,))
+    code = f"new Panel({json.dumps(panel.to_json())}, 0, 0, 500).svg().split('class=\"edge\"').length - 1"
+    assert run_script(code, "numbers.js", "charts.js") == drawn

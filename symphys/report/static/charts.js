@@ -1,6 +1,6 @@
 // Draws the curves of a page as SVG, from the numbers that it holds; shows those below the pointer. Comes after numbers.js.
 
-const WIDTH = 1000, NARROW = 400, TOP = 26, BOTTOM = 34, LEFT = 58, GAP = 14, INCH = 97, BAR = 20, LETTER = 6.6;
+const WIDTH = 1000, NARROW = 400, TOP = 26, BOTTOM = 34, LEFT = 58, GAP = 14, INCH = 97, BAR = 20, LETTER = 7;
 
 function numbers(packed) { // differences in steps of one size, or numbers as they are
   if (!packed.d) return packed;
@@ -119,7 +119,7 @@ class Panel {
   axes() {
     const { left, top, width, height, data } = this, bottom = top + height;
     const level = (v, c) => `<path d="M${left} ${this.y(v).toFixed(1)}h${width}" class="${c}"/>`;
-    const room = Math.floor(width / LETTER), title = data.title.length > room ? `${data.title.slice(0, room - 1)}…` : data.title;
+    const room = Math.floor((width + GAP + 20) / LETTER), title = data.title.length > room ? `${data.title.slice(0, room - 1)}…` : data.title;
     const out = [`<text x="${left}" y="${top - 9}" class="title"><title>${escaped(data.title)}</title>${escaped(title)}</text>`];
     const along = data.across ? ticksOf(data.across, ...this.wide) : evenTicks(...this.wide, Math.max(2, Math.round(width / 60)));
     for (const v of along) {
@@ -142,7 +142,8 @@ class Panel {
       out.push(level(v, "grid"), `<text x="${left - 6}" y="${(this.y(v) + 3.5).toFixed(1)}" text-anchor="end">${written(v)}</text>`);
     }
     out.push(...(data.ticks || []).map((v) => `<path d="M${this.x(v).toFixed(1)} ${bottom}v-6" class="tick"/>`));
-    out.push(...(data.edges || []).map((v) => level(v, "edge")));
+    const inside = (v) => this.up(v) >= this.tall[0] && this.up(v) <= this.tall[1];
+    out.push(...(data.edges || []).filter(inside).map((v) => level(v, "edge")));
     if (data.met) out.push(`<rect x="${left}" y="${this.y(1).toFixed(1)}" width="${width}" height="${(bottom - this.y(1)).toFixed(1)}" class="met"/>`, level(1, "limit"));
     return out.join("");
   }
