@@ -74,12 +74,14 @@ bench-%: $(VENV)/.benching  # ARGS=--quick takes seconds; other options: ARGS=--
 
 gallery: $(VENV)/.installed  ## make the figures of the README again
 	$(BIN)/symphys solve ball_throw bank_shot sled basket knock putt cart_pole --solver gradient,least_squares,ipopt,cma --out build/gallery
+	$(BIN)/symphys report build/gallery --figures
 	cp build/gallery/figures/ball_throw-motion.svg build/gallery/figures/ball_throw-convergence.svg \
 	    build/gallery/figures/bank_shot-motion.svg build/gallery/figures/basket-motion.svg \
 	    build/gallery/figures/knock-motion.svg build/gallery/figures/putt-motion.svg \
 	    build/gallery/figures/cart_pole-strip.svg reports/gallery/
 	cp build/gallery/sled/least_squares-seed0/figures/convergence.svg reports/gallery/sled-stages.svg
 	$(BIN)/symphys solve quadruped_walk --unexamined --out build/walk
+	$(BIN)/symphys report build/walk --figures
 	cp build/walk/figures/quadruped_walk-strip.svg reports/gallery/
 
 clean:  ## remove what the other targets made, reports aside

@@ -81,8 +81,8 @@ COMMANDS: dict[str, Sequence[str]] = {
     "symphys ls --csv": ("ls", "--csv"),
     "symphys best --overall": ("best", "--overall"),
 }
-SEEDS, FULL = 100, 20
-"""Seeds of a case, and full pages that are made."""
+SEEDS, DRAWN = 100, 20
+"""Seeds of a case, and runs whose figures are written as files."""
 COPIED = (PROBLEM, TRAJECTORY, GUESS, SCENE, TRACE, LOG)
 
 
@@ -206,14 +206,15 @@ def finding(one: Path, out: Path, count: int) -> Iterator[Row]:
 
 
 def paging(one: Path, out: Path, count: int, jobs: int) -> Iterator[Row]:
-    """Yield what full and light pages take, and the page of the batch."""
+    """Yield what pages with figures and pages alone take, and the page of the batch."""
     copies(one, out, count, COPIED)
     every = wanted_below(out)
-    for kind, chosen in (("full", every.runs[:FULL]), ("light", every.runs)):
+    for figures, chosen in ((True, every.runs[:DRAWN]), (False, every.runs)):
         with timed() as making:
-            made = make_pages(WantedPages(every.root, chosen, batch=False), kind, jobs).runs
-        pages = [path for page in made for path in (page, *(page.parent / "figures").glob("*"))]
-        yield making.row(f"{kind} pages in {jobs} processes", len(made), size_mb=megabytes(pages))
+            made = make_pages(WantedPages(every.root, chosen, batch=False), jobs, figures=figures).runs
+        pages = [*made, *(path for page in made if figures for path in (page.parent / "figures").iterdir())]
+        name = "pages with figures" if figures else "pages"
+        yield making.row(f"{name} in {jobs} processes", len(made), size_mb=megabytes(pages))
     with timed() as block:
         page = write_batch_report(out)
     yield block.row("page of the batch", count, size_mb=megabytes([page]))

@@ -213,14 +213,14 @@ def read_json(path: Path) -> Any:
 def strict(value: Any) -> Any:
     """The value in JSON's own types: arrays as lists, numbers that are not finite as strings."""
     match value:
-        case Mapping():
-            return {str(key): strict(item) for key, item in value.items()}
+        case float():  # first, since most values are numbers and a Mapping takes long to recognise
+            return value if math.isfinite(value) else "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
+        case None | bool() | int() | str():
+            return value
         case list() | tuple():
             return [strict(item) for item in value]
-        case float() if not math.isfinite(value):
-            return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
-        case None | bool() | int() | float() | str():
-            return value
+        case Mapping():
+            return {str(key): strict(item) for key, item in value.items()}
     if hasattr(value, "tolist"):  # an array or one of its numbers
         return strict(value.tolist())
     raise TypeError(f"{type(value).__name__} has no place in a JSON file")

@@ -17,6 +17,7 @@ mean, step size, covariance and paths are the same to the last bit under any opt
 from __future__ import annotations
 
 import math
+import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -288,10 +289,21 @@ class PycmaStrategy:
         return z
 
 
-def load() -> Any:
-    """Import and return pycma, whose first import takes a second or two."""
-    import cma
+UNUSED = "matplotlib", "scipy.stats"
+"""What pycma imports for plots and surrogate models; both take longer to import than most problems to solve."""
 
+
+def load() -> Any:
+    """Import and return pycma, without ``UNUSED``."""
+    kept_out = [name for name in UNUSED if name not in sys.modules]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # pycma warns that it cannot plot
+        sys.modules.update(dict.fromkeys(kept_out))  # type: ignore[arg-type]  # None: not to be imported
+        try:
+            import cma
+        finally:
+            for name in kept_out:
+                del sys.modules[name]
     return cma
 
 

@@ -143,7 +143,7 @@ class Solution:
         return views.plot(self.trajectory, self.trace, names)
 
     def report(self) -> Path:
-        """Write the full page of the run into its folder, with figures as SVG and CSV; return the page's path."""
+        """Write the page of the run into its folder; return the page's path."""
         from symphys.report import write_run_report
 
         return write_run_report(self.folder)

@@ -73,25 +73,25 @@ def plot(motion: Trajectory, trace: Trace, names: Sequence[str]) -> Figure:
 
 def plot_column(axes: Axes, trace: Trace, name: str) -> None:
     """Plot a column of the trace against the iteration."""
-    from symphys.report.figures import style
+    from symphys.report.charts import palette
 
     if name not in trace.columns:
         raise SymphysError(f"the trace has no {quote(name)}; {hint(name, trace.columns)}")
-    axes.plot(trace["iteration"], trace[name], color=style.BLUE)
+    axes.plot(trace["iteration"], trace[name], color=palette.BLUE)
     axes.set_xlabel("iteration")
     axes.set_title(name)
 
 
 def plot_quantity(axes: Axes, motion: Trajectory, name: str) -> None:
     """Plot a quantity against time, a line for each component."""
-    from symphys.report.figures import style
+    from symphys.report.charts import palette
 
     if name not in motion.units:
         raise SymphysError(f"the motion has no {quote(name)}; {hint(name, motion.units)}")
     values, unit = motion[name], motion.units[name]
     lines = values.reshape(len(values), -1)
     labels = components(lines.shape[1]) if lines.shape[1] > 1 else ("",)
-    for line, label, colour in zip(lines.T, labels, (*style.AXES, style.GREY)[: len(labels)], strict=False):
+    for line, label, colour in zip(lines.T, labels, (*palette.AXES, palette.GREY)[: len(labels)], strict=False):
         axes.plot(motion.time[: len(line)], line, label=label, color=colour)
     if len(labels) > 1:
         axes.legend(ncols=len(labels), loc="best")

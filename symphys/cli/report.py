@@ -31,16 +31,31 @@ MAX_NAMED = 20
 pages_option = click.option(
     "--pages",
     type=click.Choice(["auto", "full", "light"]),
-    default="auto",
-    show_default=True,
-    help="The pages of runs: full ones have their figures as SVG and CSV beside them, light ones draw their curves in "
-    "the browser and are made 20 times faster; auto: light where more than 50 are made at once.",
+    default=None,
+    hidden=True,
+    help="Deprecated: there is one kind of pages.",
 )
+
+
+figures_option = click.option(
+    "--figures",
+    is_flag=True,
+    help="Make all pages, and write every figure of every run as SVG, with its numbers as CSV, into its folder "
+    "`figures`.",
+)
+
+
+def wants_figures(pages: str | None, figures: bool) -> bool:
+    """Return whether figures are written as files; warn of the deprecated option ``--pages`` where it is given."""
+    if pages is not None:
+        click.echo("symphys: --pages is deprecated; `symphys report DIR --figures` writes figures as files", err=True)
+    return figures or pages == "full"
 
 
 @click.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @pages_option
+@figures_option
 @click.option("--all", "remake", is_flag=True, help="Make all pages, also where nothing that they show has changed.")
 @click.option("--new", is_flag=True, hidden=True, help="Make only pages that are missing or out of date: the default.")
 @click.option(
@@ -49,7 +64,7 @@ pages_option = click.option(
     default=None,
     help="How many processes make pages.  [default: one for each processor]",
 )
-def report(folder: Path, pages: str, remake: bool, new: bool, jobs: int | None) -> int:
+def report(folder: Path, pages: str | None, figures: bool, remake: bool, new: bool, jobs: int | None) -> int:
     """Make the report of a run folder, or of all runs below a folder, from its files alone.
 
     A page is made where it is missing, or where a file that it shows or what draws it has changed since. Pages of
@@ -57,24 +72,29 @@ def report(folder: Path, pages: str, remake: bool, new: bool, jobs: int | None) 
     """
     if remake and new:
         raise click.UsageError("--all makes all pages, --new those that are out of date; give one of them")
+    figures = wants_figures(pages, figures)
+    remake = remake or figures
     threads.limit()
     from symphys.codegen.toolchain.compiler import processors
     from symphys.report import identification_folders, outdated, wanted_below, write_identification_page
+    from symphys.report.pages.identification import write_identification_figures
     from symphys.results.discovery import run_folders
+    from symphys.results.file_names import FIGURES
 
     identified = identification_folders(folder)
     for each in identified:
-        if remake or outdated(each, ("full",)):
+        if remake or outdated(each):
             click.echo(write_identification_page(each))
+        if figures:
+            write_identification_figures(each, each / FIGURES)
     if identified and not run_folders(folder):
         return 0
-    made = make_shown(wanted_below(folder, pages, remake), pages, jobs or processors())
+    made = make_shown(wanted_below(folder, remake), jobs or processors(), figures=figures)
     if made.kept:
         click.echo(f"{several(made.kept, 'page')} of runs up to date; --all makes all again", err=True)
     printed = [page for page in made.runs if page != made.page]
     if len(printed) > MAX_PRINTED:
-        kind = ", light ones; --pages full makes full ones" if made.light else ""
-        click.echo(f"{len(printed)} pages of runs{kind}")
+        click.echo(f"{len(printed)} pages of runs")
         printed = []
     for page in printed:
         click.echo(page)
@@ -83,7 +103,9 @@ def report(folder: Path, pages: str, remake: bool, new: bool, jobs: int | None) 
     return UNDRAWN if made.faults else 0
 
 
-def make_shown(wanted: WantedPages, kind: str, jobs: int, silent: bool = False, limit: float = math.inf) -> MadePages:
+def make_shown(
+    wanted: WantedPages, jobs: int, silent: bool = False, limit: float = math.inf, figures: bool = False
+) -> MadePages:
     """Make pages, show the progress unless ``silent``, and report those that could not be made."""
     from symphys.cli.watching.heartbeat import live_line
     from symphys.report import make_pages
@@ -91,7 +113,7 @@ def make_shown(wanted: WantedPages, kind: str, jobs: int, silent: bool = False, 
     progress = PageProgress(len(wanted.runs))
     try:
         with nullcontext() if silent else live_line("reports", progress.words):
-            made = make_pages(wanted, kind, jobs, progress.tell, limit)
+            made = make_pages(wanted, jobs, progress.tell, limit, figures)
     except KeyboardInterrupt:
         again = shlex.join(["symphys", "report", str(wanted.root)])
         click.echo(f"symphys: {progress.over} of {progress.runs} pages were made; `{again}` makes the others", err=True)

@@ -32,7 +32,7 @@ from symphys.cli.arguments import (
     settings_option,
     sweep_options,
 )
-from symphys.cli.report import UNDRAWN, make_shown, pages_option
+from symphys.cli.report import UNDRAWN, make_shown, pages_option, wants_figures
 from symphys.cli.wording import duration, many_pairs
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def solve(
     multi_start: bool,
     unexamined: bool,
     no_report: bool,
-    pages: str,
+    pages: str | None,
     backend: str,
     out: Path,
     retries: int,
@@ -183,6 +183,7 @@ def solve(
     """
     began = perf_counter()
     threads.limit()
+    figures = wants_figures(pages, False)
     if scheduler and not on:
         raise UsageFault(f"--scheduler {scheduler!r} needs --on dask or --on slurm")
     if on and multi_start:
@@ -214,7 +215,7 @@ def solve(
             batch = run_batch(asked, jobs, observer, made, multi_start, limits, rerun or "")
     silent, over = json or quiet, batch.interrupted or not any(batch.results)
     limit = max(timeout, MIN_PAGE_TIMEOUT)
-    write = None if no_report or over else partial(write_reports, asked, out, pages, jobs, silent, limit)
+    write = None if no_report or over else partial(write_reports, asked, out, figures, jobs, silent, limit)
     if silent:
         return conclude_silently(batch, observer, write)
     parts = observer.notes.seconds if jobs == 1 and not (multi_start or on) else {}
@@ -318,14 +319,15 @@ def time_line(total: float, parts: Mapping[str, float]) -> str:
     return f"time: {duration(total)} s in all; {', '.join(f'{word} {duration(part)}' for word, part in shares.items())}"
 
 
-def write_reports(jobs: list[Job], out: Path, pages: str, processes: int, silent: bool, limit: float) -> MadePages:
+def write_reports(jobs: list[Job], out: Path, figures: bool, processes: int, silent: bool, limit: float) -> MadePages:
     """Make the pages of new runs and of the batch; ``silent``: report only pages that cannot be made.
 
+    ``figures``: whether every figure of every run is written as a file too.
     ``limit``: [s] that the page of a run may take; inf where runs have no timeout.
     """
     from symphys.report import WantedPages, outdated
     from symphys.results.file_names import RESULT
 
     over = dict.fromkeys(job.folder.path for job in jobs if (job.folder.path / RESULT).exists())
-    new = [folder for folder in over if outdated(folder)]
-    return make_shown(WantedPages(out, tuple(new)), pages, processes, silent, limit)
+    new = [folder for folder in over if figures or outdated(folder)]
+    return make_shown(WantedPages(out, tuple(new)), processes, silent, limit, figures)

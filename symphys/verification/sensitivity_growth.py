@@ -7,7 +7,7 @@ exponentially with the distance from the end, in free flight like T - t.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,11 +33,13 @@ def sensitivity_growth(transcription: Transcription, record: Record) -> dict[str
     count = len(state_columns(rollout))
     ends = np.linalg.qr(np.random.default_rng(2).standard_normal((count, min(DIRECTIONS, count))))[0]
     factors = np.full(rollout.steps + 1, np.nan)
+    keep = samples(rollout.steps + 1, MOST_SAMPLES)
+    kept = set(keep.tolist())
     for k, swept in backwards(transcription, record, ends):
         if not np.isfinite(swept).all():
             break
-        factors[k] = np.linalg.norm(swept, 2)
-    keep = samples(rollout.steps + 1, MOST_SAMPLES)
+        if k in kept:
+            factors[k] = np.linalg.norm(swept, 2)
     return {"time": (keep * rollout.dt).tolist(), "factor": factors[keep].tolist()}
 
 
@@ -58,12 +60,13 @@ def backwards(transcription: Transcription, record: Record, ends: Array) -> Iter
         Derivatives in the same order and units; of an orientation only its rotation is changed, not its length.
     """
     rollout, x = transcription.rollout, record.arrays.x
-    columns, units = state_columns(rollout), state_units(rollout, record)
+    columns, units, layout = state_columns(rollout), state_units(rollout, record), Layout(rollout.world)
+    quaternions = [layout[f"{body.name}.orientation"] for body in rollout.world.bodies]
     whole = np.zeros((x.shape[1], ends.shape[1]))
     whole[columns] = ends * units[:, None]
     yield rollout.steps, ends
     for k, adjoint in zip(reversed(range(rollout.steps)), transcription.back(record, whole), strict=True):
-        yield k, _turned(rollout, x[k], adjoint)[columns] / units[:, None]
+        yield k, _turned(quaternions, x[k], adjoint)[columns] / units[:, None]
 
 
 def state_columns(rollout: Rollout) -> NDArray[np.intp]:
@@ -82,11 +85,10 @@ def state_units(rollout: Rollout, record: Record) -> Array:
     return np.array(units)
 
 
-def _turned(rollout: Rollout, x: Array, adjoint: Array) -> Array:
+def _turned(quaternions: Sequence[slice], x: Array, adjoint: Array) -> Array:
     """Return the adjoint (nx, m) without the part that would change a quaternion's length."""
-    layout, result = Layout(rollout.world), adjoint.copy()
-    for body in rollout.world.bodies:
-        part = layout[f"{body.name}.orientation"]
+    result = adjoint.copy()
+    for part in quaternions:
         q = x[part, None]
         result[part] -= q @ (q.T @ adjoint[part])
     return result

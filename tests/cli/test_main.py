@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tools.page_scripts import charts
 from tools.repeats import few
 from tools.waiting import FOREVER
 
@@ -239,7 +240,8 @@ def test_show_draws_the_guess(run: Run, throw: Path) -> None:
     assert code == 0
     page = Path(out.strip())
     assert page.is_file() and page.parts[0] == "pictures"
-    assert "ball" in page.read_text(encoding="utf-8")
+    panels = charts(page.read_text(encoding="utf-8"))["contacts"]["panels"]
+    assert [panel["title"] for panel in panels][1:] == ["ball-ground: gap [m]"]
 
 
 def test_list_names_problems_and_solvers(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -364,12 +366,12 @@ def test_a_page_that_cannot_be_made_is_named_and_exits_3(run: Run, throw: Path) 
     """Of two runs that are solved one has no place for its page; the other page and that of the batch are made."""
     places = [Path(f"reports/throw/least_squares-seed{seed}/report.html") for seed in range(2)]
     (places[0] / "full").mkdir(parents=True)
-    solve = ("solve", throw, "--solver", "least_squares", "--seeds", "2", "--pages", "light", *QUICK)
+    solve = ("solve", throw, "--solver", "least_squares", "--seeds", "2", *QUICK)
     code, out, err = run(*solve)
     assert code == 3 and "2/2" in out and "report: reports/index.html" in out
     assert f"symphys: {places[0]} could not be made: " in err
     assert places[1].read_text(encoding="utf-8").endswith("</html>\n") and Path("reports/index.html").is_file()
-    code, out, err = run("report", "reports", "--pages", "light", "--jobs", "1", "--all")
+    code, out, err = run("report", "reports", "--jobs", "1", "--all")
     assert code == 3 and out.split() == [str(places[1]), "reports/index.html"] and str(places[0]) in err
     assert run("report", "reports", "--pages", "small")[0] == 2
     Path("reports/index.html").unlink()
@@ -377,3 +379,32 @@ def test_a_page_that_cannot_be_made_is_named_and_exits_3(run: Run, throw: Path) 
     code, out, err = run(*solve)
     assert code == 3 and "no report; `symphys report reports` makes one" in out and "report:" not in out
     assert "reports/index.html could not be made: " in err
+
+
+@pytest.mark.usefixtures("whole_report")
+def test_solving_and_reporting_import_no_matplotlib(throw: Path, tmp_path: Path) -> None:
+    """Figures as files alone need it, and pandas and statistics are for those who ask; all can be imported after."""
+    code = f"""
+import sys
+from symphys.cli.app import main
+code = main(["solve", {str(throw)!r}, "--solver", "gradient,cma", "--backend", "casadi", "--out", "out"])
+assert code == 0 and not {{"matplotlib", "pandas", "scipy.stats"}} & set(sys.modules)
+import scipy.stats
+assert main(["report", "out", "--jobs", "1", "--figures"]) == 0 and "matplotlib" in sys.modules
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "out" / "throw" / "gradient-seed0" / "report.html").read_text(encoding="utf-8")
+    assert 'class="chart"' in page and "<canvas" in page
+    assert (tmp_path / "out" / "throw" / "gradient-seed0" / "figures" / "states.csv").is_file()
+
+
+@pytest.mark.usefixtures("whole_report")
+def test_kinds_of_pages_are_accepted_with_a_warning(run: Run, throw: Path) -> None:
+    code, _, err = run("solve", throw, "--solver", "least_squares", "--pages", "light", *QUICK)
+    assert code == 0 and err.count("--pages is deprecated") == 1
+    assert not list(Path("reports").rglob("figures"))
+    code, _, err = run("report", "reports", "--pages", "full", "--jobs", "1")
+    assert code == 0 and err.count("--pages is deprecated") == 1
+    assert list(Path("reports").rglob("figures/convergence.svg"))
+    assert "--pages" not in run("report", "--help")[1]

@@ -40,7 +40,7 @@ from symphys.errors import SymphysError
 from symphys.importing import robot as model_source
 from symphys.importing.reading.child import main as read_in_this_process
 from symphys.problem import load, load_problem
-from symphys.report.pages.run import write_light_report
+from symphys.report.pages.run import write_run_report
 from symphys.results.discovery import read_all
 from symphys.results.table import journal
 
@@ -172,7 +172,7 @@ class Runs:
         read_all(self.root)
         symphys.results.runs(self.root)
         list_runs(self.root)
-        write_light_report(self.folder)
+        write_run_report(self.folder)
 
 
 class Journals:

@@ -7,10 +7,15 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from tools.page_scripts import charts
 
+from symphys.findings.writing import show
 from symphys.report import write_batch_report, write_run_report
-from symphys.results.discovery import run_folders
+from symphys.report.pages.batch import write_batch_figures
+from symphys.report.pages.check_figure import ratios
+from symphys.results.discovery import read_all, run_folders, studies
 from symphys.results.text_files import ReportError
 
 
@@ -66,11 +71,39 @@ def test_page_needs_nothing_else_and_is_the_same_again(page: tuple[Path, str]) -
     batch, text = page
     assert "http://" not in text
     assert "https://" not in text
-    assert set(re.findall(r'src="([a-z]+:)', text)) == {"data:"}
-    assert re.findall(r'src="(?!data:)', text) == []
+    assert "src=" not in text
     assert read(batch) == text
-    stems = {path.stem for path in (batch / "figures").iterdir()}
-    assert stems == {f"{p}-{f}" for p in ("ball_throw", "two_balls") for f in ("convergence", "checks", "motion")}
+    assert set(charts(text)) == {"ball_throw-convergence", "two_balls-convergence"}
+    assert text.count("<canvas") == text.count('class="checks"') == 2
+    assert not (batch / "figures").exists()
+
+
+@pytest.mark.slow
+def test_figures_of_a_batch_are_files_on_request(page: tuple[Path, str], tmp_path: Path) -> None:
+    paths = write_batch_figures(page[0], tmp_path)
+    stems = {f"{p}-{f}" for p in ("ball_throw", "two_balls") for f in ("convergence", "motion")}
+    assert {path.name for path in paths} == {f"{stem}.{kind}" for stem in stems for kind in ("svg", "csv")}
+    assert set(tmp_path.iterdir()) == set(paths)
+
+
+def test_marks_of_checks_say_their_numbers(page: tuple[Path, str]) -> None:
+    """A dot for each seed and a mark for each solver, hollow where its median misses, an arrow beyond the axis."""
+    picture = re.search(r'<figure class="checks">.*?</figure>', page[1], re.DOTALL)
+    assert picture is not None
+    seen = ratios(studies(read_all(page[0])[0])[0])
+    titles = re.findall(r"<title>(.*?)</title>", picture[0])
+    for name, solvers in seen.items():
+        assert name in titles
+        for solver, values in solvers.items():
+            many = f", median of {len(values)} seeds" if len(values) > 1 else ""
+            assert f"{solver}{many}: {show(float(np.median(values)), 3)} of the tolerance" in titles
+    assert f"gradient, seed 3: {show(float(seen['stands still']['gradient'][3]), 3)}" in titles
+    assert picture[0].count('class="seed"') == sum(v.size for s in seen.values() for v in s.values() if v.size > 1)
+    shown = [solvers for name, solvers in seen.items()]
+    misses = sum(float(np.median(values)) > 1 for solvers in shown for values in solvers.values())
+    assert misses and picture[0].count('fill="#fff"') == misses
+    places = [float(x) for x in re.findall(r'<circle cx="([\d.]+)"[^>]*class="seed"', picture[0])]
+    assert places and all(0 < x < 1000 for x in places)
 
 
 @pytest.mark.slow
@@ -97,10 +130,7 @@ def test_same_problem_in_two_places_is_not_mixed(batch: Path, tmp_path: Path) ->
         shutil.copytree(batch / "two_balls", tmp_path / "both" / name / "two_balls")
     text = read(tmp_path / "both")
     assert "two_balls in a/two_balls" in plain(text)
-    assert {path.name for path in (tmp_path / "both" / "figures").glob("*-motion.svg")} == {
-        "two_balls-motion.svg",
-        "two_balls-2-motion.svg",
-    }
+    assert set(charts(text)) == {"two_balls-convergence", "two_balls-2-convergence"}
 
 
 @pytest.mark.slow
@@ -111,7 +141,8 @@ def test_names_cannot_lead_out_of_the_folder(batch: Path, edit: Callable[..., No
     text = read(batch)
     assert "<script>alert" not in text
     assert "evil<script>" not in text
-    assert (batch / "figures" / "evil-script-motion.svg").is_file()
+    assert "evil-script-convergence" in charts(text)
+    assert (batch / "figures" / "evil-script-motion.svg") in write_batch_figures(batch, batch / "figures")
     assert not list(batch.parent.glob("evil*"))
 
 

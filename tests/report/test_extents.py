@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from tools.repeats import few
 
+from symphys.report.charts.motion import motion_charts
 from symphys.report.figures import style
-from symphys.report.pages.motion import motion_pictures
+from symphys.report.figures.run import draw_figures
 from symphys.report.robots.strip import draw_strip
-from symphys.report.scene.animation import animation, light_animation
+from symphys.report.scene.animation import animation
 from symphys.report.scene.motion import draw_motion
 from symphys.report.scene.panel import make_panel
 from symphys.report.scene.views import SIDE_XZ
@@ -82,7 +83,7 @@ def test_whatever_its_extent_a_motion_is_drawn(tmp_path: Path, name: str) -> Non
         assert style.svg_text(draw_motion(trajectory, world, trajectory)).endswith("</svg>\n")
         if strip := draw_strip(trajectory, world):
             assert style.svg_text(strip).endswith("</svg>\n")
-    assert animation(trajectory, world) and light_animation(trajectory, world)
+    assert animation(trajectory, world, trajectory)
     panel = make_panel(SIDE_XZ, trajectory, world, None)
     places = SIDE_XZ.flat(trajectory.position)
     size = np.abs([panel.low, panel.high]).max()
@@ -91,9 +92,9 @@ def test_whatever_its_extent_a_motion_is_drawn(tmp_path: Path, name: str) -> Non
 
 
 def test_a_motion_without_any_extent_has_all_its_figures(tmp_path: Path) -> None:
-    with style.paper():
-        found = motion_pictures(motion(start=-0.5), scene(tmp_path, joint=True))
-    assert {"motion", "strip", "states"} <= set(found)
+    still, hinged = motion(start=-0.5), scene(tmp_path, joint=True)
+    found = {picture.name for picture in draw_figures(motion_charts(still, hinged), still, hinged)}
+    assert {"motion", "strip", "states"} <= found
 
 
 def test_axes_see_a_point_as_a_box_about_it_and_leave_all_else() -> None:

@@ -9,11 +9,12 @@ import matplotlib
 import numpy as np
 import pytest
 
+from symphys.report.charts import palette
 from symphys.report.charts.contacts import pair_normals, shown_pairs
 from symphys.report.charts.convergence import Curve, best_so_far, median_curve, violation_so_far
+from symphys.report.charts.tables import thin
 from symphys.report.figures import style
-from symphys.report.figures.data import thin
-from symphys.report.pages.batch import limits, ratios
+from symphys.report.pages.check_figure import limits, ratios
 from symphys.report.scene.motion import draw_motion
 from symphys.report.scene.views import SIDE_XZ, SIDE_YZ, TOP, TOP_TURNED, choose_views, turn
 from symphys.results.discovery import read_all, studies
@@ -107,8 +108,8 @@ def test_best_run_is_solved_with_the_lowest_objective(made: Path) -> None:
 
 
 def test_colours_of_known_solvers_do_not_depend_on_the_others() -> None:
-    marks = style.solver_marks(["zeta", "cma", "alpha", "gradient"])
-    assert marks["cma"] == style.solver_marks(["cma"])["cma"]
+    marks = palette.solver_marks(["zeta", "cma", "alpha", "gradient"])
+    assert marks["cma"] == palette.solver_marks(["cma"])["cma"]
     assert len(set(marks.values())) == 4
 
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 import html
 import json
 import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.page_scripts import charts, held
 
 import symphys
 from symphys.cli.app import main
 from symphys.report import write_identification_page
+from symphys.report.pages.identification import correlations
 from symphys.report.scene.ghosts import with_ghosts
 from symphys.results.identification import read_identification
 from symphys.results.identification.replays import read_replays
@@ -77,10 +81,27 @@ def test_it_says_what_was_found(folder: Path) -> None:
 @pytest.mark.slow
 def test_figures_hold_the_numbers(folder: Path) -> None:
     found = read_identification(folder)
+    page = charts((folder / "report.html").read_text("utf-8"))
+    assert {"intervals", "residuals", "course", "replay-1"} <= set(page)
+    ((name, _, ((low, high),), _),) = page["intervals"]["panels"][0]["bars"]
+    assert name == "bounce" and low == pytest.approx(-high, rel=1e-6)
+    assert high == pytest.approx((found["bounce"].upper - found["bounce"].value) / found["bounce"].error)
+    assert 'class="correlations"' not in (folder / "report.html").read_text("utf-8"), "of one number there are none"
+    assert not (folder / "figures").exists()
+    assert symphys.write_report(folder, figures=True) == folder / "report.html"
     table = (folder / "figures" / "course.csv").read_text("utf-8")
     assert f"{found.history[-1, 0]:g}" in table
     assert (folder / "figures" / "residuals.svg").read_text("utf-8").startswith("<?xml")
-    assert not (folder / "figures" / "correlations.svg").exists(), "of one number there are none"
+    shutil.rmtree(folder / "figures")
+
+
+def test_correlations_are_cells_whose_colour_follows_the_number(folder: Path) -> None:
+    found = read_identification(folder)
+    two = (replace(found.parameters[0], name="a<b"), replace(found.parameters[0], name="mass"))
+    text = correlations(replace(found, parameters=two, correlation=np.array([[1.0, -0.75], [-0.75, 1.0]])))
+    assert text.count("rgb(33 102 172 / 0.75)") == 2 and text.count("rgb(178 24 43 / 1.00)") == 2
+    assert text.count("−0.75") == 2 and "a&lt;b" in text  # noqa: RUF001
+    assert not correlations(replace(found, parameters=two, correlation=np.full((2, 2), np.nan)))
 
 
 @pytest.mark.slow
@@ -103,7 +124,7 @@ def test_the_measured_body_is_seen_through(folder: Path) -> None:
     assert scene.solids("ball measured") == scene.solids("ball")
     height = np.interp(motion.time, replay.time, replay.quantities[0].measured[:, 0])
     assert motion["ball measured.position"][:, 2] == pytest.approx(height)
-    data = json.loads(re.search(r'<script type="application/json"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
+    data = held(page, 'class="animation">')[0]
     assert [body["ghost"] for body in data["bodies"]] == [False, True]
 
 

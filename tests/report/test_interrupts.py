@@ -22,7 +22,7 @@ def lose() -> None:
 def test_ctrl_c_is_not_swallowed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
     made: list[Path] = []
 
-    def make_run_page(folder: Path, light: bool) -> None:
+    def make_run_page(folder: Path, figures: bool) -> None:
         made.append(folder)
         if place == "a run":
             lose()

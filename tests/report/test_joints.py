@@ -15,9 +15,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from tools.repeats import first
 
-from symphys.report import write_motion, write_run_report
-from symphys.report.charts.drawing import BEYOND, draw_chart
+from symphys.report import write_motion, write_run_figures, write_run_report
+from symphys.report.charts.palette import BEYOND
 from symphys.report.figures import style
+from symphys.report.figures.drawing import draw_chart
 from symphys.report.pages.motion import limits_sentence, motors_sentence, separation_sentence
 from symphys.report.robots.joint_charts import COMMAND, SATURATED, axis_range, joint_charts, make_grid, shown
 from symphys.report.robots.joint_use import channels, separation
@@ -163,7 +164,9 @@ def test_the_page_has_joints_gait_and_strip(run_dir: Path) -> None:
     np.savez(run_dir / "guess.npz", **arrays)
     text = write_run_report(run_dir).read_text(encoding="utf-8")
     words = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", text))
-    assert {"strip.svg", "joints.svg", "motors.svg", "gait.svg"} <= {p.name for p in (run_dir / "figures").iterdir()}
+    assert {"joints", "motors", "gait"} <= set(re.findall(r'data-name="(\w+)"', text))
+    drawn = {path.name for path in write_run_figures(run_dir, run_dir / "figures")}
+    assert {"strip.svg", "joints.svg", "motors.svg", "gait.svg"} <= drawn
     assert "1 of 8 motors is saturated" in words
     assert "fr_knee hinge 0 to 0 rad −1 to 2 servo, 30 N m, 8 rad/s 30 N m ! 30 %" in words  # noqa: RUF001
     assert 'href="#joints"' in text
@@ -176,7 +179,9 @@ def test_a_page_without_joints_has_none_of_it(run_dir: Path, edit: Callable[...,
         return page.read_bytes().partition(b"<body>")[2]
 
     first = body(write_run_report(run_dir))
-    assert not {"strip.svg", "joints.svg", "motors.svg", "gait.svg"} & {p.name for p in (run_dir / "figures").iterdir()}
+    assert not {"strip.svg", "joints.svg", "motors.svg", "gait.svg"} & {
+        path.name for path in write_run_figures(run_dir, run_dir / "figures")
+    }
     assert b'id="joints"' not in first
     assert b'id="gait"' not in first
     content = json.loads((run_dir / "scene.json").read_text())

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tools.page_scripts import NODE, plays_to_the_end
+from tools.page_scripts import NODE, charts, plays_to_the_end
 
 from symphys.report import write_motion
 from symphys.report.scene.animation import NUMBERS, motion_data
@@ -26,7 +26,8 @@ def test_page_plays_and_draws(made: Path, tmp_path: Path) -> None:
     assert "Two &lt;balls&gt;" in text
     assert "1 s in 480 steps; 2 bodies." in text
     assert "<canvas" in text
-    assert set(re.findall(r'src="([a-z]+:)', text)) == {"data:"}
+    assert {"states", "contacts"} <= set(charts(text))
+    assert "src=" not in text and list(out.parent.iterdir()) == [out]
     assert "http" not in re.sub(r"http-equiv", "", text)
 
 

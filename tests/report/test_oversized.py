@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.page_scripts import charts
 from tools.repeats import few
 
-from symphys.report import write_batch_report, write_run_report
+from symphys.report import write_batch_report, write_run_figures, write_run_report
 from symphys.results.drawable import MAX_DRAWABLE, OVERSIZED, drawable, oversized
 from symphys.results.run import read_run
 
@@ -96,7 +97,7 @@ def test_the_batch_and_the_other_pages_are_those_without_it_but_for_a_note(
     enlarge(batch / "ball_throw" / which, factor)
     page = write_batch_report(batch)
     assert OVERSIZED in text_of(page)
-    assert (batch / "figures" / "ball_throw-convergence.svg").exists()
+    assert charts(page.read_text("utf-8"))["ball_throw-convergence"]["panels"]
     assert write_run_report(other).read_bytes() == before
 
 
@@ -113,9 +114,10 @@ def test_a_batch_of_nothing_else(batch: Path) -> None:
 def test_what_is_large_but_not_beyond_is_drawn(run_dir: Path) -> None:
     """No warning of an overflow either, which would be an error here."""
     enlarge(run_dir, 1e-3 * MAX_DRAWABLE)
-    text = text_of(write_run_report(run_dir))
-    assert "cannot be drawn" not in text
-    assert {"convergence.svg", "motion.svg"} <= {path.name for path in (run_dir / "figures").iterdir()}
+    page = write_run_report(run_dir)
+    assert "cannot be drawn" not in text_of(page)
+    assert {"convergence", "states"} <= set(charts(page.read_text("utf-8")))
+    assert {"convergence.svg", "motion.svg"} <= {path.name for path in write_run_figures(run_dir, run_dir / "figures")}
 
 
 def test_only_numbers_that_are_finite_and_beyond_are_left_out(run_dir: Path) -> None:

@@ -12,8 +12,9 @@ from data.walker import DT, LEGS, NAMES, SCENE, STEPS, TURNED, hinge, motion
 from tools.page_scripts import NODE, plays_to_the_end, run_script
 from tools.repeats import few
 
-from symphys.report.charts.drawing import draw_chart
+from symphys.report.charts import palette
 from symphys.report.figures import style
+from symphys.report.figures.drawing import draw_chart
 from symphys.report.pages.motion import steps_sentence
 from symphys.report.robots.branches import branches, colours, keys, traced
 from symphys.report.robots.gait import gait_chart, spans, stances, weight
@@ -95,7 +96,7 @@ def test_branches_are_what_joints_connect_to_the_base(load: Load) -> None:
 
 def test_few_bodies_keep_their_own_colours(load: Load) -> None:
     trajectory, scene = load(motion(), {**SCENE, "joints": SCENE["joints"][:2]})
-    assert colours(trajectory, scene) == tuple(style.BODIES[k % 7] for k in range(9))
+    assert colours(trajectory, scene) == tuple(palette.BODIES[k % 7] for k in range(9))
     assert traced(trajectory, scene) == tuple(NAMES)
 
 

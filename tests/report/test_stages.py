@@ -15,8 +15,8 @@ from tools.repeats import few
 
 from symphys.report import write_batch_report, write_run_report
 from symphys.report.charts.convergence import Curve, best_so_far, curve, violation_so_far
-from symphys.report.charts.drawing import draw_chart
 from symphys.report.charts.run import convergence_chart, exact_ends, segments
+from symphys.report.figures.drawing import draw_chart
 from symphys.results.run import Run, read_run
 
 Edit = Callable[..., None]

@@ -8,6 +8,7 @@ import json
 import math
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from symphys.results.file_names import CONFIG, PROBLEM, RESULT
 from symphys.results.result import VariableRecord
 from symphys.results.table import best, chosen, columns, ordered, read_rows, write_table
 from symphys.results.table.difference import differences
-from symphys.results.table.writing import json_lines
+from symphys.results.table.writing import json_lines, packed
 
 ROWS = [
     {
@@ -127,6 +128,26 @@ def test_the_table_as_files(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet").read_table(tmp_path / "runs.parquet").to_pylist()
     for line, row in zip(parquet, rows, strict=True):
         assert {name: value for name, value in line.items() if value is not None} == row
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        ["a", None, "\N{ROCKET}", ""],
+        [1.5, None, math.nan, -math.inf],
+        [None, True, False],
+        [1, -2, 3],
+        [None, None],
+        [],
+    ],
+)
+def test_columns_are_those_that_arrow_makes(column: list[Any]) -> None:
+    """To the bit of what is known; made without pandas."""
+    arrow = pytest.importorskip("pyarrow")
+    found, expected = packed(arrow, column, None), arrow.array(column)
+    found.validate(full=True)
+    assert found.type == expected.type
+    assert repr(found.to_pylist()) == repr(expected.to_pylist())
 
 
 def test_without_pyarrow_there_is_csv_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from symphys.problem import Problem, load_problem
 from symphys.problems import catalogue
-from symphys.report import write_light_report
+from symphys.report import write_run_report
 from symphys.results.run import read_run
 from symphys.runs import execute, make_jobs
 from symphys.runs.choice import SITUATIONS, chosen, chosen_lines, situation
@@ -115,5 +115,5 @@ def test_the_run_and_its_page_say_why(tmp_path: Path) -> None:
         job = make_jobs([problem], solvers, [0], {}, tmp_path / str(told), examine=False)[0]
         execute(job, lambda row: None, lambda job: transcribe(problem, backend="casadi"))
         run = read_run(job.folder.path, job.folder.path)
-        page = write_light_report(job.folder.path).read_text(encoding="utf-8")
+        page = write_run_report(job.folder.path).read_text(encoding="utf-8")
         assert ("chosen" in run.provenance) == ("No solver was named: least_squares, since" in page) == told

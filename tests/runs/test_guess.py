@@ -12,7 +12,7 @@ from tools.repeats import few
 
 import symphys
 from symphys import Problem, Solution, SymphysError
-from symphys.report import write_light_report
+from symphys.report import write_run_report
 from symphys.results.file_names import LOG, MULTIPLIERS, TRAJECTORY
 from symphys.runs import make_jobs, read_guess_run
 from symphys.runs.guess import resampled, with_guess
@@ -164,7 +164,7 @@ def test_the_page_says_where_it_starts(cart: Problem, found: Solution, tmp_path:
     """And says nothing of the kind where the guess is the file's."""
     again = symphys.solve(cart, "gradient", backend="casadi", folder=tmp_path, guess=found, iterations=1)
     for solution, told in ((again, True), (found, False)):
-        page = write_light_report(solution.folder).read_text(encoding="utf-8")
+        page = write_run_report(solution.folder).read_text(encoding="utf-8")
         assert (f"It starts from what {found.folder} found" in page) == told
 
 

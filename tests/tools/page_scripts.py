@@ -1,10 +1,13 @@
-"""The scripts of a page, run by node without a browser."""
+"""The scripts of a page, run by node without a browser, and the numbers that it holds for them."""
 
 from __future__ import annotations
 
+import base64
 import json
+import re
 import shutil
 import subprocess
+import zlib
 from typing import Any
 
 import pytest
@@ -33,6 +36,24 @@ global.document = {
 global.ResizeObserver = class { observe() {} };
 global.requestAnimationFrame = (f) => { if (frames++ < 400) setImmediate(() => f(performance.now() + 100 * frames)); };
 """
+
+
+def unpack(text: str) -> str:
+    """The inverse of ``pack``."""
+    return zlib.decompress(base64.b64decode(text)).decode()
+
+
+def held(text: str, before: str) -> list[Any]:
+    """The data that a page holds for its scripts behind each match of a pattern."""
+    found = re.findall(rf'{before}.*?<script type="application/json"[^>]*>(.*?)</script>', text, re.DOTALL)
+    return [json.loads(unpack(data)) for data in found]
+
+
+def charts(text: str) -> dict[str, Any]:
+    """The charts of a page by name, as its script reads them."""
+    place = r'<figure class="chart" data-name='
+    names = re.findall(rf'{place}"([\w-]+)"', text)
+    return dict(zip(names, held(text, place), strict=True))
 
 
 def run_script(code: str, *more: str) -> Any:

@@ -1,4 +1,4 @@
-"""A chart: panels of curves as numbers. A light page draws it by ``charts.js``, a full page by ``charts.drawing``."""
+"""A chart: panels of curves as numbers. A page draws it by ``charts.js``, a figure by ``charts.drawing``."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from symphys.report.figures.data import Table, thin
+from symphys.report.charts.tables import Table, thin
 from symphys.types import Array
 
 POINTS = 240
-"""Largest number of samples of a line in a light page, about: a panel is some 300 pixels wide."""
+"""Largest number of samples of a line in a page, about: a panel is some 300 pixels wide."""
+MARKS = 1500
+"""Largest number of points of a cloud of them in a page: an even choice, which keeps how densely they lie."""
 RESOLUTION = 4000
 """Numbers of a linear panel are rounded to this share of their range; a panel is some 150 pixels high."""
 DIGITS = 4
@@ -66,7 +68,7 @@ class Panel:
         lines: in the order in which they are drawn.
         along: title of the horizontal axis.
         scale: 0 for linear, -1 for logarithmic, else linear up to this size and logarithmic beyond.
-        across: -1 for a logarithmic horizontal axis, which only figures have.
+        across: -1 for a logarithmic horizontal axis.
         edges: heights of horizontal lines, such as bounds.
         beyond: (low, high) heights that are shaded, such as those past a limit; infinite at an open end.
         met: whether a value of 1 or below is met, which is marked.
@@ -97,7 +99,7 @@ class Panel:
         """Return the panel as ``charts.js`` reads it, without what it does not use."""
         drawn, shared = [], list[Array]()
         for group in by_abscissa(self.lines):
-            x, columns = thin(group[0].x, np.stack([line.y for line in group], axis=1), POINTS)
+            x, columns = sampled(group)
             for line, y in zip(group, columns.T, strict=True):
                 values = rounded(y) if self.scale else differences(y)
                 entry = {"x": len(shared), "y": values, "c": line.colour, "w": line.width, "l": line.look}
@@ -106,9 +108,10 @@ class Panel:
         found = {
             "title": f"{self.title}, {self.note}" if self.note else self.title,
             "lines": [{key: value for key, value in line.items() if value != ""} for line in drawn],
-            "x": [differences(x) for x in shared],
+            "x": [rounded(x) if self.across else differences(x) for x in shared],
             "along": self.along,
             "scale": self.scale,
+            "across": self.across,
             "edges": [number for number in map(float, self.edges) if math.isfinite(number)],
             "beyond": [rounded(np.array(band)) for band in self.beyond],
             "met": self.met,
@@ -142,7 +145,7 @@ class Chart:
         columns: panels in a row.
         keys: what the colours mean.
         tables: the numbers that it shows, for its CSV file.
-        height: [in] of a row in a figure.
+        height: [in] of a row.
         widths: of the columns in a figure, relative; empty for equal ones.
         points: largest number of samples of a line in a figure, about.
     """
@@ -160,7 +163,8 @@ class Chart:
     def to_json(self) -> dict[str, Any]:
         """Return the chart as ``charts.js`` reads it."""
         panels = [panel and panel.to_json() for panel in self.panels]
-        return {"panels": panels, "columns": self.columns, "keys": [[key.name, key.colour] for key in self.keys]}
+        keys = [[key.name, key.colour, key.look] for key in self.keys]
+        return {"panels": panels, "columns": self.columns, "keys": keys, "height": self.height}
 
 
 def lines(x: Array, columns: Array, names: Sequence[str], colours: Sequence[str], **look: Any) -> tuple[Line, ...]:
@@ -169,6 +173,15 @@ def lines(x: Array, columns: Array, names: Sequence[str], colours: Sequence[str]
         Line(name, colour, x, columns[:, k], **look)
         for k, (name, colour) in enumerate(zip(names, colours, strict=False))
     )
+
+
+def sampled(group: Sequence[Line]) -> tuple[Array, Array]:
+    """Return (rows,) x and (rows, k) y of lines over one x, with as many samples as a page shows."""
+    x, columns = group[0].x, np.stack([line.y for line in group], axis=1)
+    if not any(line.has("points") for line in group):
+        return thin(x, columns, POINTS)
+    chosen = np.linspace(0, len(x) - 1, min(len(x), MARKS)).round().astype(int)
+    return x[chosen], columns[chosen]
 
 
 def by_abscissa(drawn: Sequence[Line]) -> Iterator[list[Line]]:

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart, Key, Line, Panel
-from symphys.report.figures import style
-from symphys.report.figures.data import TIME, Table
+from symphys.report.charts.tables import TIME, Table
 from symphys.report.scene.views import centres
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Trajectory
@@ -40,7 +40,7 @@ def contacts_chart(trajectory: Trajectory, scene: Scene) -> Chart | None:
         drawn = tuple(Line(kind, colour, middles, force, 1.2, "middles area") for kind, colour, force in parts)
         scale = force_scale(np.stack([force for _, _, force in parts]))
         panels.append(Panel(f"{name}: force, mean over a step [N]", drawn, TIME, scale, least=(0.0,)))
-        panels.append(Panel(f"{name}: gap [m]", (Line("gap", style.GREY, trajectory.time, gap),), TIME, edges=(0.0,)))
+        panels.append(Panel(f"{name}: gap [m]", (Line("gap", palette.GREY, trajectory.time, gap),), TIME, edges=(0.0,)))
     return Chart(
         "contacts",
         "Contact forces and gaps over time",
@@ -87,10 +87,10 @@ def force_parts(trajectory: Trajectory, pair: int, normal: Array | None) -> tupl
     force = trajectory.contact_force[:, pair]
     middles = (trajectory.time[1:] + trajectory.time[:-1]) / 2
     if normal is None:
-        return middles, [("whole", style.GREEN, np.linalg.norm(force, axis=1))]
+        return middles, [("whole", palette.GREEN, np.linalg.norm(force, axis=1))]
     along = np.sum(force * normal, axis=1, keepdims=True)
     across = np.linalg.norm(force - along * normal, axis=1)
-    return middles, [("normal", style.BODIES[0], np.abs(along[:, 0])), ("tangential", style.ORANGE, across)]
+    return middles, [("normal", palette.BODIES[0], np.abs(along[:, 0])), ("tangential", palette.ORANGE, across)]
 
 
 def force_scale(force: Array) -> float:

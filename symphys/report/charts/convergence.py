@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from symphys.findings.writing import capital
+from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart, Key, Line, Panel
-from symphys.report.figures import style
-from symphys.report.figures.data import Table, thin
+from symphys.report.charts.tables import Table, thin
 from symphys.results.discovery import Study
 from symphys.results.result import StageRecord, smoothed
 from symphys.results.run import Run
@@ -105,19 +105,19 @@ def convergence_chart(name: str, study: Study) -> Chart | None:
         return None
     panels = tuple(quantity_panel(study, along, *row) for row in rows for along in columns)
     medians = [table for row in rows for along in columns for table in median_tables(study, along, *row)]
-    marks = style.solver_marks(entry.solver for entry in study.entries)
-    keys = [Key(style.short(solver, 20), colour, "", mark) for solver, (colour, mark) in marks.items()]
+    marks = palette.solver_marks(entry.solver for entry in study.entries)
+    keys = [Key(palette.short(solver, 20), colour, "", mark) for solver, (colour, mark) in marks.items()]
     if any(entry.solved * 2 <= len(entry.runs) for entry in study.entries):
-        keys.append(Key("hollow: ended unsolved", style.GREY, "rings", "o"))
+        keys.append(Key("hollow: ended unsolved", palette.GREY, "rings", "o"))
     if any(len(entry.runs) > 1 for entry in study.entries):
-        keys.append(Key("thin: single seeds", style.GREY, "thin"))
+        keys.append(Key("thin: single seeds", palette.GREY, "thin"))
     tables = (run_table(study, columns, rows), *medians)
     return Chart(name, "Objective and errors", panels, len(columns), tuple(keys), tables, 2.45, points=MOST_POINTS)
 
 
 def quantity_panel(study: Study, along: str, title: str, quantity: Quantity) -> Panel:
     """Chart a quantity: thin lines for seeds, a strong one for their median, a mark at each end."""
-    marks = style.solver_marks(entry.solver for entry in study.entries)
+    marks = palette.solver_marks(entry.solver for entry in study.entries)
     relative, drawn, ends = quantity is violation_so_far, list[Line](), list[Line]()
     floor = VIOLATION_FLOOR if relative else -np.inf
     for entry in study.entries:
@@ -130,11 +130,11 @@ def quantity_panel(study: Study, along: str, title: str, quantity: Quantity) -> 
             drawn += [Line("", colour, after_zero(each.x), each.y, 0.7, "steps pale") for each in curves]
         middle = median_curve(curves)
         places = after_zero(middle.x)
-        drawn.append(Line("", colour, places, middle.y, 1.9, "steps"))
+        drawn.append(Line(entry.solver, colour, places, middle.y, 1.9, "steps"))
         look = "dots" if entry.solved * 2 > len(entry.runs) else "rings"
         ends.append(Line("", colour, places[-1:], middle.y[-1:], look=look, mark=mark))
     heights = np.concatenate([np.zeros(0), *(line.y for line in drawn)])
-    scale = -1.0 if relative and np.any(heights > 0) else style.scale_of(heights)
+    scale = -1.0 if relative and np.any(heights > 0) else palette.scale_of(heights)
     return Panel(title, (*drawn, *ends), AXIS_TITLES[along], scale, across=-1.0, met=relative)
 
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from symphys.findings.writing import capital
+from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart, Key, Line, Panel
 from symphys.report.charts.contacts import contacts_chart
-from symphys.report.figures import style
-from symphys.report.figures.data import TIME, vector
+from symphys.report.charts.tables import TIME, vector
 from symphys.report.robots.gait import gait_chart
 from symphys.report.robots.joint_charts import joint_charts
 from symphys.report.scene.views import NAMES
@@ -71,9 +71,9 @@ def body_chart(
         for quantity, unit, time, values in quantities:
             words = f"{quantity.replace('_', ' ')} [{unit}]"
             title = f"{names[body]}: {words}" if len(names) > 1 else capital(words)
-            looks = zip(NAMES, style.AXES, values[:, body].T, style.AXIS_WIDTHS, strict=True)
+            looks = zip(NAMES, palette.AXES, values[:, body].T, palette.AXIS_WIDTHS, strict=True)
             drawn = tuple(Line(axis, colour, time, column, width) for axis, colour, column, width in looks)
             panels.append(Panel(title, drawn, TIME))
             tables.append({TIME: time, **vector(f"{names[body]}.{quantity}", unit, values[:, body])})
-    keys = tuple(Key(axis, colour) for axis, colour in zip(NAMES, style.AXES, strict=True))
+    keys = tuple(Key(axis, colour) for axis, colour in zip(NAMES, palette.AXES, strict=True))
     return Chart(name, alt, tuple(panels), len(quantities), keys, tuple(tables))

@@ -14,10 +14,10 @@ import numpy as np
 from symphys.findings.examination import Energy, Growth
 from symphys.findings.numerics import reach
 from symphys.findings.writing import capital, show
+from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart, Key, Line, Panel, lines
 from symphys.report.charts.convergence import AXIS_TITLES, VIOLATION_FLOOR, WORK
-from symphys.report.figures import style
-from symphys.report.figures.data import TIME, Table
+from symphys.report.charts.tables import TIME, Table
 from symphys.results.result import StageRecord, VariableRecord, smoothed
 from symphys.results.run import Run
 from symphys.results.trace import OUTPUT
@@ -33,9 +33,9 @@ MOST_TOUCHES = 150
 """Beginnings of contacts that are marked, at most: more cannot be told apart."""
 GROWTH_RANGE = 100.0
 """The smallest ratio of the ends of the axis of growth, so that little growth looks little."""
-COLOURS = (*style.AXES, style.PURPLE, style.ORANGE, style.SKY)
+COLOURS = (*palette.AXES, palette.PURPLE, palette.ORANGE, palette.SKY)
 """Colours of the components of a variable, in their order."""
-WIDTHS = (*style.AXIS_WIDTHS, 1.4, 1.4, 1.4)
+WIDTHS = (*palette.AXIS_WIDTHS, 1.4, 1.4, 1.4)
 VECTORS = ("position", "velocity", "angular_velocity", "force", "torque", "gravity")
 SLOT = re.compile(r"(?P<name>\w+)(\[\s*(?P<first>-?\d+)?\s*:\s*(?P<last>-?\d+)?\s*\])?")
 """A quantity, with a range of components or without."""
@@ -119,7 +119,7 @@ def convergence_chart(run: Run) -> Chart | None:
         return None
     column = WORK if np.isfinite(run.trace[WORK]).any() else "iteration"
     x, along = run.trace[column], AXIS_TITLES.get(column, column)
-    colour, staged = style.solver_marks([run.solver])[run.solver][0], smoothed(run.stages)
+    colour, staged = palette.solver_marks([run.solver])[run.solver][0], smoothed(run.stages)
     columns = 2 if len(shown) == 4 else min(len(shown), COLUMNS)
     stages = stage_bands(run, x) if staged else ()
     silent = tuple((left, right, "") for left, right, _ in stages)
@@ -136,8 +136,8 @@ def convergence_chart(run: Run) -> Chart | None:
             tables.append({f"{along} at the end of a stage": at, f"{panel.title} exact": exact})
     keys = (
         Key("at the stage's own smoothing", colour),
-        Key("exact, at its end", style.INK, "dots"),
-        Key("the same, something missed", style.INK, "rings"),
+        Key("exact, at its end", palette.INK, "dots"),
+        Key("the same, something missed", palette.INK, "rings"),
     )
     return Chart("convergence", "Convergence of this run", tuple(panels), columns, keys if staged else (),
                  tuple(tables), 2.0, points=MOST_ROWS)  # fmt: skip
@@ -161,11 +161,11 @@ def history_panel(
     if ends:
         at, exact, met = (np.array(each) for each in zip(*ends, strict=True))
         exact = panel.drawn(exact)
-        drawn.append(Line("", style.INK, at, exact, 0.8, "dotted"))
+        drawn.append(Line("", palette.INK, at, exact, 0.8, "dotted"))
         for look, some in (("dots", met), ("rings", ~met)):
-            drawn += [Line("exact", style.INK, at[some], exact[some], look=look)] if some.any() else []
+            drawn += [Line("exact", palette.INK, at[some], exact[some], look=look)] if some.any() else []
     heights = np.concatenate([values, *(line.y for line in drawn)])
-    scale = -1.0 if panel.relative and np.any(heights > 0) else style.scale_of(heights)
+    scale = -1.0 if panel.relative and np.any(heights > 0) else palette.scale_of(heights)
     return Panel(panel.title, tuple(drawn), along, scale, met=panel.relative, stages=stages)
 
 
@@ -215,7 +215,7 @@ def variable_panel(variable: VariableRecord) -> Panel:
     drawn = [*lines(knots, variable.guess.T, guess, COLOURS, width=0.9, look="dashed")]
     for name, colour, values, width in zip(names, COLOURS, variable.value, WIDTHS, strict=False):
         drawn.append(Line(name, colour, knots, values, width))
-    title = f"{variable.name}  ({style.short(', '.join(variable.sets), 60)}); dashed: the guess"
+    title = f"{variable.name}  ({palette.short(', '.join(variable.sets), 60)}); dashed: the guess"
     return Panel(title, tuple(drawn), "knot", edges=tuple(near_bounds(variable).tolist()))
 
 
@@ -257,7 +257,7 @@ def growth_chart(growth: Growth, motion: Trajectory | None) -> Chart | None:
     least = low, max(float(factor.max()) * 1.5, low * GROWTH_RANGE)
     lost = reach(growth).end
     end = (lost, f"no gradient reaches from the start beyond {show(lost, 2)} s") if math.isfinite(lost) else ()
-    title, drawn = "Growth of a change at t until the end", lines(time, factor[:, None], ["growth"], style.BODIES)
+    title, drawn = "Growth of a change at t until the end", lines(time, factor[:, None], ["growth"], palette.BODIES)
     panel = Panel(title, drawn, "time t [s]", -1.0, edges=(1.0,), least=least, ticks=ticks, end=end)
     tables: list[Table] = [{TIME: time, "growth of a change until the end": factor}]
     tables += [] if begins is None else [{"a contact begins at [s]": begins}]
@@ -277,11 +277,11 @@ def energy_chart(energy: Energy) -> Chart | None:
     time, total = energy.time, energy.kinetic + energy.potential
     if time.size < 2 or not np.isfinite(total).any():
         return None
-    drawn = [Line("kinetic", style.SKY, time, energy.kinetic, 1.2)]
-    drawn.append(Line("potential", style.ORANGE, time, energy.potential, 1.2))
-    drawn.append(Line("total", style.BODIES[0], time, total, 1.8))
+    drawn = [Line("kinetic", palette.SKY, time, energy.kinetic, 1.2)]
+    drawn.append(Line("potential", palette.ORANGE, time, energy.potential, 1.2))
+    drawn.append(Line("total", palette.BODIES[0], time, total, 1.8))
     if np.any(energy.applied != 0):
-        drawn.append(Line("put in by forces", style.GREY, time, energy.applied, 1.0))
+        drawn.append(Line("put in by forces", palette.GREY, time, energy.applied, 1.0))
     keys = tuple(Key(line.name, line.colour) for line in drawn)
     table: Table = {TIME: time} | {f"energy {line.name} [J]": line.y for line in drawn}
     return Chart("energy", "Energy over time", (Panel("Energy [J]", tuple(drawn), TIME),), 1, keys, (table,), 1.8)

@@ -19,14 +19,9 @@ from time import monotonic
 
 from symphys import files
 from symphys.interrupts import Interrupts, ignoring_interrupts
-from symphys.report.making.stamps import FULL, LIGHT
-from symphys.report.pages.run import PAGE, write_light_report, write_run_report
+from symphys.report.pages.run import PAGE, write_run_figures, write_run_report
+from symphys.results.file_names import FIGURES
 from symphys.results.text_files import ReportError
-
-AUTO = "auto"
-PAGE_KINDS = (AUTO, FULL, LIGHT)
-MOST_FULL = 50
-"""With "auto", so many pages made at once are full at most; of more all are light."""
 
 
 @dataclass(frozen=True)
@@ -41,23 +36,15 @@ class PageFault:
         return f"{self.page} could not be made: {self.reason}"
 
 
-def is_light(kind: str, count: int) -> bool:
-    """Whether ``count`` pages that are made at once are light; ReportError for a kind that there is not."""
-    if kind not in PAGE_KINDS:
-        raise ReportError(f"there are no pages of the kind {kind!r}; there are {', '.join(PAGE_KINDS)}")
-    return kind == LIGHT or (kind == AUTO and count > MOST_FULL)
+def make_run_page(folder: Path, figures: bool) -> PageFault | None:
+    """Make the page of a run folder, and with ``figures`` its figures as files; return why it could not be made."""
 
+    def make() -> None:
+        write_run_report(folder)
+        if figures:
+            write_run_figures(folder, folder / FIGURES)
 
-def fitting_kinds(kind: str, count: int) -> tuple[str, ...]:
-    """Return the kinds of a page that need not be made again, of ``count`` at once."""
-    if kind == AUTO:
-        return (FULL, LIGHT) if is_light(kind, count) else (FULL,)
-    return (LIGHT,) if is_light(kind, count) else (FULL,)
-
-
-def make_run_page(folder: Path, light: bool) -> PageFault | None:
-    """Make the page of a run folder; why it could not be made, if it was not."""
-    return attempt(folder / PAGE, lambda: write_light_report(folder) if light else write_run_report(folder))
+    return attempt(folder / PAGE, make)
 
 
 def attempt(page: Path, make: Callable[[], object]) -> PageFault | None:
@@ -75,27 +62,29 @@ DIED = "the process that made it died: killed from outside, out of memory, or a 
 SLOW = "it was not made within {:g} s"
 STOP_TIMEOUT = 20.0
 """[s] that a worker has for the end of its page once it is asked to stop."""
-MIN_PAGES_PER_WORKER = {False: 4, True: 80}
-"""A worker takes a second to start: it is started for so many pages at least, full ones and (True) light ones."""
+MIN_PAGES_PER_WORKER = 80
+"""A worker takes a second to start: it is started for so many pages at least."""
+MIN_FIGURES_PER_WORKER = 4
+"""A worker is started for the figures of so many runs at least, each of which take a second."""
 
 Done = Callable[[Path, PageFault | None], None]
 """Receives each folder whose page was made, or could not be."""
 
 
-def make_run_pages(folders: Sequence[Path], light: bool, jobs: int, done: Done, limit: float = math.inf) -> None:
+def make_run_pages(folders: Sequence[Path], figures: bool, jobs: int, done: Done, limit: float = math.inf) -> None:
     """Make the page of every folder, here or in up to ``jobs`` worker processes.
 
     ``limit``: [s] that a page may take; there is always a worker where there is one.
 
     KeyboardInterrupt ends it: pages that are begun in workers are finished, and every page is whole or as it was.
     """
-    count = min(jobs, len(folders) // MIN_PAGES_PER_WORKER[light])
+    count = min(jobs, len(folders) // (MIN_FIGURES_PER_WORKER if figures else MIN_PAGES_PER_WORKER))
     left = deque(folders)
     if count > 1 or limit < math.inf:
-        PagePool(left, light, done, limit).run(max(count, 1))
+        PagePool(left, figures, done, limit).run(max(count, 1))
     with Interrupts().listening() as interrupted:  # a KeyboardInterrupt in the middle of a figure may be lost there
         while left:
-            done(left[0], make_run_page(left[0], light))
+            done(left[0], make_run_page(left[0], figures))
             left.popleft()
             if interrupted():
                 raise KeyboardInterrupt
@@ -122,7 +111,7 @@ class PagePool:
     """Worker processes and the pages that are left for them."""
 
     left: deque[Path]
-    light: bool
+    figures: bool
     done: Done
     limit: float = math.inf
 
@@ -131,7 +120,7 @@ class PagePool:
         workers: list[PageWorker] = []
         try:
             with ignoring_interrupts():
-                workers += [start(self.light) for _ in range(count)]
+                workers += [start(self.figures) for _ in range(count)]
             while workers:
                 ready = wait([worker.pipe for worker in workers], self.end_slow(workers))
                 for worker in [each for each in workers if each.pipe in ready]:
@@ -161,7 +150,7 @@ class PagePool:
                 self.done(worker.folder, PageFault(worker.folder / PAGE, why))
                 if self.left:
                     with ignoring_interrupts():
-                        workers.append(start(self.light))
+                        workers.append(start(self.figures))
             return
         if worker.folder is not None:
             self.done(worker.folder, fault)
@@ -174,11 +163,11 @@ class PagePool:
             end([worker])
 
 
-def start(light: bool) -> PageWorker:
+def start(figures: bool) -> PageWorker:
     """Return a new worker process."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
-    process = context.Process(target=work, args=(there, light), daemon=True)
+    process = context.Process(target=work, args=(there, figures), daemon=True)
     process.start()
     there.close()
     return PageWorker(process, here)
@@ -197,10 +186,10 @@ def end(workers: Sequence[PageWorker]) -> None:
             worker.pipe.close()
 
 
-def work(pipe: Connection, light: bool) -> None:
+def work(pipe: Connection, figures: bool) -> None:
     """Make pages in a worker process until there are no more, or until its parent has gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EOFError, OSError):
         pipe.send(None)
         while (folder := pipe.recv()) is not None:
-            pipe.send(make_run_page(folder, light))
+            pipe.send(make_run_page(folder, figures))

@@ -11,19 +11,13 @@ import os
 import re
 import stat
 import sys
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from urllib.parse import unquote
 
-import matplotlib as mpl
 import numpy as np
 
 from symphys.results.discovery import run_folders
-from symphys.results.file_names import FIGURES
 
-FULL, LIGHT = "full", "light"
 RUN_PAGE, BATCH_PAGE = "report.html", "index.html"
 OWN_PAGES = frozenset({RUN_PAGE, BATCH_PAGE})
 """What lies in a folder and is made from it."""
@@ -49,54 +43,24 @@ DRAWING = (
 SOURCES = (".py", ".js", ".css")
 HEAD = 4096
 """[bytes] of a page that hold its stamp."""
-STAMP = re.compile(rb'<meta name="made-from" content="(full|light) ([0-9a-f]{64})((?: [^" ]+)*)">')
+STAMP = re.compile(rb'<meta name="made-from" content="([0-9a-f]{64})">')
 
 
-@dataclass(frozen=True)
-class Stamp:
-    """The kind of a page, a checksum of what it was made from, and its figures.
-
-    Attributes:
-        kind: "full" or "light".
-        digest: of what it was made from.
-        figures: names of the pictures that lie beside it as files, as they stand in links.
-    """
-
-    kind: str
-    digest: str
-    figures: tuple[str, ...] = ()
-
-    def __str__(self) -> str:
-        """Return the stamp as it stands in the page."""
-        return " ".join([self.kind, self.digest, *self.figures])
-
-    def beside(self, figures: Iterable[str]) -> Stamp:
-        """Return the stamp of a page with these figures."""
-        return replace(self, figures=tuple(figures))
+def is_current(page: Path, digest: str) -> bool:
+    """Whether a page is there and was made from this."""
+    return read_stamp(page) == digest
 
 
-def is_current(page: Path, digest: str, kinds: Iterable[str] = (FULL,)) -> bool:
-    """Whether a page is there, of one of these kinds, made from this, and its figures lie beside it."""
-    found = read_stamp(page)
-    if found is None or found.digest != digest or found.kind not in kinds:
-        return False
-    beside = page.parent / FIGURES
-    return all((beside / f"{unquote(name)}.{kind}").is_file() for name in found.figures for kind in ("svg", "csv"))
-
-
-def read_stamp(page: Path) -> Stamp | None:
-    """Read the stamp of a page; None where there is no page, or none with a stamp."""
+def read_stamp(page: Path) -> str:
+    """Read the checksum that a page carries; empty where there is no page, or none with a checksum."""
     try:
         if not stat.S_ISREG(page.stat().st_mode):
-            return None
+            return ""
         with page.open("rb") as file:
             found = STAMP.search(file.read(HEAD))
     except OSError:
-        return None
-    if found is None:
-        return None
-    kind, digest, names = (part.decode("ascii", "replace") for part in found.groups())
-    return Stamp(kind, digest, tuple(names.split()))
+        return ""
+    return found[1].decode("ascii") if found else ""
 
 
 def folder_digest(folder: Path) -> str:
@@ -142,8 +106,8 @@ def batch_digest(root: Path) -> str:
 
 @cache
 def drawing_digest() -> str:
-    """Return the checksum of the code that draws pages, and of the versions of Python, matplotlib and numpy."""
-    found = hashlib.sha256(f"{sys.version} {mpl.__version__} {np.__version__}".encode())
+    """Return the checksum of the code that draws pages, and of the versions of Python and numpy."""
+    found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
     for path in sorted(each for name in DRAWING for each in sources(PACKAGE / name)):
         found.update(f"\0{path.relative_to(PACKAGE)}\0{file_digest(path)}".encode())
     return found.hexdigest()

@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from matplotlib.lines import Line2D
 
 from symphys import files
 from symphys.findings.writing import percent, show
+from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart, Key, Line, Panel
-from symphys.report.charts.drawing import chart_pictures
-from symphys.report.figures import style
-from symphys.report.figures.data import TIME, DataFigure, keep, thin
+from symphys.report.charts.motion import motion_charts
+from symphys.report.charts.tables import TIME
 from symphys.report.pages.markup import (
     Html,
     banner,
@@ -26,9 +25,9 @@ from symphys.report.pages.markup import (
     table,
     tag,
 )
-from symphys.report.pages.motion import gait_card, joint_card, motion_card, motion_pictures
+from symphys.report.pages.motion import gait_card, joint_card, motion_card
 from symphys.results.closed_loop import ClosedLoopRecord, read_closed_loop
-from symphys.results.file_names import FIGURES, SCENE, TRAJECTORY
+from symphys.results.file_names import SCENE, TRAJECTORY
 from symphys.results.scene import read_scene
 from symphys.results.trajectories import read_trajectory
 from symphys.types import Array
@@ -45,19 +44,15 @@ LATE = (
 
 
 def write_closed_loop_page(folder: Path) -> Path:
-    """Write the page of a closed loop from the files of its folder, and its figures as SVG and CSV beside it.
+    """Write the page of a closed loop from the files of its folder.
 
     Raises:
         ReportError: a file cannot be read or written.
     """
     record = read_closed_loop(folder)
     trajectory, scene = read_trajectory(folder / TRAJECTORY), read_scene(folder / SCENE)
-    pictures = motion_pictures(trajectory, scene)
-    charts = [plans_chart(record), commands_chart(record)]
-    with style.paper():
-        made = chart_pictures(charts) + style.picture("latencies", "How long plans took", draw_latencies(record))
-    pictures |= {picture.name: picture for picture in made}
-    style.write_figures(folder / FIGURES, pictures.values())
+    found = [*motion_charts(trajectory, scene), plans_chart(record), commands_chart(record), latency_chart(record)]
+    charts = {chart.name: chart for chart in found if chart is not None}
     body = join(
         [
             tag("p", f"Closed loop · {record.problem}", class_="kicker"),
@@ -65,17 +60,17 @@ def write_closed_loop_page(folder: Path) -> Path:
             verdict(record),
             numbers(record),
             card("Targets", targets(record), anchor="checks", note="Of the plant, at the end of the closed loop."),
-            motion_card(trajectory, scene, None, pictures, ()),
-            card("Plans and what happened", named_figure(pictures, "plans"), anchor="plans"),
-            card("Commands", named_figure(pictures, "commands"), anchor="commands"),
-            card("Latency", named_figure(pictures, "latencies"), anchor="latency", note=LATE),
-            joint_card(trajectory, scene, pictures),
-            gait_card(trajectory, scene, pictures),
+            motion_card(trajectory, scene),
+            card("Plans and what happened", named_figure(charts, "plans"), anchor="plans"),
+            card("Commands", named_figure(charts, "commands"), anchor="commands"),
+            card("Latency", named_figure(charts, "latencies"), anchor="latency", note=LATE),
+            joint_card(trajectory, scene, charts),
+            gait_card(trajectory, scene, charts),
             card("Setting", setting(record), anchor="provenance"),
         ]
     )
     out = folder / "report.html"
-    files.write_text(out, page(record.title, body, animated=True))
+    files.write_text(out, page(record.title, body))
     return out
 
 
@@ -152,60 +147,44 @@ def plans_chart(record: ClosedLoopRecord) -> Chart | None:
     shown = most_varied(record.actual)
     if not shown or not len(record.plan_time):
         return None
-    panels, tables = list[Panel](), []
+    panels = list[Panel]()
     for column in shown:
         name, drawn = record.value_names[column], list[Line]()
-        for k, (time, value) in enumerate(zip(record.plan_time, record.plan_value[:, :, column], strict=True), 1):
-            drawn.append(Line("", style.VERMILION, time, value, 0.9, "plain"))
-            drawn.append(Line("", style.VERMILION, time[:1], value[:1], look="points"))
-            tables.append({f"plan {k} {TIME}": time, f"plan {k} {name}": value})
-        drawn.append(Line(name, style.INK, record.actual_time, record.actual[:, column], 1.8))
-        tables.append({TIME: record.actual_time, name: record.actual[:, column]})
+        for time, value in zip(record.plan_time, record.plan_value[:, :, column], strict=True):
+            drawn.append(Line("", palette.VERMILION, time, value, 0.9, "plain"))
+            drawn.append(Line("", palette.VERMILION, time[:1], value[:1], look="points"))
+        drawn.append(Line(name, palette.INK, record.actual_time, record.actual[:, column], 1.8))
         panels.append(Panel(name, tuple(drawn), TIME))
-    keys = Key("what happened", style.INK), Key("plans, from where they began", style.VERMILION)
-    return Chart("plans", "Plans and what happened, over time", tuple(panels), 1, keys, tuple(tables), 1.7)
+    keys = Key("what happened", palette.INK), Key("plans, from where they began", palette.VERMILION)
+    return Chart("plans", "Plans and what happened, over time", tuple(panels), 1, keys)
 
 
 def commands_chart(record: ClosedLoopRecord) -> Chart | None:
     """Chart what acted on the plant over time."""
-    panels, tables = list[Panel](), []
+    panels = list[Panel]()
     for column in most_varied(record.command):
         name, values = record.command_names[column], record.command[:, column]
-        panels.append(Panel(name, (Line(name, style.BLUE, record.command_time, values, 1.2, "steps"),), TIME))
-        tables.append({TIME: record.command_time, name: values})
-    alt = "Commands over time"
-    return Chart("commands", alt, tuple(panels), tables=tuple(tables), height=1.5) if panels else None
+        panels.append(Panel(name, (Line(name, palette.BLUE, record.command_time, values, 1.2, "steps"),), TIME))
+    return Chart("commands", "Commands over time", tuple(panels)) if panels else None
 
 
-def draw_latencies(record: ClosedLoopRecord) -> DataFigure | None:
-    """Draw how long plans took: a histogram with the period of a tick, and over time."""
+def latency_chart(record: ClosedLoopRecord) -> Chart | None:
+    """Chart how long plans took: as a histogram, and over time, with the period of a tick."""
     if not len(record.latency):
         return None
-    figure = DataFigure(figsize=(style.WIDTH, 2.9), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    wall, work, period = (1e3 * each for each in (record.latency, record.work, np.array(1 / record.rate)))
-    edges = bin_edges(np.concatenate([wall, work, [float(period)]]))
-    for numbers, colour, name in ((wall, style.BLUE, "wall time"), (work, style.ORANGE, "processor time")):
+    wall, work, period = 1e3 * record.latency, 1e3 * record.work, 1e3 / record.rate
+    edges = bin_edges(np.concatenate([wall, work, [period]]))
+    counted, taken = list[Line](), list[Line]()
+    for numbers, colour, name in ((wall, palette.BLUE, "wall time"), (work, palette.ORANGE, "processor time")):
         counts, _ = np.histogram(numbers, edges)
-        left.stairs(counts, edges, color=colour, linewidth=1.3)
-        keep(left, {f"{name} from [ms]": edges[:-1], f"{name} plans": counts})
-        time, value = thin(record.asked, numbers[:, None])
-        right.plot(time, value[:, 0], ".", color=colour, markersize=2.5)
-        keep(right, {f"{name} at {TIME}": time, f"{name} [ms]": value[:, 0]})
-    for axes, along in ((left, left.axvline), (right, right.axhline)):
-        along(float(period), color=style.VERMILION, linewidth=1.0, linestyle=(0, (4, 2)))
-        which = "x" if axes is left else "y"
-        style.set_log(axes, which, edges)
-    left.set_title("Plans by the time they took")
-    left.set_xlabel("[ms]")
-    style.set_symlog(left, "y", 1.0)
-    style.set_linear(right, "x", 6)
-    right.set_title("Time that each plan took [ms]")
-    right.set_xlabel(TIME)
-    handles = [Line2D([], [], color=colour) for colour in (style.BLUE, style.ORANGE)]
-    handles.append(Line2D([], [], color=style.VERMILION, linestyle=(0, (4, 2))))
-    style.legend_above(figure, handles, ["wall time", "processor time", "a tick"])
-    return figure
+        counted.append(Line(name, colour, edges, np.append(counts, 0.0), 1.3, "steps area"))
+        taken.append(Line(name, colour, record.asked, numbers, look="points"))
+    histogram = Panel(
+        "Plans by the time they took", tuple(counted), "[ms]", 1.0, -1.0, least=(0.0,), end=(period, "a tick")
+    )
+    over_time = Panel("Time that each plan took [ms]", tuple(taken), TIME, -1.0, edges=(period,))
+    keys = Key("wall time", palette.BLUE), Key("processor time", palette.ORANGE)
+    return Chart("latencies", "How long plans took", (histogram, over_time), 2, keys)
 
 
 def most_varied(values: Array) -> list[int]:

@@ -13,10 +13,10 @@ from symphys import files
 from symphys.findings import writing
 from symphys.findings.verdict import BEST_FOUND, DOUBTED
 from symphys.findings.writing import show
-from symphys.report.figures import style
+from symphys.report.charts import palette
 from symphys.report.making.stamps import RUN_PAGE
 from symphys.report.pages import words
-from symphys.report.pages.markup import ICONS, Html, banner, card, dot, embedded, join, pill, table, tag
+from symphys.report.pages.markup import ICONS, Html, banner, card, dot, join, packed_json, pill, table, tag
 from symphys.results.discovery import Entry, Study, middle
 from symphys.results.result import CheckRecord, smoothed
 from symphys.results.run import Run
@@ -139,7 +139,7 @@ LEAST_IS_BEST = ("work in rollouts", "solve")
 
 def solver_table(study: Study) -> Html:
     """Return a row for each solver, medians over its seeds."""
-    marks = style.solver_marks(entry.solver for entry in study.entries)
+    marks = palette.solver_marks(entry.solver for entry in study.entries)
     shown = columns(study)
     medians = [[entry.median([read(run) for run in entry.runs]) for _, read, _ in shown] for entry in study.entries]
     leasts = [least(study, [row[i] for row in medians]) for i in range(len(shown))]
@@ -345,7 +345,7 @@ def row_table(columns: Sequence[Column], noun: str) -> Html:
     return tag(
         "div",
         tag("p", "The table needs JavaScript; result.json of each run folder has its numbers.", class_="note"),
-        embedded(json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)),
+        packed_json(data),
         class_="rows",
     )
 

@@ -5,21 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib.lines import Line2D
 
 from symphys import files
 from symphys.findings.writing import capital, percent, several, show
-from symphys.report.charts.chart import Chart, Key, Line, Panel
-from symphys.report.charts.drawing import chart_pictures
-from symphys.report.figures import style
-from symphys.report.figures.data import TIME, DataFigure, keep
-from symphys.report.making.stamps import FULL, RUN_PAGE, Stamp, folder_digest
+from symphys.report.charts import palette
+from symphys.report.charts.chart import Bars, Chart, Key, Line, Panel
+from symphys.report.charts.tables import TIME, Table
+from symphys.report.making.stamps import RUN_PAGE, folder_digest
 from symphys.report.pages.markup import Html, banner, card, facts, join, named_figure, page, pill, stats, table, tag
 from symphys.report.scene.animation import animation
 from symphys.report.scene.ghosts import with_ghosts
-from symphys.results.file_names import FIGURES, SCENE
+from symphys.results.file_names import SCENE
 from symphys.results.identification import (
     HISTORY,
     IDENTIFICATION,
@@ -37,19 +36,23 @@ INTERVALS = (
     "is the wider one where recordings differ by more than noise."
 )
 GHOST = "What was measured is seen through; what is simulated with the estimates is solid."
+MOST_ERRORS = 12.0
+"""[standard errors] How far the bars of intervals go at most."""
+WHITE_FROM = 0.6
+"""Correlations from which a cell is so dark that its number is white."""
+SHOWN = 0.995
+"""Share of the residuals that the axis has room for."""
 STRONG_CORRELATION = 0.9
 """Correlations that are named."""
 MOST_NAMES = 30
 """Numbers of which a figure shows correlations and intervals."""
 MOST_PANELS = 6
-POINTS = 4000
-"""Residuals that are drawn of a quantity."""
 BINS = 40
 """Spans of time of which a figure shows the mean residual."""
 
 
 def write_identification_page(folder: Path) -> Path:
-    """Write the page of an identification from the files of its folder, and its figures as SVG and CSV beside it.
+    """Write the page of an identification from the files of its folder.
 
     Raises:
         ReportError: a file cannot be read or written.
@@ -57,8 +60,7 @@ def write_identification_page(folder: Path) -> Path:
     digest = folder_digest(folder)
     found, replays = read_identification(folder), read_replays(folder)
     scene = read_scene(folder / SCENE) if replays else Scene()
-    pictures = draw_pictures(found, replays)
-    style.write_figures(folder / FIGURES, pictures.values())
+    charts = {chart.name: chart for chart in every_chart(found, replays)}
     note = "Of the recordings fitted to."
     body = join(
         [
@@ -67,20 +69,26 @@ def write_identification_page(folder: Path) -> Path:
             verdict(found),
             *(tag("p", f"Start: {each}.") for each in found.starts),
             numbers(found),
-            card(
-                "Estimates", estimates(found), named_figure(pictures, "intervals"), anchor="estimates", note=INTERVALS
-            ),
+            card("Estimates", estimates(found), named_figure(charts, "intervals"), anchor="estimates", note=INTERVALS),
             card("Unidentifiable parameters", unidentifiable(found), anchor="open"),
-            card("Correlations", named_figure(pictures, "correlations"), strong(found), anchor="correlations"),
-            card("Residual analysis", left(found), named_figure(pictures, "residuals"), anchor="left", note=note),
+            card("Correlations", correlations(found), strong(found), anchor="correlations"),
+            card("Residual analysis", left(found), named_figure(charts, "residuals"), anchor="left", note=note),
             card("Prediction", predictions(found), anchor="prediction"),
-            *(worst(replay, scene, named_figure(pictures, f"replay-{k}")) for k, replay in enumerate(replays, 1)),
-            card("The fit", named_figure(pictures, "course"), setting(found), anchor="fit"),
+            *(worst(replay, scene, named_figure(charts, f"replay-{k}")) for k, replay in enumerate(replays, 1)),
+            card("The fit", named_figure(charts, "course"), setting(found), anchor="fit"),
         ]
     )
-    out, stamp = folder / RUN_PAGE, Stamp(FULL, digest)
-    files.write_text(out, page(found.title or found.problem, body, animated=bool(replays), stamp=stamp))
-    return out
+    files.write_text(folder / RUN_PAGE, page(found.title or found.problem, body, digest))
+    return folder / RUN_PAGE
+
+
+def write_identification_figures(folder: Path, out: Path) -> list[Path]:
+    """Write the charts of the page of an identification as NAME.svg and NAME.csv into a folder; return the paths."""
+    from symphys.report.figures.run import draw_figures  # late: it imports matplotlib
+    from symphys.report.figures.style import write_figures
+
+    charts = every_chart(read_identification(folder), read_replays(folder))
+    return write_figures(out, draw_figures(charts, None, Scene()))
 
 
 def identification_folders(root: Path) -> list[Path]:
@@ -229,102 +237,89 @@ def setting(found: Identification) -> Html:
     return facts(rows)
 
 
-def draw_pictures(found: Identification, replays: Sequence[RecordingReplay]) -> dict[str, style.Picture]:
-    """Draw every figure of the page, by name; those that have nothing to show are left out."""
-    charts = [course_chart(found), *(replay_chart(k, replay) for k, replay in enumerate(replays, 1))]
-    with style.paper():
-        made = style.picture("intervals", "Estimates with their intervals", draw_intervals(found))
-        made += style.picture("correlations", "Correlations of the estimates", draw_correlations(found))
-        made += style.picture("residuals", "Residuals over time", draw_residuals(found))
-        made += chart_pictures(charts)
-    return {picture.name: picture for picture in made}
+def correlations(found: Identification) -> Html:
+    """Return the correlations of the shared numbers as a table of coloured cells; empty without two of them."""
+    names = [each.name for each in found.parameters][:MOST_NAMES]
+    if len(names) < 2 or not np.isfinite(found.correlation).any():
+        return Html("")
+    head = [tag("th", ""), *(tag("th", name, scope="col") for name in names)]
+    cells = [[correlation_cell(float(value)) for value in row] for row in found.correlation[: len(names), : len(names)]]
+    rows = [tag("tr", tag("th", name, scope="row"), *row) for name, row in zip(names, cells, strict=True)]
+    content = tag("table", tag("thead", tag("tr", *head)), tag("tbody", *rows), class_="correlations")
+    return tag("div", content, class_="scroll")
 
 
-def draw_intervals(found: Identification) -> DataFigure | None:
-    """Each number with both of its intervals, in standard errors from the estimate."""
+def correlation_cell(value: float) -> Html:
+    """Return a cell: the stronger, the darker; red for what grows together, blue for what does not."""
+    if not math.isfinite(value):
+        return tag("td", "")
+    colour = "178 24 43" if value > 0 else "33 102 172"
+    ink = "; color: #fff" if abs(value) > WHITE_FROM else ""
+    return tag("td", show(value, 2), style=f"background: rgb({colour} / {min(abs(value), 1):.2f}){ink}")
+
+
+def every_chart(found: Identification, replays: Sequence[RecordingReplay]) -> list[Chart]:
+    """Return every chart of the page; those that have nothing to show are left out."""
+    charts = [interval_chart(found), residual_chart(found), course_chart(found)]
+    charts += [replay_chart(k, replay) for k, replay in enumerate(replays, 1)]
+    return [chart for chart in charts if chart is not None]
+
+
+def interval_chart(found: Identification) -> Chart | None:
+    """Chart both intervals and the prior of each number, in standard errors from the estimate."""
     known = [each for each in found.parameters if np.isfinite(each.error) and each.error > 0][:MOST_NAMES]
     if not known:
         return None
-    figure = DataFigure(figsize=(style.WIDTH, 1.0 + 0.32 * len(known)), layout="constrained")
-    axes = figure.subplots()
-    rows = np.arange(len(known))[::-1]
-    columns: dict[str, list[float]] = {}
-    for row, each in zip(rows, known, strict=True):
-        for low, high, colour, shift, name in (
-            (each.lower, each.upper, style.BLUE, 0.14, "Jacobian"),
-            (each.bootstrap_lower, each.bootstrap_upper, style.ORANGE, -0.14, "bootstrap"),
+    bars, columns, used = list[Bars](), dict[str, list[float]](), dict[str, Key]()
+    for each in known:
+        name = each.name
+        for kind, colour, low, high in (
+            ("95 % by the Jacobian", palette.BLUE, each.lower, each.upper),
+            ("95 % by the bootstrap", palette.ORANGE, each.bootstrap_lower, each.bootstrap_upper),
+            ("prior", palette.FAINT, each.prior_mean - each.prior_deviation, each.prior_mean + each.prior_deviation),
         ):
             ends = [(end - each.value) / each.error for end in (low, high)]
-            axes.plot(ends, [row + shift] * 2, color=colour, linewidth=3, solid_capstyle="butt")
             for key, end in zip(("from", "to"), ends, strict=True):
-                columns.setdefault(f"{name} {key} [standard errors]", []).append(end)
-        if np.isfinite(each.prior_deviation):
-            axes.plot((each.prior_mean - each.value) / each.error, row, "d", color=style.SOFT, markersize=4)
-    axes.axvline(0.0, color=style.INK, linewidth=0.8)
-    axes.set_yticks(rows, [each.name for each in known])
-    axes.set_ylim(-0.7, len(known) - 0.3)
-    axes.grid(visible=False, axis="y")
-    style.set_linear(axes, "x", 8)
-    axes.set_xlabel("from the estimate [standard errors]")
-    keep(axes, {name: np.array(values) for name, values in columns.items()})
-    names = ["95 % by the Jacobian"] + ["95 % by the bootstrap"] * (len(found.draws) > 0)
-    handles = [Line2D([], [], color=colour, linewidth=3) for colour in (style.BLUE, style.ORANGE)[: len(names)]]
-    style.legend_above(figure, handles, names)
-    return figure
-
-
-def draw_correlations(found: Identification) -> DataFigure | None:
-    """Draw the correlations of the shared numbers."""
-    names = [each.name for each in found.parameters][:MOST_NAMES]
-    if len(names) < 2 or not np.isfinite(found.correlation).any():
+                columns.setdefault(f"{kind} {key} [standard errors]", []).append(end)
+            if np.isfinite(ends).all():
+                bars.append(Bars(name, colour, ((max(ends[0], -MOST_ERRORS), min(ends[1], MOST_ERRORS)),)))
+                used[kind] = Key(kind, colour)
+                name = ""
+    if not bars:
         return None
-    shown = found.correlation[: len(names), : len(names)]
-    side = min(1.6 + 0.36 * len(names), style.WIDTH)
-    figure = DataFigure(figsize=(style.WIDTH, side), layout="constrained")
-    axes = figure.subplots()
-    image = axes.imshow(shown, cmap="RdBu_r", vmin=-1, vmax=1)
-    axes.set_xticks(range(len(names)), names, rotation=60, ha="right", rotation_mode="anchor")
-    axes.set_yticks(range(len(names)), names)
-    axes.grid(visible=False)
-    if len(names) <= 12:
-        for (i, j), value in np.ndenumerate(shown):
-            if np.isfinite(value) and i != j:
-                colour = "white" if abs(value) > 0.6 else style.INK
-                axes.text(
-                    j, i, style.number_label(round(float(value), 2)), ha="center", va="center", color=colour, fontsize=7
-                )
-    figure.colorbar(image, ax=axes, shrink=0.8).outline.set_visible(False)
-    keep(axes, {name: shown[:, k] for k, name in enumerate(names)})
-    return figure
+    reach = 1.05 * max(abs(end) for bar in bars for end in bar.spans[0])
+    title = "From the estimate [standard errors]"
+    panel = Panel(title, least=(-reach, reach), bars=tuple(bars), end=(0.0, ""))
+    table: dict[str, Any] = {"number": [each.name for each in known], **columns}
+    height = 0.4 + 0.25 * len(bars)
+    return Chart("intervals", "Estimates with their intervals", (panel,), 1, tuple(used.values()), (table,), height)
 
 
-def draw_residuals(found: Identification) -> DataFigure | None:
-    """Residuals by noise over time, of what was fitted to, with their running mean."""
-    if not found.quantities:
-        return None
-    shown = list(range(len(found.quantities)))[:MOST_PANELS]
-    figure = DataFigure(figsize=(style.WIDTH, 0.8 + 1.6 * len(shown)), layout="constrained")
-    grid = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+def residual_chart(found: Identification) -> Chart | None:
+    """Chart residuals by noise over time, of what was fitted to, with their running mean."""
     back = np.asarray(found.held_back, bool)[np.asarray(found.residual_recording, int)]
-    for axes, q in zip(grid, shown, strict=True):
+    panels, tables = list[Panel](), list[Table]()
+    for q, quantity in enumerate(found.quantities[:MOST_PANELS]):
         mine = (np.asarray(found.residual_quantity, int) == q) & ~back
-        time, value = found.residual_time[mine], found.residual[mine]
-        few = np.linspace(0, len(time) - 1, min(len(time), POINTS)).astype(int) if len(time) else np.zeros(0, int)
-        axes.plot(time[few], value[few], ".", color=style.SKY, markersize=1.6, alpha=0.6, rasterized=True)
-        keep(axes, {TIME: time[few], f"{found.quantities[q].name} by noise": value[few]})
+        order = np.argsort(found.residual_time[mine], kind="stable")
+        time, value = found.residual_time[mine][order], found.residual[mine][order]
+        reach = 1.1 * max(float(np.quantile(np.abs(value), SHOWN)) if len(value) else 1.0, 2.0)
+        beyond = int(np.sum(np.abs(value) > reach))
         middle, mean, deviation = _binned(time, value)
-        axes.fill_between(middle, mean - deviation, mean + deviation, color=style.FAINT, alpha=0.35, linewidth=0)
-        axes.plot(middle, mean, color=style.VERMILION, linewidth=1.4)
-        axes.axhline(0.0, color=style.INK, linewidth=0.7)
-        axes.set_title(f"{found.quantities[q].name}: {found.quantities[q].verdict}")
-        reach = float(np.quantile(np.abs(value), 0.995)) if len(value) else 1.0
-        axes.set_ylim(-max(reach, 2.0) * 1.1, max(reach, 2.0) * 1.1)
-        style.set_linear(axes, "y", 4)
-    style.set_linear(grid[-1], "x", 8)
-    grid[-1].set_xlabel(TIME)
-    handles = [Line2D([], [], color=style.SKY, marker=".", linestyle=""), Line2D([], [], color=style.VERMILION)]
-    style.legend_above(figure, handles, ["residuals by noise", "their mean, and where two thirds lie"])
-    return figure
+        drawn = [Line("", palette.SKY, time, np.where(np.abs(value) > reach, np.nan, value), look="points")]
+        drawn += [Line("", palette.VERMILION, middle, mean + s * deviation, 1.0, "dotted") for s in (-1, 1)]
+        drawn.append(Line("mean", palette.VERMILION, middle, mean, 1.4, "plain"))
+        note, title = f"{beyond} beyond the axis" if beyond else "", f"{quantity.name}: {quantity.verdict}"
+        panels.append(Panel(title, tuple(drawn), TIME, edges=(0.0,), least=(-reach, reach), note=note))
+        tables.append({TIME: time, f"{quantity.name} by noise": value})
+    keys = (
+        Key("residuals by noise", palette.SKY, "points"),
+        Key("their mean", palette.VERMILION),
+        Key("where two thirds lie", palette.VERMILION, "dotted"),
+    )
+    if not panels:
+        return None
+    return Chart("residuals", "Residuals over time", tuple(panels), 1, keys, tuple(tables), 1.6, points=4000)
 
 
 def course_chart(found: Identification) -> Chart | None:
@@ -335,7 +330,7 @@ def course_chart(found: Identification) -> Chart | None:
     panels, iteration, columns = list[Panel](), history[:, 0], dict(zip(HISTORY, history.T, strict=True))
     for name, title in (("merit", "Merit"), ("left", "Standard errors that are left")):
         scale = -1.0 if np.any(columns[name] > 0) else 0.0
-        panels.append(Panel(title, (Line(name, style.BLUE, iteration, columns[name]),), "iteration", scale))
+        panels.append(Panel(title, (Line(name, palette.BLUE, iteration, columns[name]),), "iteration", scale))
     table = {name: columns[name] for name in ("iteration", "merit", "left")}
     return Chart("course", "The course of the fit", tuple(panels), 2, tables=(table,), height=2.2)
 
@@ -346,13 +341,13 @@ def replay_chart(number: int, replay: RecordingReplay) -> Chart | None:
     for each in replay.quantities[:MOST_PANELS]:
         drawn, several_ = list[Line](), each.measured.shape[1] > 1
         for m, (measured, simulated) in enumerate(zip(each.measured.T, each.simulated.T, strict=True)):
-            colour = style.AXES[m % len(style.AXES)] if several_ else style.BLUE
+            colour = palette.AXES[m % len(palette.AXES)] if several_ else palette.BLUE
             drawn.append(Line("measured", colour, replay.time, measured, look="points"))
             drawn.append(Line("simulated", colour, replay.time, simulated, 1.2, "plain"))
             label = f" {m + 1}" if several_ else ""
             tables.append({TIME: replay.time, f"measured{label}": measured, f"simulated{label}": simulated})
         panels.append(Panel(f"{each.name} [{each.unit}]" if each.unit else each.name, tuple(drawn), TIME))
-    keys = Key("measured", style.SOFT, "points"), Key("simulated", style.SOFT)
+    keys = Key("measured", palette.SOFT, "points"), Key("simulated", palette.SOFT)
     alt = f"{replay.name}, measured and simulated"
     return Chart(f"replay-{number}", alt, tuple(panels), 1, keys, tuple(tables), 1.6) if panels else None
 

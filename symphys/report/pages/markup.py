@@ -8,25 +8,19 @@ import html
 import json
 import re
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from urllib.parse import quote
 
 from symphys.report.charts.chart import Chart
-from symphys.report.figures.style import Picture
-from symphys.report.making.stamps import Stamp
-from symphys.results.file_names import FIGURES
 
 VOID = frozenset({"br", "img", "input", "link", "meta"})
 HERE = Path(__file__).parents[1] / "static"
 SCRIPTS = ("geometry.js", "solids.js", "terrain.js", "painter.js", "joints.js", "animation.js")
-CHARTS, ROWS = ("numbers.js", "charts.js"), ("numbers.js", "rows.js")
+SHARED, CHARTS, ROWS = ("numbers.js",), ("charts.js",), ("rows.js",)
 UNPACK = "unpack.js"
 PACKED = "packed"
 """Class of what ``unpack.js`` unpacks."""
-LINKED = re.compile(rf'href="{FIGURES}/([^"]+)\.svg"')
-"""A link to a figure as a file, by its name as it stands in links."""
 ICONS = {"good": "✓", "fair": "!", "bad": "✕", "unknown": "?"}
 
 
@@ -91,29 +85,17 @@ def dot(colour: str) -> Html:
     return tag("span", class_="dot", style=f"background:{colour}", aria_hidden="true")
 
 
-Drawn = Picture | Chart
-"""What a page shows as a figure: drawn already, or by the page's own script."""
-
-
-def figures(pictures: Iterable[Drawn], caption: Part = "") -> Html:
-    """Pictures embedded in the page, with one caption."""
-    parts = [chart(picture) if isinstance(picture, Chart) else figure(picture) for picture in pictures]
+def figures(charts: Iterable[Chart], caption: Part = "") -> Html:
+    """Return charts, which the page's script draws, with one caption."""
+    parts = [chart(each) for each in charts]
     if parts and caption:
         parts.append(tag("p", caption, class_="caption"))
     return join(parts)
 
 
-def named_figure(pictures: Mapping[str, Drawn], name: str, caption: Part = "") -> Html:
-    """Embed the picture of that name, if it was made."""
-    return figures([pictures[name]] if name in pictures else [], caption)
-
-
-def figure(picture: Picture) -> Html:
-    """Return a picture embedded in the page, with links to its files, which lie in a folder beside the page."""
-    code = base64.b64encode(picture.svg.encode()).decode("ascii")
-    svg, data = (f"{FIGURES}/{quote(picture.name)}.{kind}" for kind in ("svg", "csv"))
-    links = tag("figcaption", tag("a", "SVG", href=svg), " ", tag("a", "CSV", href=data, title="the numbers drawn"))
-    return tag("figure", tag("img", alt=picture.alt, src=f"data:image/svg+xml;base64,{code}"), links)
+def named_figure(charts: Mapping[str, Chart], name: str, caption: Part = "") -> Html:
+    """Return the chart of that name, if there is one."""
+    return figures([charts[name]] if name in charts else [], caption)
 
 
 def chart(found: Chart) -> Html:
@@ -128,15 +110,9 @@ def pack(text: str) -> str:
 
 
 def packed_json(value: object) -> Html:
-    """Embed a value of strict JSON for scripts of a light page, compressed."""
+    """Embed a value of strict JSON for scripts of the page, compressed."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
     return tag("script", Html(pack(text)), type="application/json", class_=PACKED)
-
-
-def embedded(data: str) -> Html:
-    """Return a text of JSON for scripts of the page, harmless in HTML whatever it holds."""
-    inert = data.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
-    return tag("script", Html(inert), type="application/json")
 
 
 def stats(pairs: Iterable[tuple[str, str]]) -> Html:
@@ -155,28 +131,33 @@ def fold(title: str, text: str) -> Html:
     return tag("details", tag("summary", title), tag("pre", text)) if text.strip() else Html("")
 
 
-def page(title: str, body: Part, animated: bool = False, rows: bool = False, stamp: Stamp | None = None) -> str:
+UNPACKED = tag(
+    "p",
+    "This browser cannot unpack the curves and the motion of this page; any browser of 2023 or later can.",
+    class_="note unpacked",
+    hidden="",
+)
+SCRIPTLESS = tag("noscript", tag("p", "Curves, motions and long tables need JavaScript.", class_="note"))
+
+
+def page(title: str, body: Part, digest: str = "") -> str:
     """Return the whole document: no part of it is loaded from elsewhere, and no script but our own may run.
 
-    ``animated``: whether it plays a motion; ``rows``: whether it has a table that is shown a page at a time; ``stamp``:
-    what it was made from.
+    The scripts are those that the body needs. ``digest``: the checksum of what the page was made from.
     """
-    script = read_static(*(SCRIPTS if animated else ()), *(ROWS if rows else ()))
-    scripts = tag("script", Html(script)) if script else Html("")
-    return document(title, body, scripts, [script] if script else [], stamp)
-
-
-def light_page(title: str, body: Part, animated: bool, stamp: Stamp | None = None) -> str:
-    """Make a document whose scripts are compressed, among them the one that draws charts."""
-    first, then, packed = light_scripts(animated)
+    first, then, packed = packed_scripts("<canvas" in body, 'class="chart"' in body, 'class="rows"' in body)
+    if not then:
+        return document(title, body, Html(""), (), digest)
     held = tag("script", Html(packed), type="text/plain", class_=PACKED, id="scripts")
-    return document(title, body, join([held, tag("script", Html(first))]), [first, then], stamp)
+    scripts = join([held, tag("script", Html(first))])
+    return document(title, join([UNPACKED, SCRIPTLESS, body]), scripts, (first, then), digest)
 
 
 @cache
-def light_scripts(animated: bool) -> tuple[str, str, str]:
+def packed_scripts(animated: bool, charts: bool, rows: bool) -> tuple[str, str, str]:
     """Return the script that unpacks, the script that it unpacks, and the latter compressed."""
-    then = squeezed(read_static(*(SCRIPTS if animated else ()), *CHARTS))
+    parts = (SCRIPTS, animated), (SHARED, charts or rows), (CHARTS, charts), (ROWS, rows)
+    then = squeezed(read_static(*(name for names, wanted in parts if wanted for name in names)))
     return read_static(UNPACK), then, pack(then)
 
 
@@ -191,15 +172,15 @@ def read_static(*names: str) -> str:
     return "".join((HERE / name).read_text(encoding="utf-8") for name in names)
 
 
-def document(title: str, body: Part, scripts: Html, allowed: Sequence[str], stamp: Stamp | None = None) -> str:
-    """Head and body; ``allowed``: the texts of the scripts that may run."""
-    digests = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii") for script in allowed]
-    sources = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
-    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {sources}"
+def document(title: str, body: Part, scripts: Html, allowed: Collection[str], digest: str) -> str:
+    """Return head and body; ``allowed``: the texts of the scripts that may run."""
+    hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii") for script in allowed]
+    sources = " ".join(f"'sha256-{each}'" for each in hashes) or "'none'"
+    policy = f"default-src 'none'; style-src 'unsafe-inline'; script-src {sources}"
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
-        tag("meta", name="made-from", content=str(stamp.beside(LINKED.findall(body)))) if stamp else "",
+        tag("meta", name="made-from", content=digest) if digest else "",
         tag("meta", http_equiv="Content-Security-Policy", content=policy),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("title", title),

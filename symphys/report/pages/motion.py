@@ -13,19 +13,14 @@ import numpy as np
 
 from symphys import files
 from symphys.findings.writing import listed, percent, several, show
+from symphys.report.charts.chart import Chart
 from symphys.report.charts.contacts import by_surfaces, shown_pairs
-from symphys.report.charts.drawing import chart_pictures
 from symphys.report.charts.motion import MOST_BODIES, controlled_bodies, motion_charts, shown_bodies
-from symphys.report.figures.style import Picture, paper, picture, write_figures
-from symphys.report.pages.markup import Drawn, Html, Part, card, figures, join, named_figure, page, pill, table, tag
-from symphys.report.robots.branches import is_large
+from symphys.report.pages.markup import Html, Part, card, figures, join, named_figure, page, pill, table, tag
 from symphys.report.robots.gait import LOADED_SHARE, stances, weight
 from symphys.report.robots.joint_charts import shown
 from symphys.report.robots.joint_use import Channel, channels, separation
-from symphys.report.robots.strip import draw_strip
-from symphys.report.scene.animation import animation, light_animation
-from symphys.report.scene.motion import draw_motion
-from symphys.results.file_names import FIGURES
+from symphys.report.scene.animation import animation
 from symphys.results.scene import Scene, read_scene
 from symphys.results.scene_joints import SceneMotor
 from symphys.results.trajectories import read_trajectory
@@ -36,19 +31,13 @@ OFTEN_SATURATED = 0.25
 MOST_ROWS = 60
 MOST_NAMED = 4
 HEADER = ("joint", "moves over", "limits", "motor", "largest torque or force", "saturated")
-HOW_DRAWN = "Poses at even times, the later the darker, fewer where a body hardly moves; spokes and edges turn with it."
-HOW_ROBOTS_DRAWN = (
-    "Whole poses, each most of a length further on, the later the stronger; lines are paths of base bodies and feet."
-)
-HOW_JOINTS_DRAWN = "Dots are joints, squares those that slide or hold fast; bars are the axes."
-HOW_STRIP_DRAWN = "At even times; the section shown follows what travels far."
 HOW_FORCED = (
     "A force is the step's impulse over its duration, so an impact is a spike whose height grows as dt shrinks."
 )
 
 
 def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str = "Motion") -> Path:
-    """Write a page that plays and draws a recorded motion, and its figures as SVG and CSV beside it.
+    """Write a page that plays and draws a recorded motion.
 
     Args:
         trajectory_npz: as in a run folder.
@@ -67,8 +56,7 @@ def write_motion(trajectory_npz: Path, scene_json: Path, out: Path, title: str =
 
 def write_motion_page(trajectory: Trajectory, scene: Scene, out: Path, title: str = "Motion") -> Path:
     """Write the page of a motion that is at hand; arguments and errors are those of ``write_motion``."""
-    pictures = motion_pictures(trajectory, scene)
-    write_figures(out.parent / FIGURES, pictures.values())
+    charts = {chart.name: chart for chart in motion_charts(trajectory, scene)}
     duration, steps = trajectory.time[-1] - trajectory.time[0], len(trajectory.time) - 1
     bodies = several(len(trajectory.body_names), "body", "bodies")
     body = join(
@@ -76,44 +64,24 @@ def write_motion_page(trajectory: Trajectory, scene: Scene, out: Path, title: st
             tag("p", "Simulated motion", class_="kicker"),
             tag("h1", title),
             tag("p", f"{show(duration, 4)} s in {steps} steps; {bodies}.", class_="lead"),
-            motion_card(trajectory, scene, None, pictures, ()),
-            *motion_cards(trajectory, scene, pictures),
+            motion_card(trajectory, scene),
+            *motion_cards(trajectory, scene, charts),
         ]
     )
-    files.write_text(out, page(title, body, animated=True))
+    files.write_text(out, page(title, body))
     return out
 
 
-def motion_pictures(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> dict[str, Picture]:
-    """Draw every figure of a motion, by name; what it does not have is left out."""
-    with paper():
-        made = picture("motion", "Path and poses over time", draw_motion(trajectory, scene, guess))
-        alt = "The motion at even times, from the side and from above"
-        made += picture("strip", alt, draw_strip(trajectory, scene))
-        made += chart_pictures(motion_charts(trajectory, scene))
-    return {each.name: each for each in made}
-
-
 def motion_card(
-    trajectory: Trajectory | None,
-    scene: Scene,
-    guess: Trajectory | None,
-    pictures: Mapping[str, Drawn],
-    faults: Sequence[str],
+    trajectory: Trajectory | None, scene: Scene, guess: Trajectory | None = None, faults: Sequence[str] = ()
 ) -> Html:
-    """Show the motion played and drawn, or say why there is none; on a light page it is played only."""
+    """Show the motion played, with the path of its guess, or say why there is none."""
     notes = tag("p", "Not read: " + "; ".join(faults) + ".", class_="note") if faults else Html("")
-    if trajectory is None:
-        return card("The motion", tag("p", "This run recorded no motion."), notes, anchor="motion")
-    if "motion" not in pictures:
-        return card("The motion", light_animation(trajectory, scene, guess), notes, anchor="motion")
-    how = HOW_ROBOTS_DRAWN if is_large(trajectory, scene) else HOW_DRAWN
-    drawn = figures([pictures["motion"]], f"{how} {HOW_JOINTS_DRAWN}" if scene.joints else how)
-    strip = named_figure(pictures, "strip", HOW_STRIP_DRAWN)
-    return card("The motion", animation(trajectory, scene, guess), strip, drawn, notes, anchor="motion")
+    played = tag("p", "This run recorded no motion.") if trajectory is None else animation(trajectory, scene, guess)
+    return card("The motion", played, notes, anchor="motion")
 
 
-def motion_cards(motion: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> list[Html]:
+def motion_cards(motion: Trajectory, scene: Scene, charts: Mapping[str, Chart]) -> list[Html]:
     """Show joints, gait, states, controls and contacts over time."""
     bodies, touching = len(motion.body_names), by_surfaces(motion)
     states = shortened(len(shown_bodies(motion)), bodies, "bodies", "that move most")
@@ -121,11 +89,11 @@ def motion_cards(motion: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]
     acting = shortened(min(controlled, MOST_BODIES), controlled, "bodies", "that come first")
     contacts = shortened(len(shown_pairs(touching)), len(touching.contact_names), "pairs", "with the largest impulses")
     return [
-        joint_card(motion, scene, pictures),
-        gait_card(motion, scene, pictures),
-        card("States over time", named_figure(pictures, "states", states), anchor="states"),
-        card("Controls", named_figure(pictures, "controls", acting), anchor="controls"),
-        card("Contacts", named_figure(pictures, "contacts", f"{HOW_FORCED} {contacts}"), anchor="contacts"),
+        joint_card(motion, scene, charts),
+        gait_card(motion, scene, charts),
+        card("States over time", named_figure(charts, "states", states), anchor="states"),
+        card("Controls", named_figure(charts, "controls", acting), anchor="controls"),
+        card("Contacts", named_figure(charts, "contacts", f"{HOW_FORCED} {contacts}"), anchor="contacts"),
     ]
 
 
@@ -134,10 +102,10 @@ def shortened(shown: int, total: int, noun: str, which: str) -> str:
     return f"Shown are {shown} of {total} {noun}: those {which}." if shown < total else ""
 
 
-def joint_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> Html:
+def joint_card(trajectory: Trajectory, scene: Scene, charts: Mapping[str, Chart]) -> Html:
     """Show the coordinates of joints and the torques of motors; empty without joints."""
     every = channels(trajectory, scene)
-    drawn = [pictures[name] for name in ("joints", "motors") if name in pictures]
+    drawn = [charts[name] for name in ("joints", "motors") if name in charts]
     few = shown(every)
     left_out = f"Drawn are {len(few)} of {len(every)} coordinates: those that move most." * (len(few) < len(every))
     sentences = [motors_sentence(every), limits_sentence(every), separation_sentence(trajectory)]
@@ -225,13 +193,13 @@ def share_words(channel: Channel) -> Html:
     return pill("fair", percent(channel.share)) if channel.share >= OFTEN_SATURATED else Html(percent(channel.share))
 
 
-def gait_card(trajectory: Trajectory, scene: Scene, pictures: Mapping[str, Drawn]) -> Html:
+def gait_card(trajectory: Trajectory, scene: Scene, charts: Mapping[str, Chart]) -> Html:
     """Show when each foot stands; empty where none comes down or leaves the ground."""
-    if "gait" not in pictures:
+    if "gait" not in charts:
         return Html("")
     least = f"{percent(LOADED_SHARE)} of the weight of {show(weight(trajectory, scene))} N"
     caption = f"A bar: the body carries more than {least}. The duty factor is the share of the time that it does."
-    figure = named_figure(pictures, "gait", caption)
+    figure = named_figure(charts, "gait", caption)
     return card("Gait", tag("p", steps_sentence(trajectory, scene)), figure, anchor="gait")
 
 

@@ -9,18 +9,17 @@ from pathlib import Path
 
 from symphys import files
 from symphys.findings import writing
-from symphys.report.charts.drawing import chart_pictures
+from symphys.report.charts.chart import Chart
 from symphys.report.charts.motion import motion_charts
 from symphys.report.charts.run import run_charts
-from symphys.report.figures.style import Picture, paper, write_figures
-from symphys.report.making.stamps import FULL, LIGHT, RUN_PAGE, Stamp, folder_digest
+from symphys.report.making.stamps import RUN_PAGE, folder_digest
 from symphys.report.pages import sections
-from symphys.report.pages.markup import Drawn, Html, card, join, light_page, page, tag
-from symphys.report.pages.motion import motion_card, motion_cards, motion_pictures
+from symphys.report.pages.markup import Html, card, join, page, tag
+from symphys.report.pages.motion import motion_card, motion_cards
 from symphys.results import text_files as tables
 from symphys.results.discovery import is_run
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.file_names import CONFIG, FIGURES, GUESS, LOG, PROBLEM, SCENE, TRAJECTORY
+from symphys.results.file_names import CONFIG, GUESS, LOG, PROBLEM, SCENE, TRAJECTORY
 from symphys.results.run import Run, read_run
 from symphys.results.scene import Scene, read_scene
 from symphys.results.text_files import ReportError
@@ -41,7 +40,7 @@ class RecordedMotion:
 
 
 def write_run_report(run_dir: Path) -> Path:
-    """Write report.html, and figures as SVG and CSV, into a run folder, from its files alone.
+    """Write report.html into a run folder, from its files alone; its script draws curves and plays the motion.
 
     The page says what it was made from, so that it need not be made again while that is the same.
 
@@ -55,31 +54,17 @@ def write_run_report(run_dir: Path) -> Path:
         ReportError: there is no such folder, it is no run folder, or it cannot be written to.
     """
     digest = folder_digest(run_dir)  # before files are read: what changes meanwhile is seen next time
-    run, recording, pictures = drawn(run_dir)
-    write_figures(run_dir / FIGURES, pictures.values())
-    body, animated = join([build(run, recording, pictures), sections.FOOTER]), recording.trajectory is not None
-    files.write_text(run_dir / PAGE, page(title_of(run), body, animated, stamp=Stamp(FULL, digest)))
-    return run_dir / PAGE
-
-
-def write_light_report(run_dir: Path) -> Path:
-    """Write a light report.html: all but figures as files; its curves and its motion are drawn in the browser.
-
-    It takes some 20 ms, and 50 kB on disk. Arguments, result and errors are those of ``write_run_report``.
-    """
-    digest = folder_digest(run_dir)
     run, recording = read_recorded(run_dir)
-    charts: dict[str, Drawn] = {chart.name: chart for chart in run_charts(drawable(run), recording.trajectory)}
-    if recording.trajectory is not None:
-        charts |= {chart.name: chart for chart in motion_charts(recording.trajectory, recording.scene)}
-    body, animated = join([build(run, recording, charts), sections.LIGHT]), recording.trajectory is not None
-    files.write_text(run_dir / PAGE, light_page(title_of(run), body, animated, Stamp(LIGHT, digest)))
+    charts = {chart.name: chart for chart in every_chart(run, recording)}
+    body = join([build(run, recording, charts), sections.FOOTER])
+    files.write_text(run_dir / PAGE, page(f"{run.title}: {run.solver}, seed {run.seed}", body, digest))
     return run_dir / PAGE
 
 
-def title_of(run: Run) -> str:
-    """Return the title of the page."""
-    return f"{run.title}: {run.solver}, seed {run.seed}"
+def every_chart(run: Run, recording: RecordedMotion) -> list[Chart]:
+    """Return every chart of a run's page; what there is nothing to show of is left out."""
+    charts = run_charts(drawable(run), recording.trajectory)
+    return charts if recording.trajectory is None else charts + motion_charts(recording.trajectory, recording.scene)
 
 
 def write_run_figures(run_dir: Path, folder: Path) -> list[Path]:
@@ -92,18 +77,12 @@ def write_run_figures(run_dir: Path, folder: Path) -> list[Path]:
         ReportError: there is no such run folder.
         FileError: ``folder`` cannot be written to.
     """
-    return write_figures(folder, drawn(run_dir)[2].values())
+    from symphys.report.figures.run import draw_figures  # late: it imports matplotlib
+    from symphys.report.figures.style import write_figures
 
-
-def drawn(run_dir: Path) -> tuple[Run, RecordedMotion, dict[str, Picture]]:
-    """Read a run folder and draw every figure of its page; what it does not have is left out."""
     run, recording = read_recorded(run_dir)
-    motion = recording.trajectory
-    with paper():
-        pictures = {each.name: each for each in chart_pictures(run_charts(drawable(run), motion))}
-        if motion is not None:
-            pictures |= motion_pictures(motion, recording.scene, recording.guess)
-    return run, recording, pictures
+    charts = every_chart(run, recording)
+    return write_figures(folder, draw_figures(charts, recording.trajectory, recording.scene, recording.guess))
 
 
 def read_recorded(run_dir: Path) -> tuple[Run, RecordedMotion]:
@@ -137,18 +116,18 @@ def read_or_note(path: Path, faults: list[str], only: Sequence[str] = ()) -> Tra
         return None
 
 
-def build(run: Run, recording: RecordedMotion, pictures: Mapping[str, Drawn]) -> Html:
+def build(run: Run, recording: RecordedMotion, charts: Mapping[str, Chart]) -> Html:
     """Make the page, from the verdict to the sources."""
     motion, scene = recording.trajectory, recording.scene
-    played = motion_card(motion, scene, recording.guess, pictures, recording.faults)
+    played = motion_card(motion, scene, recording.guess, recording.faults)
     cards = [
         sections.checks(run),
         played if motion is not None or run.readable else Html(""),
-        sections.found(run, pictures),
-        sections.trusted(run, pictures),
+        sections.found(run, charts),
+        sections.trusted(run, charts),
         sections.stage_card(run),
-        sections.convergence(run, pictures),
-        *([] if motion is None else motion_cards(motion, scene, pictures)),
+        sections.convergence(run, charts),
+        *([] if motion is None else motion_cards(motion, scene, charts)),
         sections.time_split(run),
         sources(run),
     ]

@@ -17,11 +17,11 @@ from symphys.findings.examination import Examination
 from symphys.findings.levels import MARKS, Judged
 from symphys.findings.physics import sliding
 from symphys.findings.writing import capital, show
+from symphys.report.charts import palette
+from symphys.report.charts.chart import Chart
 from symphys.report.charts.run import component_names, knotted
-from symphys.report.figures import style
 from symphys.report.pages import words
 from symphys.report.pages.markup import (
-    Drawn,
     Html,
     banner,
     card,
@@ -40,15 +40,14 @@ from symphys.results.run import Run
 from symphys.results.trace import OUTPUT
 from symphys.types import Array
 
-FOOTER = tag("footer", "Made by symphys from the files of the run folder; make it again with “symphys report”.")
-LIGHT = join(
-    [
-        tag("p", "This browser cannot unpack the curves and the motion of this page; “symphys report” of the run "
-            "folder makes the page with figures.", class_="note unpacked", hidden=""),
-        tag("footer", "Made by symphys from the files of the run folder; a light page of a large batch. “symphys "
-            "report” of the run folder makes the full one, with its figures as SVG and CSV."),
-    ]
-)  # fmt: skip
+FOOTER = tag(
+    "footer",
+    "Made by symphys from the files of the run folder; make it again with ",
+    tag("code", "symphys report"),
+    ". ",
+    tag("code", "symphys report --figures"),
+    " writes its figures as SVG, and the numbers in them as CSV.",
+)
 MOST_ROWS = 60
 LOG_TAIL = 20_000
 HOW_JUDGED = (
@@ -182,7 +181,7 @@ def gauge(check: CheckRecord) -> Html:
     return tag("span", bar, class_=f"gauge {'good' if check.met else 'bad'}", aria_hidden="true")
 
 
-def found(run: Run, pictures: Mapping[str, Drawn]) -> Html:
+def found(run: Run, charts: Mapping[str, Chart]) -> Html:
     """Variables with one knot as a table, those with many as curves."""
     rows = [row for variable in run.variables if variable.value.shape[1] == 1 for row in variable_rows(variable)]
     more = tag("p", f"and {len(rows) - MOST_ROWS} more, in result.json", class_="note") if len(rows) > MOST_ROWS else ""
@@ -196,7 +195,7 @@ def found(run: Run, pictures: Mapping[str, Drawn]) -> Html:
         "What was found",
         table(header, rows[:MOST_ROWS], "tnnnnt", "Variables") if rows else "",
         more,
-        named_figure(pictures, "variables", "; ".join(curves)),
+        named_figure(charts, "variables", "; ".join(curves)),
         anchor="found",
     )
 
@@ -253,7 +252,7 @@ def between(value: float, guess: float, low: float, high: float) -> Html:
     return join([bar, tag("small", "at a bound")]) if edge else bar
 
 
-def trusted(run: Run, pictures: Mapping[str, Drawn]) -> Html:
+def trusted(run: Run, charts: Mapping[str, Chart]) -> Html:
     """Advice, findings, figures, and the refinements as numbers."""
     judged = run.judged
     lines = findings(run.examination, judged)
@@ -267,8 +266,8 @@ def trusted(run: Run, pictures: Mapping[str, Drawn]) -> Html:
         tag("p", ONLY_MOTION) if not run.examination.gradient else "",
         table(["", "check", "value", "interpretation"], rows, "tttt", "Verification"),
         step_note(run.examination),
-        named_figure(pictures, "growth", HOW_GROWN),
-        named_figure(pictures, "energy", " ".join(filter(None, [HOW_BALANCED, sliding(run.examination)]))),
+        named_figure(charts, "growth", HOW_GROWN),
+        named_figure(charts, "energy", " ".join(filter(None, [HOW_BALANCED, sliding(run.examination)]))),
         refined(run.examination, judged),
         anchor="trust",
     )
@@ -342,15 +341,15 @@ def rank(stage: StageRecord) -> tuple[bool, float]:
     return not stage.solved, stage.exact_objective if math.isfinite(stage.exact_objective) else math.inf
 
 
-def convergence(run: Run, pictures: Mapping[str, Drawn]) -> Html:
+def convergence(run: Run, charts: Mapping[str, Chart]) -> Html:
     """Show the convergence, and say what the figure leaves out."""
     caption = f"Pale: the lowest so far{' in its stage' * smoothed(run.stages)}. Work counts one rollout as 1."
-    return card("Convergence", named_figure(pictures, "convergence", caption), anchor="convergence")
+    return card("Convergence", named_figure(charts, "convergence", caption), anchor="convergence")
 
 
 def time_split(run: Run) -> Html:
     """Build, compile and solve as one bar."""
-    colours = {"build": style.SKY, "compile": style.ORANGE, "solve": style.BODIES[0]}
+    colours = {"build": palette.SKY, "compile": palette.ORANGE, "solve": palette.BODIES[0]}
     parts = [(name, run.seconds.get(name, math.nan), colour) for name, colour in colours.items()]
     known = [(name, took, colour) for name, took, colour in parts if math.isfinite(took) and took >= 0]
     total = sum(took for _, took, _ in known)

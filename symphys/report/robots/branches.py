@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from symphys.report.figures import style
+from symphys.report.charts import palette
 from symphys.results.scene import Scene
 from symphys.trajectory import Trajectory
 
@@ -29,16 +29,16 @@ def linked(trajectory: Trajectory, scene: Scene) -> tuple[int, ...]:
 
 def is_large(trajectory: Trajectory, scene: Scene) -> bool:
     """Whether joints hold more bodies than there are colours."""
-    return len(linked(trajectory, scene)) > len(style.BODIES)
+    return len(linked(trajectory, scene)) > len(palette.BODIES)
 
 
 def colours(trajectory: Trajectory, scene: Scene) -> tuple[str, ...]:
     """Return the colour of each body: its own, or its branch's where joints connect many."""
     names = trajectory.body_names
     if not is_large(trajectory, scene):
-        return tuple(style.BODIES[index % len(style.BODIES)] for index in range(len(names)))
+        return tuple(palette.BODIES[index % len(palette.BODIES)] for index in range(len(names)))
     of_branch = {body: branch.colour for branch in branches(trajectory, scene) for body in branch.bodies}
-    return tuple(of_branch.get(index, style.FAINT) for index in range(len(names)))
+    return tuple(of_branch.get(index, palette.FAINT) for index in range(len(names)))
 
 
 def keys(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
@@ -47,7 +47,7 @@ def keys(trajectory: Trajectory, scene: Scene) -> list[tuple[str, str]]:
         found = [(branch.name, branch.colour) for branch in branches(trajectory, scene)]
     else:
         found = list(zip(trajectory.body_names, colours(trajectory, scene), strict=True))
-    return found if 1 < len(found) <= len(style.BODIES) else []
+    return found if 1 < len(found) <= len(palette.BODIES) else []
 
 
 def traced(trajectory: Trajectory, scene: Scene) -> tuple[str, ...]:
@@ -67,10 +67,10 @@ def branches(trajectory: Trajectory, scene: Scene) -> list[KinematicBranch]:
     edges = edges_of(trajectory, scene)
     for group in components(linked(trajectory, scene), edges):
         base = base_of(group, edges, trajectory, scene)
-        found.append(KinematicBranch(trajectory.body_names[base], (base,), style.BODIES[0], True))
+        found.append(KinematicBranch(trajectory.body_names[base], (base,), palette.BODIES[0], True))
         for number, bodies in enumerate(components([body for body in group if body != base], edges)):
             name = branch_name([trajectory.body_names[body] for body in bodies])
-            found.append(KinematicBranch(name, bodies, style.BODIES[1 + number % (len(style.BODIES) - 1)], False))
+            found.append(KinematicBranch(name, bodies, palette.BODIES[1 + number % (len(palette.BODIES) - 1)], False))
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from symphys.findings.writing import percent
 from symphys.report.charts.chart import Bars, Chart, Panel
 from symphys.report.charts.contacts import labels, pair_of
-from symphys.report.figures.data import TIME
+from symphys.report.charts.tables import TIME
 from symphys.report.robots.branches import colours, linked
 from symphys.results.scene import Scene
 from symphys.trajectory import Trajectory

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from symphys.findings.writing import percent
+from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart, Key, Line, Panel
-from symphys.report.charts.drawing import BEYOND
-from symphys.report.figures import style
-from symphys.report.figures.data import TIME, Table
+from symphys.report.charts.tables import TIME, Table
 from symphys.report.robots.branches import branches, colours
 from symphys.report.robots.gait import spans
 from symphys.report.robots.joint_use import Channel, channels
@@ -19,7 +18,7 @@ from symphys.results.scene import Scene
 from symphys.trajectory import Trajectory
 from symphys.types import Array
 
-SATURATED, COMMAND = style.VERMILION, style.INK
+SATURATED, COMMAND = palette.VERMILION, palette.INK
 NEAR_LIMIT = 16
 """Limits farther away than so many times the range of a coordinate are not drawn."""
 LEAST_TURN, LEAST_SLIDE = 0.1, 0.02
@@ -136,12 +135,12 @@ def value_keys(every: Sequence[Channel]) -> tuple[Key, ...]:
     command = any(channel.target is not None for channel in every)
     limits = any(np.isfinite([channel.joint.lower, channel.joint.upper]).any() for channel in every)
     keys = (Key("command of the servo", COMMAND, "dashed"),) * command
-    return keys + (Key("beyond a limit", BEYOND, "shade"),) * limits
+    return keys + (Key("beyond a limit", palette.BEYOND, "shade"),) * limits
 
 
 def torque_keys(driven: Sequence[Channel]) -> tuple[Key, ...]:
     """Return the keys of charts of torques, as far as they are used."""
-    keys = (Key("most that a motor can give", style.GROUND_EDGE, "dotted"),) * any(each.bound > 0 for each in driven)
+    keys = (Key("most that a motor can give", palette.GROUND_EDGE, "dotted"),) * any(each.bound > 0 for each in driven)
     full = any(channel.share > 0 for channel in driven)
     return keys + (Key("saturated: it gives the most, and for how long", SATURATED),) * full
 
@@ -184,4 +183,4 @@ def colour_of(channel: Channel, trajectory: Trajectory, scene: Scene) -> str:
     of_body = dict(zip(trajectory.body_names, colours(trajectory, scene), strict=True))
     names = [name for name in channel.joint.bodies if name in of_body]
     moving = [name for name in names if name not in bases] or names
-    return of_body[moving[0]] if moving else style.BODIES[0]
+    return of_body[moving[0]] if moving else palette.BODIES[0]

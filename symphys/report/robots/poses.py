@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Polygon
 
-from symphys.report.figures.data import thin
+from symphys.report.charts.tables import thin
 from symphys.report.robots.branches import colours, linked, traced
-from symphys.report.robots.joint_positions import bones, draw_joint_positions, draw_lines
+from symphys.report.robots.joint_marks import draw_joint_positions, draw_lines
+from symphys.report.robots.joint_positions import bones
 from symphys.report.scene.panel import ViewPanel
 from symphys.report.scene.views import View, centres, corners, inner_edges, outline, reach, turn
 from symphys.results.scene import Scene, Solid

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 
+from symphys.report.charts.tables import TIME, vector
 from symphys.report.figures import style
-from symphys.report.figures.data import TIME, DataFigure, keep, vector
+from symphys.report.figures.data import DataFigure, keep
 from symphys.report.robots.branches import linked
-from symphys.report.robots.joint_positions import draw_joint_positions
+from symphys.report.robots.joint_marks import draw_joint_positions
 from symphys.report.robots.poses import RobotDrawing, extents
 from symphys.report.scene.ground import draw_ground
 from symphys.report.scene.panel import ViewPanel, include

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 
-from symphys.report.figures import style
-from symphys.report.pages.markup import Html, dot, embedded, join, packed_json, tag
+from symphys.report.charts import palette
+from symphys.report.pages.markup import Html, dot, join, packed_json, tag
 from symphys.report.robots.branches import colours, keys, linked, traced
 from symphys.report.robots.joint_positions import axes_of, drawable
 from symphys.report.scene.ghosts import MEASURED
@@ -17,10 +15,8 @@ from symphys.results.scene import Scene, SceneTerrain, Solid
 from symphys.trajectory import Trajectory
 from symphys.types import Array
 
-NUMBERS = 60_000
-"""How many numbers a page carries at most for one motion, about 400 kB."""
-LIGHT_NUMBERS = 10_000
-"""The same of a light page; the player goes evenly from one pose to the next."""
+NUMBERS = 10_000
+"""How many numbers a page carries at most for one motion; the player goes evenly from one pose to the next."""
 MOST_FRAMES = 600
 GUESS_POINTS = 120
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
@@ -29,28 +25,14 @@ LEAST_PLAY = 3.0
 
 
 def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None, numbers: int = NUMBERS) -> Html:
-    """A canvas with play, time and view controls, and its data; works without any network."""
-    data = json.dumps(motion_data(trajectory, scene, guess, numbers), separators=(",", ":"), allow_nan=False)
-    without = "The motion plays only with JavaScript; the figure below shows it without."
-    return player(trajectory, scene, without, embedded(data))
-
-
-def light_animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None) -> Html:
-    """Make the player of a light page: fewer numbers, compressed."""
-    data = packed_json(motion_data(trajectory, scene, guess, LIGHT_NUMBERS))
-    return player(trajectory, scene, "The motion plays only with JavaScript.", data)
-
-
-def player(trajectory: Trajectory, scene: Scene, without: str, data: Html) -> Html:
-    """The element; ``without``: what is said where no script runs."""
-    legend = [join([dot(colour), style.short(name, 24)]) for name, colour in keys(trajectory, scene)]
+    """Return a canvas with play, time and view controls, and its data of at most ``numbers`` numbers."""
+    legend = [join([dot(colour), palette.short(name, 24)]) for name, colour in keys(trajectory, scene)]
     return tag(
         "div",
         tag("canvas", tabindex="0", role="img", aria_label="The motion, played; drag to turn"),
         tag("div", *(tag("span", part) for part in legend), class_="legend") if legend else "",
         controls(float(trajectory.time[-1] - trajectory.time[0]), follow_data(trajectory, scene) is not None),
-        tag("noscript", without),
-        data,
+        packed_json(motion_data(trajectory, scene, guess, numbers)),
         class_="animation",
     )
 
@@ -94,7 +76,7 @@ def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, 
         "terrain": [terrain_data(ground) for ground in scene.terrain],
         "flat": views[0] == TOP,
         "along": "y" if views[0] == SIDE_YZ else "x",
-        "axes": list(style.AXES),
+        "axes": list(palette.AXES),
         "joints": joint_data(trajectory, scene),
         "follow": follow_data(trajectory, scene),
     }

@@ -11,14 +11,14 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
 from symphys.findings import writing
-from symphys.report.figures import style
+from symphys.report.charts import palette
 from symphys.report.scene.panel import ViewPanel
 from symphys.report.scene.views import View, corners, inner_edges, outline
 from symphys.results.scene import UPRIGHT, Scene, SceneTerrain, Solid
 from symphys.trajectory import Trajectory
 
 SHADES = LinearSegmentedColormap.from_list("heights", ["#ffffff", "#d8dfe6"])
-HATCH: dict[str, Any] = {"facecolor": style.GROUND, "edgecolor": "#d5dbe1", "hatch": "////", "linewidth": 0}
+HATCH: dict[str, Any] = {"facecolor": palette.GROUND, "edgecolor": "#d5dbe1", "hatch": "////", "linewidth": 0}
 BEHIND_COLOUR = "#f6f8f9"
 MAX_CONTOURS = 8
 """Lines of height in a view from above, at most about."""
@@ -41,9 +41,9 @@ def draw_fixture(axes: Axes, view: View, solid: Solid) -> None:
     upright = np.array(UPRIGHT)
     around = view.flat(solid.centre) + outline(view.flat(corners(upright, solid)), solid.radius)
     axes.add_patch(Polygon(around, **HATCH, zorder=1.55))
-    axes.add_patch(Polygon(around, fill=False, edgecolor=style.GROUND_EDGE, linewidth=1.3, zorder=1.56))
+    axes.add_patch(Polygon(around, fill=False, edgecolor=palette.GROUND_EDGE, linewidth=1.3, zorder=1.56))
     for edge in view.flat(solid.centre + inner_edges(upright, solid, view.front)):
-        axes.plot(*edge.T, color=style.GROUND_EDGE, linewidth=0.8, zorder=1.56)
+        axes.plot(*edge.T, color=palette.GROUND_EDGE, linewidth=0.8, zorder=1.56)
 
 
 def draw_profile(axes: Axes, panel: ViewPanel, trajectory: Trajectory, ground: SceneTerrain) -> None:
@@ -57,10 +57,10 @@ def draw_profile(axes: Axes, panel: ViewPanel, trajectory: Trajectory, ground: S
     if near.any():
         highest = np.fmax.reduce(z[near], axis=0)
         axes.fill_between(
-            along, highest, bottom, facecolor=BEHIND_COLOUR, edgecolor=style.FAINT, linewidth=0.8, zorder=1.4
+            along, highest, bottom, facecolor=BEHIND_COLOUR, edgecolor=palette.FAINT, linewidth=0.8, zorder=1.4
         )
     axes.fill_between(along, cut, bottom, **HATCH, zorder=1.57)
-    axes.plot(along, cut, color=style.GROUND_EDGE, linewidth=1.6, zorder=1.58)
+    axes.plot(along, cut, color=palette.GROUND_EDGE, linewidth=1.6, zorder=1.58)
 
 
 def draw_heights(axes: Axes, panel: ViewPanel, ground: SceneTerrain) -> None:
@@ -72,7 +72,7 @@ def draw_heights(axes: Axes, panel: ViewPanel, ground: SceneTerrain) -> None:
     turned = panel.view.right == 1
     x, y, z = (ground.y, ground.x, ground.z.T) if turned else (ground.x, ground.y, ground.z)
     axes.contourf(x, y, z, levels=levels, cmap=SHADES, zorder=1.4)
-    axes.contour(x, y, z, levels=levels, colors=style.FAINT, linewidths=0.8, linestyles="solid", zorder=1.5)
+    axes.contour(x, y, z, levels=levels, colors=palette.FAINT, linewidths=0.8, linestyles="solid", zorder=1.5)
     axes.set_title(f"{panel.view.title}; a line of height every {writing.show(levels[1] - levels[0], 3)} m")
 
 
@@ -91,5 +91,5 @@ def draw_planes(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
         along = size * np.array([-normal[1], normal[0]])
         cut = np.array([foot - along, foot + along, foot + along - size * normal, foot - along - size * normal])
         # The line lies under every solid, so that it ends where another plane's solid begins.
-        axes.plot(*cut[:2].T, color=style.GROUND_EDGE, linewidth=2.2, zorder=1.5)
+        axes.plot(*cut[:2].T, color=palette.GROUND_EDGE, linewidth=2.2, zorder=1.5)
         axes.add_patch(Polygon(cut, **HATCH, zorder=1.6))

@@ -11,10 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 
+from symphys.report.charts import palette
+from symphys.report.charts.tables import TIME, thin, vector
 from symphys.report.figures import style
-from symphys.report.figures.data import TIME, DataFigure, keep, thin, vector
+from symphys.report.figures.data import DataFigure, keep
 from symphys.report.robots.branches import is_large, keys, traced
-from symphys.report.robots.joint_positions import draw_joint_positions
+from symphys.report.robots.joint_marks import draw_joint_positions
 from symphys.report.robots.poses import draw_robots
 from symphys.report.scene.ground import draw_ground
 from symphys.report.scene.panel import RIGHT, ViewPanel, arrange, dress, lay_out, make_panel, widen
@@ -84,7 +86,7 @@ def draw_guess(axes: Axes, panel: ViewPanel, guess: Trajectory, names: Sequence[
 
 def add_legend(figure: DataFigure, trajectory: Trajectory, scene: Scene, guessed: bool) -> None:
     """Bodies or kinematic branches by colour, and the guess; nothing where the picture explains itself."""
-    handles = [Line2D([], [], color=colour, label=style.short(name, 20)) for name, colour in keys(trajectory, scene)]
+    handles = [Line2D([], [], color=colour, label=palette.short(name, 20)) for name, colour in keys(trajectory, scene)]
     if guessed:
         handles.append(Line2D([], [], color="#98a4af", linewidth=0.9, linestyle=(0, (4, 2.5)), label="guess"))
     if handles:
@@ -104,7 +106,7 @@ def draw_bodies(axes: Axes, panel: ViewPanel, trajectory: Trajectory, scene: Sce
     total = sum(len(solids_of(trajectory, scene, body)) for body in bodies)
     shots = np.linspace(0, len(trajectory.time) - 1, int(np.clip(MAX_SOLIDS // total, 3, 10))).round().astype(int)
     for body in bodies:
-        colour = style.BODIES[body % len(style.BODIES)]
+        colour = palette.BODIES[body % len(palette.BODIES)]
         _, path = thin(trajectory.time, panel.view.flat(trajectory.position[:, body]), 500)
         axes.plot(*path.T, color=colour, linewidth=1.3 if total < 10 else 0.7, zorder=3)
         solids = solids_of(trajectory, scene, body)
@@ -193,7 +195,7 @@ def spoke(orientation: Array, view: View) -> Array:
 
 def name_ends(axes: Axes, panel: ViewPanel, trajectory: Trajectory, radius: float, body: int, scale: float) -> None:
     """Write ``start`` and ``end`` at a body's first and last place; the end below where both are close."""
-    colour = style.BODIES[body % len(style.BODIES)]
+    colour = palette.BODIES[body % len(palette.BODIES)]
     first, last = panel.view.flat(trajectory.position[[0, -1], body])
     apart = np.abs(last - first) * scale
     close = apart[0] < 0.55 and apart[1] < 0.3

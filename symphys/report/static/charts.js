@@ -1,6 +1,6 @@
-// Draws the curves of a light page as SVG, from the numbers that it holds; shows those below the pointer. Comes after numbers.js.
+// Draws the curves of a page as SVG, from the numbers that it holds; shows those below the pointer. Comes after numbers.js.
 
-const WIDTH = 1000, TOP = 26, BOTTOM = 34, LEFT = 58, GAP = 14, HEIGHT = 170, BAR = 20;
+const WIDTH = 1000, NARROW = 400, TOP = 26, BOTTOM = 34, LEFT = 58, GAP = 14, INCH = 97, BAR = 20, LETTER = 7;
 
 function numbers(packed) { // differences in steps of one size, or numbers as they are
   if (!packed.d) return packed;
@@ -36,26 +36,30 @@ function ticksOf(scale, low, high) { // low and high: heights
   return ticks.filter((v) => transform(scale)(v) >= low - 1e-9 && transform(scale)(v) <= high + 1e-9);
 }
 
+function joined(points) { return `M${points.map((p) => p.map((v) => v.toFixed(1)).join(" ")).join("L")}`; }
+
 function extent(values) {
   return values.reduce(([a, b], v) => (Number.isFinite(v) ? [Math.min(a, v), Math.max(b, v)] : [a, b]), [Infinity, -Infinity]);
 }
 
 class Panel {
-  constructor(data, left, top, width) {
+  constructor(data, left, top, width, height = 1.75) { // height: of the panel with its titles, in inches of a figure
     this.data = data;
-    this.height = data.bars ? BAR * data.bars.length : HEIGHT - TOP - BOTTOM;
+    this.height = data.bars ? BAR * data.bars.length : INCH * height - TOP - BOTTOM;
     this.left = left + (data.bars ? 130 : LEFT);
     this.top = top + TOP;
     this.width = width - (this.left - left) - GAP - (data.bars ? 60 : 0);
     this.xs = (data.x || []).map(numbers);
     this.lines = (data.lines || []).map((line) => ({ ...line, l: (line.l || "").split(" "), y: numbers(line.y), x: this.xs[line.x] }));
     this.up = transform(data.scale);
+    this.over = transform(data.across);
     this.range();
   }
 
   range() {
     const { least = [], met, edges = [], bars } = this.data;
-    this.wide = bars ? least : extent(this.xs.flat());
+    this.wide = bars ? least : extent(this.xs.flat().filter((v) => v !== null).map(this.over));
+    if (!Number.isFinite(this.wide[0])) this.wide = [0, 1];
     if (!(this.wide[1] > this.wide[0])) this.wide = [this.wide[0] - 0.5, this.wide[0] + 0.5];
     const heights = this.lines.flatMap((line) => line.y).filter((v) => v !== null).map(this.up);
     let [low, high] = extent([...heights, ...least.map(this.up), ...(met ? [0.5, 2].map(this.up) : [])]);
@@ -67,41 +71,58 @@ class Panel {
     this.tall = [low - margin, high + margin];
   }
 
-  x(v) { return this.left + ((v - this.wide[0]) / (this.wide[1] - this.wide[0])) * this.width; }
+  x(v) { return this.left + ((this.over(v) - this.wide[0]) / (this.wide[1] - this.wide[0])) * this.width; }
 
   y(v) { return this.top + (1 - (this.up(v) - this.tall[0]) / (this.tall[1] - this.tall[0])) * this.height; }
 
-  path(line) {
-    let text = "", pen = "M";
+  runs(line) { // its points on the page, a list for each stretch without a gap
+    const runs = [];
+    let last = null;
     line.y.forEach((value, k) => {
       const x = this.x(line.x[k]), y = this.y(value);
-      if (value === null || line.x[k] === null || !Number.isFinite(x) || !Number.isFinite(y)) { pen = "M"; return; }
-      if (line.l.includes("steps") && pen === "L") text += `H${x.toFixed(1)}V${y.toFixed(1)}`;
-      else if (line.l.includes("middles") && pen === "L") text += `H${((x + this.x(line.x[k - 1])) / 2).toFixed(1)}V${y.toFixed(1)}H${x.toFixed(1)}`;
-      else text += `${pen}${x.toFixed(1)} ${y.toFixed(1)}`;
-      pen = "L";
+      if (value === null || line.x[k] === null || !Number.isFinite(x) || !Number.isFinite(y)) { last = null; return; }
+      if (!last) runs.push([]);
+      const run = runs[runs.length - 1];
+      if (last && line.l.includes("steps")) run.push([x, last[1]]);
+      if (last && line.l.includes("middles")) run.push([(x + last[0]) / 2, last[1]], [(x + last[0]) / 2, y]);
+      run.push([x, y]);
+      last = [x, y];
     });
-    return text;
+    return runs;
   }
 
   drawn(line) {
     const has = (word) => line.l.includes(word);
+    if (has("points")) {
+      const spots = line.y.map((v, k) => [this.x(line.x[k]), v === null ? NaN : this.y(v)]).filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
+      const ink = spots.map(([x, y]) => `M${x.toFixed(1)} ${y.toFixed(1)}h0`).join("");
+      return `<g fill="none" stroke="${line.c}" stroke-linecap="round" stroke-opacity="0.6"><path d="${ink}" stroke-width="3"/></g>`;
+    }
     if (has("dots") || has("rings")) {
       const spots = line.y.map((v, k) => `<circle cx="${this.x(line.x[k]).toFixed(1)}" cy="${this.y(v).toFixed(1)}" r="4"/>`);
       return `<g fill="${has("dots") ? line.c : "#fff"}" stroke="${line.c}">${spots.join("")}</g>`;
     }
     const look = has("dashed") ? 'stroke-dasharray="4 3"' : has("dotted") ? 'stroke-dasharray="1 2"' : has("pale") ? 'stroke-opacity="0.25"' : "";
-    const few = line.y.length <= 40 && !["dashed", "dotted", "pale", "plain"].some(has);
+    const few = line.y.length <= 40 && !["dashed", "dotted", "pale", "plain", "steps"].some(has);
     const mark = few ? line.y.map((v, k) => (v === null ? "" : `M${this.x(line.x[k]).toFixed(1)} ${this.y(v).toFixed(1)}h0`)).join("") : "";
     const dots = few ? `<path d="${mark}" stroke-width="5" stroke-linecap="round"/>` : "";
-    return `<g fill="none" stroke="${line.c}" ${look}><path d="${this.path(line)}" stroke-width="${line.w}"/>${dots}</g>`;
+    const runs = this.runs(line), shade = has("area") ? this.area(line, runs) : "";
+    return `<g fill="none" stroke="${line.c}" ${look}>${shade}<path d="${runs.map(joined).join("")}" stroke-width="${line.w}"/>${dots}</g>`;
+  }
+
+  area(line, runs) { // from the line down to 0, or to the lower end of the axis
+    const base = Math.min(this.top + this.height, this.data.scale < 0 ? Infinity : this.y(0));
+    const shapes = runs.map((run) => `${joined([[run[0][0], base], ...run, [run[run.length - 1][0], base]])}Z`);
+    return `<path d="${shapes.join("")}" fill="${line.c}" fill-opacity="0.14" stroke="none"/>`;
   }
 
   axes() {
     const { left, top, width, height, data } = this, bottom = top + height;
     const level = (v, c) => `<path d="M${left} ${this.y(v).toFixed(1)}h${width}" class="${c}"/>`;
-    const out = [`<text x="${left}" y="${top - 9}" class="title">${escaped(data.title)}</text>`];
-    for (const v of evenTicks(...this.wide, Math.max(2, Math.round(width / 60)))) {
+    const room = Math.floor((width + GAP + 20) / LETTER), title = data.title.length > room ? `${data.title.slice(0, room - 1)}…` : data.title;
+    const out = [`<text x="${left}" y="${top - 9}" class="title"><title>${escaped(data.title)}</title>${escaped(title)}</text>`];
+    const along = data.across ? ticksOf(data.across, ...this.wide) : evenTicks(...this.wide, Math.max(2, Math.round(width / 60)));
+    for (const v of along) {
       out.push(`<path d="M${this.x(v).toFixed(1)} ${top}v${height}" class="grid"/>`);
       out.push(`<text x="${this.x(v).toFixed(1)}" y="${bottom + 14}" text-anchor="middle">${written(v)}</text>`);
     }
@@ -121,12 +142,8 @@ class Panel {
       out.push(level(v, "grid"), `<text x="${left - 6}" y="${(this.y(v) + 3.5).toFixed(1)}" text-anchor="end">${written(v)}</text>`);
     }
     out.push(...(data.ticks || []).map((v) => `<path d="M${this.x(v).toFixed(1)} ${bottom}v-6" class="tick"/>`));
-    out.push(...(data.edges || []).map((v) => level(v, "edge")));
-    if (data.end) {
-      const x = this.x(data.end[0]), late = x > left + width / 2;
-      out.push(`<path d="M${x.toFixed(1)} ${top}v${height}" class="end"/>`);
-      out.push(`<text x="${(x + (late ? -5 : 5)).toFixed(1)}" y="${top + 10}" text-anchor="${late ? "end" : "start"}">${escaped(data.end[1])}</text>`);
-    }
+    const inside = (v) => this.up(v) >= this.tall[0] && this.up(v) <= this.tall[1];
+    out.push(...(data.edges || []).filter(inside).map((v) => level(v, "edge")));
     if (data.met) out.push(`<rect x="${left}" y="${this.y(1).toFixed(1)}" width="${width}" height="${(bottom - this.y(1)).toFixed(1)}" class="met"/>`, level(1, "limit"));
     return out.join("");
   }
@@ -140,44 +157,57 @@ class Panel {
     }).join("");
   }
 
-  svg() { return `<g>${this.axes()}${this.data.bars ? this.bars() : this.lines.map((line) => this.drawn(line)).join("")}</g>`; }
+  end() { // a vertical line with a text beside it
+    const { left, top, width, height, data } = this, x = this.x(data.end[0]), late = x > left + width / 2;
+    const text = `<text x="${(x + (late ? -5 : 5)).toFixed(1)}" y="${top + 10}" text-anchor="${late ? "end" : "start"}">${escaped(data.end[1])}</text>`;
+    return `<path d="M${x.toFixed(1)} ${top}v${height}" class="end"/>${text}`;
+  }
+
+  svg() {
+    const curves = this.data.bars ? this.bars() : this.lines.map((line) => this.drawn(line)).join("");
+    return `<g>${this.axes()}${curves}${this.data.end ? this.end() : ""}</g>`;
+  }
 
   at(x) { // the numbers below the pointer, in words; null beside the panel
-    const value = this.wide[0] + ((x - this.left) / this.width) * (this.wide[1] - this.wide[0]);
-    if (value < this.wide[0] || value > this.wide[1] || !this.lines.length) return null;
+    const place = this.wide[0] + ((x - this.left) / this.width) * (this.wide[1] - this.wide[0]);
+    if (place < this.wide[0] || place > this.wide[1] || !this.lines.length) return null;
+    const value = this.data.across ? 10 ** place : place;
     const parts = this.lines.filter((line) => line.n && !line.l.includes("dots") && !line.l.includes("rings")).map((line) => {
-      const near = line.x.reduce((best, v, k) => (Math.abs(v - value) < Math.abs(line.x[best] - value) ? k : best), 0);
+      const before = line.x.findLastIndex((v) => v !== null && v <= value);
+      const nearest = () => line.x.reduce((best, v, k) => (Math.abs(v - value) < Math.abs(line.x[best] - value) ? k : best), 0);
+      const near = line.l.includes("steps") ? before : nearest();
       return line.y[near] === null || line.y[near] === undefined ? "" : `${line.n} ${written(line.y[near])}`;
     });
     return `${this.data.along} ${written(Number(value.toPrecision(4)))}: ${[...new Set(parts)].filter(Boolean).join(", ")}`;
   }
 }
 
-function layOut(chart) { // the panels in their places, and the height of all
-  const width = WIDTH / chart.columns, panels = [];
+function layOut(chart, whole) { // the panels in their places, below each other where there is little room, and the height of all
+  const columns = whole < WIDTH ? 1 : chart.columns, width = whole / columns, panels = [];
+  const all = columns < chart.columns ? chart.panels.filter(Boolean) : chart.panels;
   let top = 0;
-  for (let row = 0; row < chart.panels.length; row += chart.columns) {
-    const made = chart.panels.slice(row, row + chart.columns).map((data, k) => data && new Panel(data, k * width, top, width));
+  for (let row = 0; row < all.length; row += columns) {
+    const made = all.slice(row, row + columns).map((data, k) => data && new Panel(data, k * width, top, width, chart.height));
     panels.push(...made.filter(Boolean));
     top += Math.max(...made.filter(Boolean).map((panel) => panel.height), 0) + TOP + BOTTOM;
   }
   return { panels, height: top };
 }
 
-function drawChart(chart) {
-  const { panels, height } = layOut(chart);
-  const keys = chart.keys.map(([name, colour]) => `<span><i style="background:${colour}"></i>${escaped(name)}</span>`);
-  const svg = `<svg viewBox="0 0 ${WIDTH} ${height}" role="img">${panels.map((panel) => panel.svg()).join("")}</svg>`;
+function drawChart(chart, width = WIDTH) {
+  const { panels, height } = layOut(chart, width);
+  const keys = chart.keys.map(([name, colour, look]) => `<span><i class="${look}" style="color:${colour}"></i>${escaped(name)}</span>`);
+  const svg = `<svg viewBox="0 0 ${width} ${height}" role="img">${panels.map((panel) => panel.svg()).join("")}</svg>`;
   return { html: `<div class="legend">${keys.join("")}<output></output></div>${svg}`, panels };
 }
 
 document.querySelectorAll("figure.chart").forEach((root) => {
-  const { html, panels } = drawChart(JSON.parse(root.querySelector("script").textContent));
-  const place = root.querySelector("div");
+  const place = root.querySelector("div"), width = place.clientWidth < 520 ? NARROW : WIDTH;
+  const { html, panels } = drawChart(JSON.parse(root.querySelector("script").textContent), width);
   place.innerHTML = html;
   const svg = place.querySelector("svg"), output = place.querySelector("output");
   svg.addEventListener("pointermove", (event) => {
-    const box = svg.getBoundingClientRect(), scale = WIDTH / box.width;
+    const box = svg.getBoundingClientRect(), scale = width / box.width;
     const [x, y] = [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale];
     const panel = panels.find((p) => y >= p.top - TOP && y <= p.top + p.height + BOTTOM && x >= p.left && x <= p.left + p.width);
     output.textContent = (panel && panel.at(x)) || "";

@@ -1,4 +1,4 @@
-// Unpacks what a light page holds compressed, then starts its scripts. The browser runs no other than those that the page allows.
+// Unpacks what a page holds compressed, then starts its scripts. The browser runs no other than those that the page allows.
 
 async function unpack(text) {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));

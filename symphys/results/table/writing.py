@@ -9,6 +9,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from symphys import files
 from symphys.errors import SymphysError
 from symphys.results.table.choosing import best, chosen, ordered
@@ -96,11 +98,34 @@ def parquet_bytes(rows: Sequence[Row], names: Sequence[str]) -> bytes:
     except ImportError:
         raise MissingPackage(NEEDED.format("pyarrow")) from None
     buffer = io.BytesIO()
-    types = {name: arrow.string() for name in FIXED} | {"solved": arrow.bool_()}
-    types |= {name: arrow.float64() for name in names if numeric(name)}
-    arrays = {name: arrow.array(column, type=types.get(name)) for name, column in data(rows, names).items()}
+    types = dict.fromkeys(FIXED, str) | {"solved": bool} | {name: float for name in names if numeric(name)}
+    arrays = {name: packed(arrow, column, types.get(name)) for name, column in data(rows, names).items()}
     parquet.write_table(arrow.table(arrays), buffer)
     return buffer.getvalue()
+
+
+def packed(arrow: Any, column: Sequence[Any], kind: type | None) -> Any:
+    """Return a column as an array of Arrow; ``kind``: of its values, None for that of the first that is known.
+
+    It is made of buffers, since ``arrow.array`` imports pandas, which takes longer than all else that is done here.
+    """
+    known = np.array([value is not None for value in column], bool)
+    kind = kind or next((type(value) for value in column if value is not None), None)
+    if kind is None:
+        return arrow.nulls(len(column))
+    mask = arrow.py_buffer(np.packbits(known, bitorder="little").tobytes())
+    filled = [kind() if value is None else value for value in column]
+    if kind is str:
+        texts = [value.encode() for value in filled]
+        ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
+        buffers = [mask, arrow.py_buffer(ends.tobytes()), arrow.py_buffer(b"".join(texts))]
+        return arrow.Array.from_buffers(arrow.string(), len(column), buffers)
+    if kind is bool:
+        content, of = np.packbits(np.array(filled, bool), bitorder="little"), arrow.bool_()
+    else:
+        content = np.array(filled, np.int64 if kind is int else np.float64)
+        of = arrow.int64() if kind is int else arrow.float64()
+    return arrow.Array.from_buffers(of, len(column), [mask, arrow.py_buffer(content.tobytes())])
 
 
 def frame(folder: str | Path, where: str | Sequence[str] = (), sort: str = "") -> Any:

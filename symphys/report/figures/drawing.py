@@ -1,4 +1,4 @@
-"""Charts drawn by matplotlib, for the figures of full pages."""
+"""Charts drawn by matplotlib."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart, Key, Line, Panel, by_abscissa
+from symphys.report.charts.tables import thin, thinned
 from symphys.report.figures import style
-from symphys.report.figures.data import DataFigure, keep, thin, thinned
+from symphys.report.figures.data import DataFigure, keep
 from symphys.report.figures.style import Picture
 from symphys.types import Array
 
 DASHES: Any = (0, (4, 2))
 DOTS: Any = (0, (1, 1.5))
-BEYOND = "#e9edf0"
 TICKS = {1: 8, 2: 6, 3: 5}
 """Numbers along the bottom of a panel, about, by the columns of its chart; 4 of narrower ones."""
 MAX_MARKED_SAMPLES = 40
@@ -76,8 +77,8 @@ def one_range(chart: Chart) -> bool:
 
 def draw_panel(axes: Axes, panel: Panel, chart: Chart, room: int) -> None:
     """Draw one panel; ``room``: letters of its title."""
-    axes.set_title(style.short(panel.title, room - len(panel.note)))
-    axes.set_title(panel.note, loc="right", color=style.VERMILION)
+    axes.set_title(palette.short(panel.title, room - len(panel.note)))
+    axes.set_title(panel.note, loc="right", color=palette.VERMILION)
     style.set_linear(axes, "x", TICKS.get(chart.columns, 4))
     if panel.bars:
         draw_bars(axes, panel)
@@ -94,7 +95,7 @@ def draw_panel(axes: Axes, panel: Panel, chart: Chart, room: int) -> None:
     if panel.end:
         draw_end(axes, *panel.end)
     if panel.ticks:
-        axes.vlines(panel.ticks, 0, 0.05, transform=axes.get_xaxis_transform(), color=style.ORANGE, linewidth=1.2)
+        axes.vlines(panel.ticks, 0, 0.05, transform=axes.get_xaxis_transform(), color=palette.ORANGE, linewidth=1.2)
     named = [line for line in panel.lines if line.name and not line.has("dashed")]
     if not chart.keys and len(named) > 1:
         name_lines(axes, named)
@@ -152,7 +153,7 @@ def fit_heights(axes: Axes, panel: Panel) -> None:
     far = FAR_EDGE * (high - low)
     near = [edge for edge in panel.edges if low - far <= edge <= high + far]
     for edge in near:
-        axes.axhline(edge, color=style.GROUND_EDGE, linewidth=0.9, linestyle=DOTS, zorder=1.5)
+        axes.axhline(edge, color=palette.GROUND_EDGE, linewidth=0.9, linestyle=DOTS, zorder=1.5)
     if near and panel.scale == 0:
         margin = 0.07 * (max(high, *near) - min(low, *near))
         low, high = min(low, min(near) - margin), max(high, max(near) + margin)
@@ -163,13 +164,13 @@ def fit_heights(axes: Axes, panel: Panel) -> None:
         high = panel.least[1] if not values.size or values.max() <= panel.least[1] else high
     if panel.met:
         low, high = min(low, 0.5), max(high, 2.0)
-        axes.axhspan(low, 1, color=style.MET, linewidth=0, zorder=0.5)
-        axes.axhline(1, color=style.GREEN, linewidth=0.9, linestyle=DASHES, zorder=1)
+        axes.axhspan(low, 1, color=palette.MET, linewidth=0, zorder=0.5)
+        axes.axhline(1, color=palette.GREEN, linewidth=0.9, linestyle=DASHES, zorder=1)
         place = {"xycoords": ("axes fraction", "data"), "xytext": (5, -3), "textcoords": "offset points"}
         axes.annotate("met below", (0, 1), ha="left", va="top", color="#00775a", fontsize=8, **place)  # type: ignore[arg-type]
     for band in panel.beyond:
         bottom, top = np.clip(band, low, high)
-        axes.axhspan(bottom, top, color=BEYOND, linewidth=0, zorder=0.5)
+        axes.axhspan(bottom, top, color=palette.BEYOND, linewidth=0, zorder=0.5)
     axes.set_ylim(low, high)
 
 
@@ -177,21 +178,21 @@ def draw_stages(axes: Axes, panel: Panel) -> None:
     """Draw a pale band behind every other stage, and its name where there is room."""
     for index, (left, right, text) in enumerate(panel.stages):
         if index % 2:
-            axes.axvspan(left, right, color=style.GROUND, linewidth=0, alpha=0.7, zorder=0.2)
+            axes.axvspan(left, right, color=palette.GROUND, linewidth=0, alpha=0.7, zorder=0.2)
         if index:
-            axes.axvline(left, color=style.FAINT, linewidth=0.8, zorder=0.4)
+            axes.axvline(left, color=palette.FAINT, linewidth=0.8, zorder=0.4)
         if text and right - left >= MIN_STAGE_WIDTH * (panel.stages[-1][1] - panel.stages[0][0]):
             place = {"xycoords": ("data", "axes fraction"), "xytext": (0, -3), "textcoords": "offset points"}
             middle = (0.5 * (left + right), 1)
-            axes.annotate(text, middle, ha="center", va="top", color=style.SOFT, fontsize=7.5, **place)  # type: ignore[arg-type]
+            axes.annotate(text, middle, ha="center", va="top", color=palette.SOFT, fontsize=7.5, **place)  # type: ignore[arg-type]
 
 
 def draw_end(axes: Axes, x: float, text: str) -> None:
     """Draw a vertical line with a text beside it."""
-    axes.axvline(x, color=style.VERMILION, linewidth=1, linestyle=DASHES)
+    axes.axvline(x, color=palette.VERMILION, linewidth=1, linestyle=DASHES)
     late = x > np.mean(axes.get_xlim())
     axes.annotate(text, (x, 0.97), xycoords=axes.get_xaxis_transform(), xytext=(-5 if late else 5, 0),
-                  textcoords="offset points", ha="right" if late else "left", va="top", color=style.VERMILION,
+                  textcoords="offset points", ha="right" if late else "left", va="top", color=palette.VERMILION,
                   fontsize=8)  # fmt: skip
 
 
@@ -207,11 +208,11 @@ def name_lines(axes: Axes, named: Sequence[Line]) -> None:
 def draw_bars(axes: Axes, panel: Panel) -> None:
     """Draw rows of bars, named on the left and noted on the right."""
     for row, bar in enumerate(panel.bars):
-        axes.axhspan(row - BAR_HEIGHT / 2, row + BAR_HEIGHT / 2, color=style.GROUND, linewidth=0, zorder=1)
+        axes.axhspan(row - BAR_HEIGHT / 2, row + BAR_HEIGHT / 2, color=palette.GROUND, linewidth=0, zorder=1)
         parts = [(start, stop - start) for start, stop in bar.spans]
         axes.broken_barh(parts, (row - BAR_HEIGHT / 2, BAR_HEIGHT), facecolor=bar.colour, linewidth=0, zorder=3)
-        axes.text(1.007, row, bar.note, va="center", color=style.SOFT, transform=axes.get_yaxis_transform())
-    axes.set_yticks(range(len(panel.bars)), [style.short(bar.name, 24) for bar in panel.bars])
+        axes.text(1.007, row, bar.note, va="center", color=palette.SOFT, transform=axes.get_yaxis_transform())
+    axes.set_yticks(range(len(panel.bars)), [palette.short(bar.name, 24) for bar in panel.bars])
     axes.set(xlim=panel.least, ylim=(len(panel.bars) - 0.5, -0.5))
     axes.grid(visible=False, axis="y")
     axes.spines["left"].set_visible(False)
@@ -221,7 +222,7 @@ def draw_bars(axes: Axes, panel: Panel) -> None:
 def handle(key: Key) -> Artist:
     """Return what stands beside a key in the legend."""
     if key.look == "shade":
-        return Patch(facecolor=key.colour, edgecolor=style.GROUND_EDGE, linewidth=0.8)
+        return Patch(facecolor=key.colour, edgecolor=palette.GROUND_EDGE, linewidth=0.8)
     line = Line(key.name, key.colour, np.zeros(0), np.zeros(0), look=key.look)
     face, mark = "white" if line.has("rings") else key.colour, key.mark or "D"
     if line.has("points"):
