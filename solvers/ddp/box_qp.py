@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import lapack
 
 from symphys.types import Array, Bools
 
@@ -19,6 +19,23 @@ MIN_STEP_FACTOR = 1e-10
 """Least factor on a step."""
 GRADIENT_TOLERANCE = 1e-10
 """Projected gradient, relative to the first one, that counts as zero."""
+
+
+def factored(*arguments: Any, **how: Any) -> Any:
+    """Call LAPACK's ``dpotrf``; scipy is imported for problems with several decisions at once."""
+    return _lapack().dpotrf(*arguments, **how)
+
+
+def solved(*arguments: Any, **how: Any) -> Any:
+    """Call LAPACK's ``dpotrs``."""
+    return _lapack().dpotrs(*arguments, **how)
+
+
+@cache
+def _lapack() -> Any:
+    from scipy.linalg import lapack
+
+    return lapack
 
 
 class BoxSolution(NamedTuple):
@@ -58,14 +75,14 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
             free = now
             if not free.any():
                 return BoxSolution(x, free, None)
-            factor, failed = lapack.dpotrf(hessian[free][:, free], lower=1)
+            factor, failed = factored(hessian[free][:, free], lower=1)
             if failed:
                 return None
         if np.abs(slope[free]).max() <= GRADIENT_TOLERANCE * size:
             break
         # Newton step in the free entries, then an Armijo search along its projection.
         ahead = np.zeros(len(x))
-        ahead[free] = -lapack.dpotrs(factor, slope[free], lower=1)[0]
+        ahead[free] = -solved(factor, slope[free], lower=1)[0]
         found = _projected(hessian, gradient, (lower, upper), x, slope, ahead)
         if found is None:
             break
@@ -75,10 +92,10 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
 
 def _within(hessian: Array, gradient: Array, lower: Array, upper: Array) -> BoxSolution | None:
     """Return the unconstrained minimum, where it exists and lies within the bounds."""
-    factor, failed = lapack.dpotrf(hessian, lower=1)
+    factor, failed = factored(hessian, lower=1)
     if failed:
         return None
-    step = -lapack.dpotrs(factor, gradient, lower=1)[0]
+    step = -solved(factor, gradient, lower=1)[0]
     inside = np.all(step >= lower) and np.all(step <= upper)
     return BoxSolution(step, np.ones(len(step), np.bool_), factor) if inside else None
 

@@ -11,10 +11,9 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import lapack
 
 from symphys.shooting import CompiledRecursion
-from symphys.solvers.ddp.box_qp import solve_box_qp
+from symphys.solvers.ddp.box_qp import factored, solve_box_qp, solved
 from symphys.types import Array
 
 
@@ -148,10 +147,10 @@ def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: 
     """Return the optimal decisions within bounds, and the gains of those that are at no bound."""
     damped = hessian.copy()
     damped.ravel()[:: len(slope) + 1] += damping
-    factor, fault = lapack.dpotrf(damped, lower=1, clean=0)
+    factor, fault = factored(damped, lower=1, clean=0)
     if fault:
         return None
-    both = lapack.dpotrs(factor, np.concatenate([slope[:, None], cross], axis=1), lower=1)[0]
+    both = solved(factor, np.concatenate([slope[:, None], cross], axis=1), lower=1)[0]
     ahead = -both[:, 0]
     if (ahead >= lower).all() and (ahead <= upper).all():
         return Feedback(ahead, -both[:, 1:])
@@ -160,5 +159,5 @@ def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: 
         return None
     back = np.zeros_like(cross)
     if found.factor is not None:
-        back[found.free] = -lapack.dpotrs(found.factor, cross[found.free], lower=1)[0]
+        back[found.free] = -solved(found.factor, cross[found.free], lower=1)[0]
     return Feedback(found.step, back)

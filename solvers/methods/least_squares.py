@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import revive
@@ -215,10 +214,12 @@ def damped_step(jacobian: Array, r: Array, damping: float) -> Array:
     tall = jacobian.shape[0] >= jacobian.shape[1]
     square = jacobian.T @ jacobian if tall else jacobian @ jacobian.T
     floor = 4 * len(square) * float(np.finfo(float).eps) * float(np.trace(square))
-    factor = scipy.linalg.cho_factor(square + max(damping, floor) * np.eye(len(square)))
+    from scipy.linalg import cho_factor, cho_solve  # late: other solvers need none of it
+
+    factor = cho_factor(square + max(damping, floor) * np.eye(len(square)))
     if tall:
-        return np.asarray(-scipy.linalg.cho_solve(factor, jacobian.T @ r))
-    return np.asarray(-jacobian.T @ scipy.linalg.cho_solve(factor, r))
+        return np.asarray(-cho_solve(factor, jacobian.T @ r))
+    return np.asarray(-jacobian.T @ cho_solve(factor, r))
 
 
 def cosine(evaluator: CountingEvaluator, state: LeastSquaresState) -> float:
