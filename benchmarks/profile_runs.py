@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
 from symphys.problem import Problem, require_solvable
-from symphys.problem.loading import load
+from symphys.problem.problem import load
 from symphys.runs.choice import SITUATIONS, situation
 from symphys.runs.record import equivalents
 from symphys.shooting import Evaluator, ShootingProblem, Values

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from symphys.mpc.controller import Controller
     from symphys.prediction.identifying import identify
     from symphys.problem import Problem
-    from symphys.problem.loading import load
+    from symphys.problem.problem import load
     from symphys.report.making.batch import write_report
     from symphys.trajectory import Trajectory
 
@@ -93,7 +93,7 @@ _HOMES = {
     "mpc.controller": ("Controller",),
     "prediction.identifying": ("identify",),
     "problem": ("Problem",),
-    "problem.loading": ("load",),
+    "problem.problem": ("load",),
     "report.making.batch": ("write_report",),
     "trajectory": ("Trajectory",),
 }

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symphys.api.compiled import CompiledStep, compile_step
 from symphys.errors import SymphysError
-from symphys.problem.loading import Source
+from symphys.problem.problem import Source
 from symphys.types import Array
 
 try:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from symphys.api.compiled import CompiledRollout, CompiledStep, compile, compile_step
 from symphys.errors import SymphysError
-from symphys.problem.loading import Source
+from symphys.problem.problem import Source
 from symphys.transcription.open_step import StepResult, StepStart
 from symphys.transcription.recorded_rollout import RecordedRollout
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symphys.api.compiled import CompiledRollout, CompiledStep, compile, compile_step
-from symphys.problem.loading import Source
+from symphys.problem.problem import Source
 from symphys.transcription.open_step import StepResult, StepStart
 from symphys.transcription.recorded_rollout import RecordedRollout
 from symphys.types import Array

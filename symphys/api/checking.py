@@ -24,7 +24,7 @@ from symphys.findings.levels import BAD, FAIR, MARKS, UNKNOWN, Finding, Judged
 from symphys.findings.numerics import GRADIENT, GRID, reach
 from symphys.findings.physics import sliding
 from symphys.problem import Problem, require_solvable
-from symphys.problem.loading import Source, load
+from symphys.problem.problem import Source, load
 from symphys.runs import check_tables
 from symphys.transcription import Assessment
 from symphys.verification import examine

@@ -15,7 +15,7 @@ from symphys.codegen.backends import NAMES, require_backend
 from symphys.codegen.backends.precision import warn
 from symphys.errors import SymphysError
 from symphys.problem import Problem
-from symphys.problem.loading import Source, load
+from symphys.problem.problem import Source, load
 from symphys.shooting import Evaluator, Linearized, Values
 from symphys.trajectory import Trajectory
 from symphys.transcription import Transcription

@@ -12,7 +12,7 @@ from symphys import problems
 from symphys.api.transcriptions import transcribed
 from symphys.api.values import vector
 from symphys.problem import Problem, is_robot, robot_alone
-from symphys.problem.loading import Source, load
+from symphys.problem.problem import Source, load
 from symphys.results.scene_of_problem import make_scene
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from symphys.api.transcriptions import transcribed
 from symphys.api.values import vector
 from symphys.problem import Problem
-from symphys.problem.loading import Source, load
+from symphys.problem.problem import Source, load
 from symphys.solvers.ddp.gains import Gains
 from symphys.solvers.ddp.gains import follow as gains_motion
 from symphys.trajectory import Trajectory

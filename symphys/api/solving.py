@@ -16,7 +16,7 @@ from symphys.codegen.backends import require_backend
 from symphys.errors import SymphysError
 from symphys.interrupts import Interrupts
 from symphys.problem import Problem
-from symphys.problem.loading import Source, load
+from symphys.problem.problem import Source, load
 from symphys.results.run import read_run
 from symphys.runs import Job, Result, RunGuess, execute, make_jobs, read_guess_run
 from symphys.runs.choice import chosen

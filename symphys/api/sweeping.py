@@ -19,10 +19,9 @@ from symphys.batches import ENGINES, BatchLimits, BatchResult, Observer, run_bat
 from symphys.codegen.backends import require_backend
 from symphys.errors import SymphysError
 from symphys.problem import Problem
-from symphys.problem.loading import Source, load
-from symphys.problem.problem import plain
+from symphys.problem.problem import Source, load, plain
 from symphys.problem.sweeps.points import combined, swept
-from symphys.problem.sweeps.table import read_sweep
+from symphys.problem.sweeps.reading import read_sweep
 from symphys.results.run import read_run
 from symphys.runs import Job, make_jobs
 from symphys.runs.execute import Transcribe

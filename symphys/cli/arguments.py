@@ -111,7 +111,7 @@ def read_backend(name: str) -> str:
 
 def read_settings(assignments: Iterable[str]) -> dict[str, object]:
     """Read ``KEY=VALUE`` pairs; a value is TOML, or plain text if it is not valid TOML."""
-    from symphys.problem.reading.value_texts import read_value
+    from symphys.problem.reading.messages import read_value
 
     settings: dict[str, object] = {}
     for assignment in assignments:
@@ -141,7 +141,7 @@ def read_sweeps(
 ) -> list[tuple[Problem, Sweep | None]]:
     """Return each problem with its sweep, from its file, --sweep and --samples; None without a sweep."""
     from symphys.problem.sweeps.points import combined
-    from symphys.problem.sweeps.texts import read_axes, read_samples
+    from symphys.problem.sweeps.reading import read_axes, read_samples
 
     axes, alone = read_axes(sweeps)
     chosen = None if samples is None else read_samples(samples)

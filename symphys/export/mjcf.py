@@ -55,7 +55,7 @@ from symphys.model.shapes import Terrain
 from symphys.model.site import Site
 from symphys.model.world import World
 from symphys.problem import Problem
-from symphys.problem.feedback import Sensor
+from symphys.problem.model import Sensor
 from symphys.types import Array
 
 NUMBERS = r"(\[[^\[\]]*\])"

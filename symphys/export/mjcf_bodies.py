@@ -19,7 +19,7 @@ from symphys.model.joints.kinematic_tree import FLOATING
 from symphys.model.joints.start import moved_to_zero
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import World
-from symphys.problem.joint_tables import placed_joint, whole_state
+from symphys.problem.world_tables import placed_joint, whole_state
 from symphys.types import Array
 
 MAX_JOINT_GAP = 1e-5

@@ -9,7 +9,7 @@ import numpy as np
 from symphys.model.state_layout import Layout, input_columns, input_size
 from symphys.model.world import World
 from symphys.problem import DURATION, Problem, Variable, VariableSlot
-from symphys.problem.units import quantity_unit
+from symphys.problem.quantities import quantity_unit
 from symphys.transcription import Transcription
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.tangent import Tangent

@@ -12,7 +12,7 @@ from symphys.export.mjcf_departures import Departure
 from symphys.export.mjcf_trial import tried_model
 from symphys.export.sources import c_files
 from symphys.problem import Problem, require_solvable
-from symphys.problem.loading import Source, load
+from symphys.problem.problem import Source, load
 from symphys.transcription.network_rollout import require_small_nets
 from symphys.transcription.transcribe import transcribe_whole
 from symphys.version import __version__

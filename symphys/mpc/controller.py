@@ -12,7 +12,7 @@ from symphys.errors import SymphysError
 from symphys.model.state_layout import input_columns
 from symphys.mpc.planner import Planner, RecedingPlan
 from symphys.problem import Problem, RecedingHorizon
-from symphys.problem.loading import Source, load
+from symphys.problem.problem import Source, load
 from symphys.transcription.state_reader import StateReader
 from symphys.types import Array
 

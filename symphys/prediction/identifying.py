@@ -18,7 +18,7 @@ from symphys.errors import SymphysError
 from symphys.identification import FitOptions, FitState, FitStep, IdentificationOptions, SearchOptions, revive_state
 from symphys.prediction.residuals import RecordingResiduals, difference, residuals_of
 from symphys.problem import IdentifySettings, Problem
-from symphys.problem.loading import Source, load
+from symphys.problem.problem import Source, load
 from symphys.results.identification import Identification
 from symphys.results.identification.replays import RecordingReplay, ReplayedQuantity, write_replays
 from symphys.results.scene import Scene

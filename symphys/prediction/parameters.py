@@ -10,7 +10,7 @@ import numpy as np
 
 from symphys.identification import FitParameters
 from symphys.problem import Problem, Variable
-from symphys.problem.units import formula_units
+from symphys.problem.quantities import formula_units
 from symphys.types import Array, Ints
 
 JOINT_FRICTION = "dry_friction"

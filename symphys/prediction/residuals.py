@@ -14,7 +14,7 @@ from symphys.prediction.parameters import fit_numbers
 from symphys.prediction.predictor import PredictedSamples, Predictor
 from symphys.prediction.rotations import rotation_slopes, rotation_vectors
 from symphys.problem import Measured, Problem, Recording
-from symphys.problem.units import quantity_unit
+from symphys.problem.quantities import quantity_unit
 from symphys.types import Array, Bools, Ints
 
 WHOLE_TURN = 2 * np.pi

@@ -3,8 +3,7 @@
 from typing import TYPE_CHECKING
 
 from symphys.later import later
-from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
-from symphys.problem.guess.motion import GuessedMotion
+from symphys.problem.guess import GuessedMotion
 from symphys.problem.load import require_solvable
 from symphys.problem.model import (
     ALIVE,
@@ -12,31 +11,32 @@ from symphys.problem.model import (
     Constraint,
     Cost,
     Discretisation,
+    FeedbackController,
+    ForceLaw,
     Output,
     Phase,
+    PlantSettings,
     ProblemData,
     RandomizedPose,
     RandomizedQuantity,
+    RecedingHorizon,
     Scenarios,
+    Sensor,
     Simulation,
     Target,
     Termination,
     Variable,
     VariableSlot,
 )
-from symphys.problem.parametric.carried import carried
-from symphys.problem.parametric.reposition import placing, reposition
-from symphys.problem.parametric.starts import begin
+from symphys.problem.parametric.placement import begin, carried, placing, reposition
 from symphys.problem.problem import Problem, load_problem, problem_of_tables
 from symphys.problem.quantities import set_quantities
 from symphys.problem.reading.solver_options import require_solvers, validate_options
-from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
 from symphys.problem.recordings import IdentifySettings, Measured, RecordedFile, RecordedInput, Recording
 from symphys.problem.robot_alone import is_robot, robot_alone
 
 if TYPE_CHECKING:
-    from symphys.problem.schema.json_schema import json_schema
-    from symphys.problem.schema.reference import reference_page
+    from symphys.problem.schema.reference import json_schema, reference_page
 
 __all__ = [
     "ALIVE",
@@ -86,7 +86,6 @@ __all__ = [
 __getattr__ = later(
     __name__,
     {
-        "schema.json_schema": ("json_schema",),
-        "schema.reference": ("reference_page",),
+        "schema.reference": ("json_schema", "reference_page"),
     },
 )

@@ -14,23 +14,26 @@ from symphys.errors import Issue, ProblemError
 from symphys.files import printable
 from symphys.model.state_layout import input_sizes
 from symphys.model.world import World
-from symphys.problem.checks.memory import check_rollout
-from symphys.problem.checks.pair_limit import check_pair_limit
-from symphys.problem.checks.start import at_guess, check_joints, check_overlap, formula_names
-from symphys.problem.checks.start_values import StartValues
-from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
-from symphys.problem.guess.table import read_guess
-from symphys.problem.include.files import appendix
-from symphys.problem.model import ALIVE, ProblemData, Simulation, Termination, Variable
-from symphys.problem.parametric.forward_kinematics import forward_kinematics
+from symphys.problem.include import appendix
+from symphys.problem.limits import check_pair_limit, check_rollout
+from symphys.problem.model import (
+    ALIVE,
+    FeedbackController,
+    ForceLaw,
+    ProblemData,
+    Sensor,
+    Simulation,
+    Termination,
+    Variable,
+)
 from symphys.problem.parametric.parts import Part
-from symphys.problem.parametric.reposition import check_anchors
-from symphys.problem.parametric.starts import check_starts
+from symphys.problem.parametric.placement import check_anchors, check_starts, forward_kinematics
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import (
     Quantity,
     delay_quantities,
     duration_quantity,
+    formula_units,
     quantities,
     recording_quantities,
     start_quantities,
@@ -38,13 +41,13 @@ from symphys.problem.quantities import (
 )
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import report
-from symphys.problem.reading.range_of_numbers import check_range
-from symphys.problem.recordings.kept import recorded_appendix
+from symphys.problem.reading.source import check_range
+from symphys.problem.recordings.files import recorded_appendix
 from symphys.problem.recordings.reading import read_identification, with_duration
 from symphys.problem.references import read_references, reference_values
 from symphys.problem.schema import Document
-from symphys.problem.tables.attached import check_couplings, read_couplings, read_sites
-from symphys.problem.tables.bodies import read_body, read_state
+from symphys.problem.start import StartValues, at_guess, check_joints, check_overlap, formula_names
+from symphys.problem.tables.bodies import read_body, read_state, read_statics
 from symphys.problem.tables.contact import (
     check_collides_with,
     check_laws,
@@ -52,9 +55,9 @@ from symphys.problem.tables.contact import (
     read_contact,
     read_pairs,
 )
-from symphys.problem.tables.controllers import read_controllers, read_sensors
-from symphys.problem.tables.forces import force_quantities, read_forces
-from symphys.problem.tables.joints import read_joints
+from symphys.problem.tables.control import force_quantities, read_controllers, read_forces, read_sensors
+from symphys.problem.tables.guess import read_guess
+from symphys.problem.tables.joints import check_couplings, read_couplings, read_joints, read_sites
 from symphys.problem.tables.objectives import Objectives, read_objectives, read_termination, with_termination_cost
 from symphys.problem.tables.scenarios import read_scenarios
 from symphys.problem.tables.simulation import (
@@ -65,9 +68,7 @@ from symphys.problem.tables.simulation import (
     read_sets,
     read_time,
 )
-from symphys.problem.tables.statics import read_statics
 from symphys.problem.tables.variables import read_variables
-from symphys.problem.units import formula_units
 from symphys.types import Array
 
 if TYPE_CHECKING:

@@ -12,19 +12,156 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from symphys.expression import Formula
+from symphys.model.controllers import ControlLaw
 from symphys.model.world import Scheme, World
-from symphys.problem.feedback import FeedbackController, ForceLaw, Sensor
-from symphys.problem.guess.motion import GuessedMotion
+from symphys.problem.guess import GuessedMotion
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.world import ParametricWorld
-from symphys.problem.receding_horizon import RecedingHorizon
-from symphys.problem.recordings.kept import without_places
+from symphys.problem.recordings.files import without_places
 from symphys.problem.recordings.types import IdentifySettings, RecordedFile, Recording
 from symphys.problem.references import ReferenceTrajectory
 from symphys.types import Array
 
 if TYPE_CHECKING:
     from symphys.problem.sweeps.sweep import Sweep
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Something that controllers may use.
+
+    Attributes:
+        name: as in the file.
+        formulas: of its parts, one after the other.
+        size: how many numbers they come to.
+    """
+
+    name: str
+    formulas: tuple[Formula, ...]
+    size: int
+
+
+@dataclass(frozen=True)
+class FeedbackController:
+    """What drives inputs in every step.
+
+    Attributes:
+        name: as in the file.
+        law: how outputs follow from what is sensed.
+        senses: names of the sensors, whose values are joined.
+        drives: for each output the name of an input and the component that it is added to.
+        scale: (m,) factors of the outputs.
+        numbers: the law's numbers as the file has them, by the names of ``law.sizes``.
+    """
+
+    name: str
+    law: ControlLaw
+    senses: tuple[str, ...]
+    drives: tuple[tuple[str, int], ...]
+    scale: Array = field(repr=False)
+    numbers: dict[str, Array] = field(repr=False)
+
+    @property
+    def weights(self) -> dict[str, Array]:
+        """The numbers by the names that variables use: ``brain.weights``."""
+        return {f"{self.name}.{key}": value for key, value in self.numbers.items()}
+
+
+@dataclass(frozen=True)
+class ForceLaw:
+    """What adds to an input in every step, by a formula of the state.
+
+    Attributes:
+        name: as in the file.
+        on: the input: ``ball.force`` [N], ``ball.torque`` [N m], both world frame, or ``knee.command``.
+        components: of the input.
+        formula: of as many numbers.
+        against: an input and components to which the opposite is added; None: nothing.
+        numbers: of the formula, as the file has them.
+        during: where the phase in which alone it acts begins and ends, as shares of the duration; None: it acts always.
+    """
+
+    name: str
+    on: str
+    components: tuple[int, ...]
+    formula: Formula
+    numbers: dict[str, Array] = field(repr=False)
+    against: tuple[str, tuple[int, ...]] | None = None
+    during: tuple[float, float] | None = None
+
+    @property
+    def acts_on(self) -> tuple[tuple[str, tuple[int, ...], int], ...]:
+        """Inputs, their components, and the sign with which the formula is added."""
+        opposite = () if self.against is None else ((*self.against, -1),)
+        return ((self.on, self.components, 1), *opposite)
+
+    @property
+    def weights(self) -> dict[str, Array]:
+        """The numbers by the names that variables and formulas use: ``drag.c``."""
+        return {f"{self.name}.{key}": value for key, value in self.numbers.items()}
+
+
+@dataclass(frozen=True)
+class PlantSettings:
+    """How the plant differs from the model.
+
+    Attributes:
+        dt: [s] its longest time step.
+        masses: factor of all masses and inertias.
+        set: values by the keys of ``Problem.set``.
+        noise, rate_noise: standard deviations of measured coordinates [m, rad] and rates [m/s, rad/s].
+        seed: of the noise.
+        delay: [s] from a command to its effect.
+        latency: [s] from a measurement to the commands of its plan; ``measured``: the time that the solver took;
+            ``cpu``: the processor time that it took.
+    """
+
+    dt: float
+    masses: float
+    set: Mapping[str, object]
+    noise: float
+    rate_noise: float
+    seed: int
+    delay: float
+    latency: float | str
+
+
+@dataclass(frozen=True)
+class RecedingHorizon:
+    """Model predictive control.
+
+    Attributes:
+        rate: ticks in a second [Hz].
+        horizon, dt: [s] how far a plan looks ahead, and its time step.
+        iterations, first_iterations: of iLQR at each tick, and before the first.
+        damping: first and least regularisation.
+        smoothing: of the model's contacts [m/s].
+        feedback: whether commands between ticks answer what is measured.
+        duration: [s] of the closed loop.
+        plant: what it is tried on.
+    """
+
+    rate: float
+    horizon: float
+    dt: float
+    iterations: int
+    first_iterations: int
+    damping: float
+    smoothing: float
+    feedback: bool
+    duration: float
+    plant: PlantSettings
+
+    @property
+    def steps(self) -> int:
+        """The number of the model's time steps in a plan."""
+        return round(self.horizon / self.dt)
+
+    @property
+    def tick(self) -> float:
+        """[s] between two ticks."""
+        return 1 / self.rate
+
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 

@@ -1,4 +1,4 @@
-"""A problem and where it comes from: read from a file, a text or tables, changed, and written again."""
+"""A problem and where it comes from: a shipped name, a file, a text or tables; changed, and written again."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import tomli_w
 
+from symphys import problems
 from symphys.model.world import World
 from symphys.problem.model import NOTHING, ProblemData
 from symphys.problem.reader import read_problem
@@ -189,3 +190,32 @@ def _made(path: Path, text: str, settings: Mapping[str, object], functions: Mapp
     settings = plain(settings)
     data = read_problem(path, text, settings, functions)
     return Problem(**vars(data), settings=settings, functions=dict(functions))
+
+
+Source = str | Path | Mapping[str, Any] | Problem
+"""What names a problem."""
+
+
+def load(source: Source, functions: Mapping[str, ca.Function] | None = None) -> Problem:
+    """A problem, validated.
+
+    Args:
+        source: the name of a shipped problem, the path of a problem file, or its tables as dicts and lists.
+        functions: of controllers with ``function``, by name: casadi functions of (sensed, time, weights).
+
+    Raises:
+        ProblemError: names the file and every fault found, each with table, key and what would be valid.
+        SymphysError: there is no such file, and no shipped problem of that name.
+
+    Example:
+        >>> import symphys
+        >>> problem = symphys.load("ball_throw")
+        >>> [variable.name for variable in problem.variables]
+        ['throw', 'spin']
+    """
+    given = functions or {}
+    if isinstance(source, Problem):
+        return source
+    if isinstance(source, Mapping):
+        return problem_of_tables(source, functions=given)
+    return load_problem(problems.find(str(source)), functions=given)

@@ -19,8 +19,7 @@ from symphys.errors import ProblemError
 from symphys.files import check_regular
 from symphys.model.world import NOTHING
 from symphys.problem.reading.faults import Faults
-from symphys.problem.reading.range_of_numbers import LARGEST, TOO_LARGE
-from symphys.problem.reading.source import read_source
+from symphys.problem.reading.source import LARGEST, TOO_LARGE, read_source
 from symphys.problem.schema import Document
 from symphys.problem.schema.checks import IDENTIFIER
 from symphys.suggest import quote

@@ -14,7 +14,7 @@ from symphys.maths import rotation
 from symphys.model.joints import AffineMotor, Servo
 from symphys.model.joints.frames import WORLD
 from symphys.model.scalar import is_zero
-from symphys.problem.include.files import with_included
+from symphys.problem.include import with_included
 from symphys.problem.model import NOTHING
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.problem import Problem, problem_of_tables

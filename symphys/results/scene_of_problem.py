@@ -16,7 +16,7 @@ from symphys.model.joints.motor import motor_kind
 from symphys.model.shapes import Fixture, Plane, Scalar, Shape, Terrain
 from symphys.model.world import World
 from symphys.problem import Problem
-from symphys.problem.plain import floats
+from symphys.problem.world_tables import floats
 from symphys.results.scene import Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
 from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneJointFrame, SceneMotor
 from symphys.trajectory import Trajectory

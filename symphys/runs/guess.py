@@ -11,8 +11,7 @@ import numpy as np
 
 from symphys.errors import SymphysError
 from symphys.problem import Problem, Variable, load_problem
-from symphys.problem.guess.motion import GuessedMotion
-from symphys.problem.guess.recorded import recorded_guess
+from symphys.problem.guess import GuessedMotion, recorded_guess
 from symphys.results.config import read_config
 from symphys.results.discovery import is_run, run_folders
 from symphys.results.file_names import CONFIG, MULTIPLIERS, PROBLEM, TRAJECTORY

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from symphys.cli.arguments import UsageFault, read_settings
-from symphys.problem.reading.value_texts import read_value
+from symphys.problem.reading.messages import read_value
 
 
 @settings(deadline=None)

@@ -12,9 +12,8 @@ import symphys
 from symphys.expression import parse
 from symphys.importing.records import ImportProblem
 from symphys.model.state_layout import input_sizes
-from symphys.problem.checks.start import at_guess, formula_names
-from symphys.problem.checks.start_values import StartValues
 from symphys.problem.quantities import duration_quantity, quantities
+from symphys.problem.start import StartValues, at_guess, formula_names
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -573,7 +573,7 @@ def test_files_that_are_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("symphys.problem.reading.source.MAX_BYTES", len(ROBOT) - 1)
     assert faults(tmp_path, {WHOLE: MAIN, PART: ROBOT})[0].file == PART
     monkeypatch.undo()
-    monkeypatch.setattr("symphys.problem.include.files.MAX_BYTES", len(ROBOT) + len(MAIN) - 1)
+    monkeypatch.setattr("symphys.problem.include.MAX_BYTES", len(ROBOT) + len(MAIN) - 1)
     assert faults(tmp_path, {WHOLE: MAIN, PART: ROBOT})[0].file == WHOLE
 
 

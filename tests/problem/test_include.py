@@ -13,7 +13,7 @@ from symphys.dynamics.observation import gap_function
 from symphys.dynamics.observation.joint_coordinates import readings
 from symphys.model.state_layout import initial_state
 from symphys.problem import Problem, json_schema, load_problem
-from symphys.problem.include.files import LISTS, prefixed
+from symphys.problem.include import LISTS, prefixed
 
 Load = Callable[..., Problem]
 

@@ -14,7 +14,7 @@ from worlds.included import ROBOT
 from symphys.cli import main
 from symphys.errors import ProblemError
 from symphys.problem import Problem, load_problem
-from symphys.problem.include.files import appendix
+from symphys.problem.include import appendix
 
 Load = Callable[..., Problem]
 

@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from symphys.errors import ProblemError
-from symphys.problem import load_problem
-from symphys.problem.checks import memory
+from symphys.problem import limits, load_problem
 
 BALL = """[simulation]
 duration = 1.0
@@ -50,7 +49,7 @@ def refused(folder: Path, text: str, **settings: Any) -> str:
 
 def test_a_net_of_400_million_weights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In no time, and in no memory: tracemalloc sees what numpy and Python take."""
-    monkeypatch.setattr(memory, "available", lambda: 64.0 * GIB)
+    monkeypatch.setattr(limits, "available", lambda: 64.0 * GIB)
     tracemalloc.start()
     said = refused(tmp_path, BALL + NET.replace("WIDTH", "20000") + WEIGHTS)
     peak = tracemalloc.get_traced_memory()[1]
@@ -64,7 +63,7 @@ def test_one_that_is_not_varied_takes_less(tmp_path: Path, monkeypatch: pytest.M
     """The numbers of a variable take more than weights that stay as they are."""
     text = BALL + NET.replace("WIDTH", "300")
     size = 300 * 300 + 6 * 300 + 603
-    monkeypatch.setattr(memory, "available", lambda: memory.WEIGHT * size + 1e6)
+    monkeypatch.setattr(limits, "available", lambda: limits.WEIGHT * size + 1e6)
     assert load(tmp_path, text).controllers[0].numbers["weights"].size == size
     assert "c" in refused(tmp_path, text + WEIGHTS)
 
@@ -73,12 +72,12 @@ def test_one_that_is_not_varied_takes_less(tmp_path: Path, monkeypatch: pytest.M
 def test_steps_and_knots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Which key is to be changed is the one that brings it over what there is."""
     states = 20
-    monkeypatch.setattr(memory, "available", lambda: memory.steps_need(states, 100) + 300 * memory.NUMBER)
+    monkeypatch.setattr(limits, "available", lambda: limits.steps_need(states, 100) + 300 * limits.NUMBER)
     assert load(tmp_path, BALL + PUSH).variables[0].knots == 100
     assert 'variable "more".knots: the steps, and all knots up to these, take' in refused(
         tmp_path, BALL + PUSH + PUSH.replace("push", "more").replace("force", "torque")
     )
-    monkeypatch.setattr(memory, "available", lambda: memory.steps_need(states, 100) - 1)
+    monkeypatch.setattr(limits, "available", lambda: limits.steps_need(states, 100) - 1)
     said = refused(tmp_path, BALL + PUSH)
     assert "simulation.dt: 100 steps of 20 states take about" in said and "a larger dt or a shorter duration" in said
     assert load(tmp_path, BALL + PUSH.replace("100", "50"), simulation__dt=0.02).simulation.steps == 50
@@ -93,15 +92,15 @@ def test_the_estimate_of_what_a_variable_takes_is_of_the_right_order(tmp_path: P
     weights = load(tmp_path, text).controllers[0].numbers["weights"].size
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert 0.3 < peak / (weights * (memory.WEIGHT + memory.NUMBER)) < 2
+    assert 0.3 < peak / (weights * (limits.WEIGHT + limits.NUMBER)) < 2
 
 
 def test_what_a_group_of_processes_may_use_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No limit where the file says "max", or is not there."""
-    monkeypatch.setattr(memory, "LIMITS", ())
-    whole = memory.available()
+    monkeypatch.setattr(limits, "LIMITS", ())
+    whole = limits.available()
     assert whole > 1e8
     for text, expected in (("1000000\n", 1e6), ("max\n", whole), (f"{2**62}\n", whole)):
         (tmp_path / "memory.max").write_text(text)
-        monkeypatch.setattr(memory, "LIMITS", (tmp_path / "memory.max", tmp_path / "none"))
-        assert memory.available() == expected
+        monkeypatch.setattr(limits, "LIMITS", (tmp_path / "memory.max", tmp_path / "none"))
+        assert limits.available() == expected

@@ -7,7 +7,7 @@ import pytest
 
 from symphys.errors import ProblemError
 from symphys.problem import Problem, load_problem, problem_of_tables
-from symphys.problem.units import quantity_unit
+from symphys.problem.quantities import quantity_unit
 from symphys.problems import find
 
 ARM = {

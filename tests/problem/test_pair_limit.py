@@ -28,7 +28,7 @@ from symphys.model.shapes import (
 )
 from symphys.model.world import Law
 from symphys.problem import Problem
-from symphys.problem.checks.pair_limit import MOST_POINTS
+from symphys.problem.limits import MOST_POINTS
 from symphys.problem.parametric.collision_filter import KINDS, CollisionFilter
 from symphys.problem.parametric.parts import PairRule, ParametricBody, ParametricStatic, Part
 from symphys.problem.parametric.world import ParametricWorld

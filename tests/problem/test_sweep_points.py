@@ -13,10 +13,9 @@ import pytest
 from symphys.errors import ProblemError
 from symphys.problem import Problem, load_problem
 from symphys.problem.reader import ProblemReader
-from symphys.problem.sweeps.axes import SweepError
 from symphys.problem.sweeps.points import LazyProblem, combined, swept
-from symphys.problem.sweeps.sweep import Sweep
-from symphys.problem.sweeps.texts import read_axes, read_samples
+from symphys.problem.sweeps.reading import read_axes, read_samples
+from symphys.problem.sweeps.sweep import Sweep, SweepError
 
 Load = Callable[..., Problem]
 Names = Callable[[ProblemError, str, str], None]

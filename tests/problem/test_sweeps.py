@@ -13,11 +13,8 @@ import pytest
 from scipy.stats import qmc
 
 from symphys.errors import ProblemError
-from symphys.problem.sweeps.axes import Interval, Levels, SweepError
-from symphys.problem.sweeps.samples import Samples
-from symphys.problem.sweeps.sweep import Sweep
-from symphys.problem.sweeps.table import read_sweep, without_sweep
-from symphys.problem.sweeps.texts import read_axes, read_axis, read_samples
+from symphys.problem.sweeps.reading import read_axes, read_axis, read_samples, read_sweep, without_sweep
+from symphys.problem.sweeps.sweep import Interval, Levels, Samples, Sweep, SweepError
 
 Names = Callable[[ProblemError, str, str], None]
 

@@ -18,7 +18,7 @@ from symphys.errors import ProblemError
 from symphys.export.writing import export_problem
 from symphys.problem import load_problem
 from symphys.problem.sweeps.points import combined, swept
-from symphys.problem.sweeps.texts import read_axes
+from symphys.problem.sweeps.reading import read_axes
 from symphys.shooting import ScenarioEvaluator
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.network_rollout import LargeEvaluator, LargeTranscription, layers, require_small_nets

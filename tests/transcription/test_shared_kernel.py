@@ -13,7 +13,7 @@ from worlds.thrown import TABLES
 from symphys.dynamics.functions import report_function
 from symphys.problem import Problem, problem_of_tables
 from symphys.problem.sweeps.points import combined, swept
-from symphys.problem.sweeps.texts import read_axes
+from symphys.problem.sweeps.reading import read_axes
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.sampler import swept_inputs
 

@@ -1,16 +1,46 @@
-"""Pydantic's findings in the words of this project."""
+"""Pydantic's findings in the words of this project; how values of a file are shown, and what typed ones mean."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from symphys import files
 from symphys.problem.reading.faults import Faults, Place
-from symphys.problem.reading.value_texts import shown
-from symphys.suggest import hint
+from symphys.suggest import hint, quote
+
+
+def shown(value: object) -> str:
+    """A value as its author would recognise it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f"the text {quote(value)}"
+    if isinstance(value, int | float):
+        return repr(value) if isinstance(value, float) or abs(value) < 10**18 else "a number that large"
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    return "a table" if isinstance(value, Mapping) else f"a {type(value).__name__}"
+
+
+def listed(words: Sequence[str], last: str) -> str:
+    """``a, b or c``; ``last`` is the word before the last one."""
+    return f"{', '.join(words[:-1])} {last} {words[-1]}"
+
+
+def read_value(text: str) -> object:
+    """A TOML value that JSON has too, else the text itself."""
+    try:
+        table = tomllib.loads(f"value = {text}")
+        files.strict(table)
+    except (ValueError, TypeError, RecursionError):
+        return text
+    return table["value"] if table.keys() == {"value"} else text
+
 
 Finding = Mapping[str, Any]
 

@@ -11,8 +11,8 @@ import numpy as np
 from symphys.model.joints.frames import WORLD
 from symphys.model.joints.joint import UNWRAPPED
 from symphys.model.joints.start import moved_to_start, moved_to_zero, placed_frames, spanning_tree
-from symphys.problem.parametric.carried import follow
 from symphys.problem.parametric.joints import ParametricJoint
+from symphys.problem.parametric.placement import follow
 from symphys.types import Array
 
 State = dict[str, Array]

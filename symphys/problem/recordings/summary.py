@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from symphys.problem.checks.start import OVERLAP
-from symphys.problem.checks.start_values import StartValues
 from symphys.problem.model import ProblemData
-from symphys.problem.recordings.times import steps_apart
+from symphys.problem.recordings.conversion import steps_apart
 from symphys.problem.recordings.types import Recording
+from symphys.problem.start import OVERLAP, StartValues
 
 WHOLE = 1e-6
 """How far the distance of samples may be off a whole number of steps."""

@@ -12,7 +12,7 @@ from typing import Any, TypeGuard
 from pydantic_core import PydanticCustomError
 
 from symphys.expression import CONSTANTS, FUNCTIONS, OVER_TIME
-from symphys.problem.reading.value_texts import shown
+from symphys.problem.reading.messages import shown
 from symphys.suggest import quote
 
 RESERVED = frozenset({*FUNCTIONS, *CONSTANTS, *keyword.kwlist, *OVER_TIME, "time", "gravity", "ground", "contact"})

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import Field, PlainValidator, WithJsonSchema, create_model
 
 from symphys.model.shapes import SHAPES, SizeKey, Sphere
-from symphys.problem.reading.value_texts import listed
+from symphys.problem.reading.messages import listed
 from symphys.problem.schema import checks
 from symphys.problem.schema.types import NonNegative, Orientation, Points, Positive, SchemaTable, Size, Vector
 

@@ -22,10 +22,8 @@ from symphys.problem.model import Simulation
 from symphys.problem.parametric.parts import DISTRIBUTION
 from symphys.problem.problem import Problem, plain
 from symphys.problem.reader import ProblemReader
-from symphys.problem.recordings.kept import without_places
-from symphys.problem.sweeps.axes import Axis, SweepError
-from symphys.problem.sweeps.samples import GRID, Samples
-from symphys.problem.sweeps.sweep import Sweep
+from symphys.problem.recordings.files import without_places
+from symphys.problem.sweeps.sweep import GRID, Axis, Samples, Sweep, SweepError
 from symphys.types import Array
 
 KEPT = (

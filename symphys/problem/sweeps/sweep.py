@@ -1,14 +1,170 @@
-"""A sweep: some keys of a problem over their values, each combination or sample a problem of its own."""
+"""A sweep: axes, each a key of a problem with its values, and the points on them, each a problem of its own."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-from symphys.problem.schema.sweep import MOST_SAMPLES
-from symphys.problem.sweeps.axes import Axis, Interval, Levels, SweepError, product
-from symphys.problem.sweeps.samples import GRID, Samples
+from symphys.errors import SymphysError
+from symphys.problem.reading.messages import shown
+from symphys.problem.schema.sweep import MOST_SAMPLES, MOST_VALUES
+
+Spacing = Literal["linear", "log"]
+SPACINGS: tuple[Spacing, ...] = ("linear", "log")
+DIGITS = 6
+"""Of the distance between the ends of an axis, to which its values are rounded: they are parts of folder names."""
+MOST_WHOLE = 1e15
+"""Whole numbers up to this are written without a point."""
+
+
+class SweepError(SymphysError):
+    """A sweep that cannot be made; the message says what would be valid."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Values of a key, one after the other.
+
+    Attributes:
+        key: dotted, as ``--set`` takes it.
+        values: as in a problem file, all different, at least one.
+    """
+
+    key: str
+    values: tuple[object, ...]
+
+    def __post_init__(self) -> None:
+        """SweepError where there is no value, or one twice."""
+        if not self.values:
+            raise SweepError("needs at least one value")
+        seen: set[str] = set()
+        for value in self.values:
+            if sign(value) in seen:
+                raise SweepError(f"has {shown(value)} twice; leave one of them out")
+            seen.add(sign(value))
+
+    def at(self, share: float) -> object:
+        """The value at a share of the axis, 0 to 1: each has an equal part of it."""
+        return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Any number between two ends, for samples.
+
+    Attributes:
+        key: dotted, as ``--set`` takes it.
+        ends: from where to where.
+        spacing: ``log``: every factor is as likely as any other.
+    """
+
+    key: str
+    ends: tuple[float, float]
+    spacing: Spacing = "linear"
+
+    def __post_init__(self) -> None:
+        """SweepError for ends that bound nothing."""
+        check_ends(*self.ends, self.spacing)
+
+    def at(self, share: float) -> object:
+        """The number at a share of the axis, 0 to 1."""
+        return between(*self.ends, share, self.spacing)
+
+
+Axis = Levels | Interval
+
+
+def spaced(key: str, ends: tuple[float, float], count: int, spacing: Spacing = "linear") -> Levels:
+    """``count`` values from one end to the other, both included."""
+    check_ends(*ends, spacing)
+    if not 2 <= count <= MOST_VALUES:
+        raise SweepError(f"needs a count of 2 to {MOST_VALUES:,} from one end to the other, not {count}")
+    inner = [between(*ends, k / (count - 1), spacing) for k in range(1, count - 1)]
+    return Levels(key, (shortest(ends[0]), *inner, shortest(ends[1])))
+
+
+def check_ends(low: float, high: float, spacing: Spacing) -> None:
+    """SweepError for ends that bound nothing."""
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise SweepError(f"needs finite ends, not {low:g} and {high:g}")
+    if low == high:
+        raise SweepError(f"has both ends at {low:g}; they must differ")
+    if spacing == "log" and min(low, high) <= 0:
+        raise SweepError(f"with log spacing needs ends above 0, not {low:g} and {high:g}")
+
+
+def between(low: float, high: float, share: float, spacing: Spacing) -> float:
+    """The number at a share of the way, rounded to about six digits of what tells values apart there."""
+    if spacing == "log":
+        value = low * (high / low) ** share
+        scale = value * min(abs(math.log(high / low)), 1.0)
+    else:
+        value = low + (high - low) * share
+        scale = abs(high - low)
+    rounded = round(value, DIGITS - 1 - math.floor(math.log10(scale)))
+    return shortest(min(max(rounded, min(low, high)), max(low, high)))
+
+
+def shortest(value: float) -> float:
+    """A whole number without a point, as a person would type it: it is part of the name of a folder."""
+    return int(value) if abs(value) < MOST_WHOLE and value == int(value) else value
+
+
+def sign(value: object) -> str:
+    """Return a key that equal values share: 2 and 2.0 do, 1 and true do not."""
+    return repr(float(value)) if isinstance(value, int | float) and not isinstance(value, bool) else repr(value)
+
+
+def product(axes: Sequence[Levels]) -> int:
+    """The number of points of a grid."""
+    return math.prod(len(axis.values) for axis in axes)
+
+
+Kind = Literal["grid", "latin hypercube", "sobol"]
+KINDS: tuple[Kind, ...] = ("grid", "latin hypercube", "sobol")
+
+
+@dataclass(frozen=True)
+class Samples:
+    """How many points of which kind.
+
+    Attributes:
+        kind: "grid", "latin hypercube" or "sobol".
+        count: of samples; 0 for a grid, which has as many as its axes make.
+        seed: of the random numbers of samples.
+    """
+
+    kind: Kind = "grid"
+    count: int = 0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """SweepError for a number of points that the kind cannot have."""
+        if self.kind == "grid":
+            if self.count:
+                raise SweepError("a grid has as many points as its axes make; a count belongs to samples")
+            return
+        if not 1 <= self.count <= MOST_SAMPLES:
+            raise SweepError(f"{self.kind} samples need a count of 1 to {MOST_SAMPLES:,}")
+        if self.kind == "sobol" and self.count & (self.count - 1):
+            below = 1 << (self.count.bit_length() - 1)
+            raise SweepError(f"a count of Sobol points is a power of two, such as {below} or {2 * below}")
+
+    def shares(self, axes: int) -> Iterator[tuple[float, ...]]:
+        """Points of the unit cube with so many axes; the same ones every time."""
+        from scipy.stats import qmc  # only here: the import takes a second
+
+        if self.kind == "sobol":
+            points = qmc.Sobol(axes, scramble=True, seed=self.seed).random_base2(self.count.bit_length() - 1)
+        else:
+            points = qmc.LatinHypercube(axes, seed=self.seed).random(self.count)
+        return (tuple(map(float, point)) for point in points)
+
+
+GRID = Samples()
 
 
 @dataclass(frozen=True)

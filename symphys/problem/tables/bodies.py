@@ -1,21 +1,124 @@
-"""The [[body]] tables: mass, inertia and state at the start."""
+"""The [[body]] tables, and [ground], [[plane]], [[block]] and [[terrain]] for what stands still."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from math import hypot, isfinite
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
-from symphys.model.shapes import Shape
+from symphys.expression import Formula, FormulaError, parse
+from symphys.model.heightfield import Heightfield
+from symphys.model.orientation import roll_pitch_yaw, unit_quaternion
+from symphys.model.shapes import SHAPES, UPRIGHT, Fixture, Plane, Shape, Sphere, Terrain
 from symphys.model.shapes.inertia import centring, off_centre
 from symphys.model.world import COMBINE
-from symphys.problem.checks.magnitude import check_magnitudes
-from symphys.problem.parametric.parts import ParametricBody
-from symphys.problem.reading.faults import Faults
-from symphys.problem.schema.physics import BodyTable, MemberTable, SurfaceTable
-from symphys.problem.tables.shapes import read_orientation, read_shape
+from symphys.problem.limits import check_magnitudes
+from symphys.problem.parametric.parts import ParametricBody, ParametricStatic
+from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.reading.messages import listed
+from symphys.problem.schema import Document
+from symphys.problem.schema.physics import (
+    BlockTable,
+    BodyTable,
+    GroundTable,
+    MemberTable,
+    PlaneTable,
+    SurfaceTable,
+    TerrainTable,
+)
+from symphys.problem.schema.shapes import EXAMPLES, PartTable, ShapeTable, SolidTable
+from symphys.problem.schema.types import RollPitchYaw
+from symphys.suggest import quote
 from symphys.types import Array
+
+KINDS = tuple(SHAPES)
+COMPOUND = "{ parts = [{ box = { size = [1, 2, 3] }, centre = [0.5, 0, 0] }, ...] }"
+
+
+def read_shape(place: Place, table: ShapeTable | None, faults: Faults) -> tuple[Shape, ...]:
+    """The surface of a body."""
+    if table is None:
+        return ()
+    place = (*place, "shape")
+    given = [key for key in (*KINDS, "spheres", "parts") if getattr(table, key) is not None]
+    if len(given) != 1:
+        faults.add(
+            place,
+            f"{wanted(given)} one of {', '.join(KINDS)}, spheres and parts: {EXAMPLES}, or several: {COMPOUND}",
+        )
+        return ()
+    if table.spheres is not None:
+        return tuple(Sphere(part.radius, three(part.centre)) for part in table.spheres)
+    if table.parts is not None:
+        found = [read_part((*place, "parts", k), part, faults) for k, part in enumerate(table.parts)]
+        return tuple(shape for shape in found if shape) if all(found) else ()
+    return (solid(place, table, given[0], three([0, 0, 0]), UPRIGHT, faults),)
+
+
+def read_part(place: Place, table: PartTable, faults: Faults) -> Shape | None:
+    """One part of a compound; None after a fault."""
+    orientation = read_orientation((*place, "orientation"), table.orientation, faults)
+    return read_solid(place, table, table.centre, orientation, faults)
+
+
+def read_solid(
+    place: Place, table: SolidTable, centre: Sequence[float], orientation: Array, faults: Faults
+) -> Shape | None:
+    """The one shape of a table; None after a fault."""
+    given = [key for key in KINDS if getattr(table, key) is not None]
+    if len(given) != 1:
+        faults.add(place, f"{wanted(given)} one of {listed(KINDS, 'and')}: {EXAMPLES}")
+        return None
+    w, x, y, z = (float(q) for q in orientation)
+    return solid(place, table, given[0], three(centre), (w, x, y, z), faults)
+
+
+def solid(
+    place: Place,
+    table: SolidTable,
+    kind: str,
+    centre: tuple[float, float, float],
+    orientation: tuple[float, float, float, float],
+    faults: Faults,
+) -> Shape:
+    """The shape of this kind that a table has; notes one that is too flat."""
+    cls, own = SHAPES[kind], getattr(table, kind)
+    keys = [key.name for key in cls.size_keys]
+    given = [*keys, *(key.name for key in cls.optional_keys)]
+    shape = cls.from_sizes({key: getattr(own, key) for key in given}, centre, orientation)
+    reason = shape.flatness
+    if reason:
+        faults.add((*place, kind, *(keys if len(keys) == 1 else [])), reason)
+    elif shape.optional_fault:
+        faults.add((*place, kind, cls.optional_keys[0].name), shape.optional_fault)
+    return shape
+
+
+def wanted(given: Sequence[str]) -> str:
+    """Return the message for a table without exactly one shape."""
+    return f"has {' and '.join(given)}; give only" if given else "give"
+
+
+def three(numbers: Sequence[float]) -> tuple[float, float, float]:
+    """A vector as a tuple."""
+    x, y, z = (float(number) for number in numbers)
+    return x, y, z
+
+
+def read_orientation(place: Place, given: Any, faults: Faults) -> Array:
+    """(4,): the unit quaternion w x y z, from four numbers or from angles."""
+    if isinstance(given, RollPitchYaw):
+        return roll_pitch_yaw(given.roll_deg, given.pitch_deg, given.yaw_deg)
+    try:
+        return unit_quaternion(given)
+    except ValueError as fault:
+        faults.add(place, str(fault))
+        return np.array(UPRIGHT)
+
 
 ROUNDING = 1e-9
 """Relative slack for symmetry and the triangle inequality, which flat and thin bodies meet with equality."""
@@ -122,3 +225,117 @@ def frozen(inertia: object) -> object:
     if isinstance(inertia, list):
         return tuple(frozen(item) for item in inertia)
     return float(inertia) if isinstance(inertia, int | float) else None
+
+
+NAMES = ("x", "y")
+GRID_KEYS = ("spacing", "origin")
+
+
+def read_statics(document: Document, starts: Sequence[Sequence[float]], faults: Faults) -> tuple[ParametricStatic, ...]:
+    """The ground, if there is one, then planes, blocks and terrain; ``starts``: where bodies are at first."""
+    ground = () if document.ground is None else (read_ground(document.ground),)
+    planes = tuple(read_plane(i, table, faults) for i, table in enumerate(document.plane))
+    blocks = tuple(read_block(i, table, faults) for i, table in enumerate(document.block))
+    terrain = tuple(read_terrain(i, table, starts, faults) for i, table in enumerate(document.terrain))
+    return (*ground, *planes, *blocks, *terrain)
+
+
+def read_ground(table: GroundTable) -> ParametricStatic:
+    """The horizontal plane called ground."""
+    return ParametricStatic(Plane.ground(table.height), states(table), table.group, touching(table))
+
+
+def read_plane(index: int, table: PlaneTable, faults: Faults) -> ParametricStatic:
+    """One plane."""
+    place = ("plane", index)
+    length = hypot(*table.normal)  # squares of large numbers overflow
+    if not (isfinite(length) and length > 1e-12):
+        faults.add((*place, "normal"), "must not be zero; [0, 0, 1] points up")
+        length = 1.0
+    normal = np.array(table.normal) / length
+    if (table.point is None) == (table.offset is None):
+        faults.add((*place, "offset"), "give either a point of the plane or its offset along the normal")
+    offset = table.offset if table.point is None else float(normal @ np.array(table.point))
+    plane = Plane(table.name, three(normal.tolist()), offset or 0.0)
+    return ParametricStatic(plane, states(table), table.group, touching(table))
+
+
+def read_block(index: int, table: BlockTable, faults: Faults) -> ParametricStatic:
+    """One static solid."""
+    place = ("block", index)
+    orientation = read_orientation((*place, "orientation"), table.orientation, faults)
+    shape = read_solid((*place, "shape"), table.shape, table.position, orientation, faults)
+    return ParametricStatic(Fixture(table.name, shape or Sphere(1.0)), states(table), table.group, touching(table))
+
+
+@dataclass(frozen=True)
+class FormulaHeight:
+    """The height [m] that a formula of x and y [m] gives."""
+
+    formula: Formula
+
+    def __call__(self, x: Any, y: Any) -> Any:
+        """A casadi scalar; x and y are casadi scalars or numbers."""
+        return self.formula.evaluate({"x": x, "y": y})
+
+
+def flat(x: Any, y: Any) -> Any:
+    """Return a placeholder for a terrain that cannot be read."""
+    return 0 * x * y
+
+
+def read_terrain(
+    index: int, table: TerrainTable, starts: Sequence[Sequence[float]], faults: Faults
+) -> ParametricStatic:
+    """One terrain; ``starts``: where bodies are at first, so that a formula can be tried there."""
+    place = ("terrain", index)
+    height: Callable[[Any, Any], Any] | None = None
+    if (table.height is None) == (table.heights is None):
+        faults.add((*place, "height"), "give either height (a formula of x and y) or heights (a grid) with spacing")
+    elif table.height is not None:
+        height = read_formula(place, table, table.height, starts, faults)
+    elif table.spacing is None:
+        faults.add((*place, "spacing"), "this key is required with heights: the distance of neighbours [m]")
+    else:
+        rows = tuple(tuple(row) for row in table.heights or ())
+        (dx, dy), (x, y) = table.spacing, table.origin or (0.0, 0.0)
+        height = Heightfield(rows, (dx, dy), (x, y))
+    return ParametricStatic(Terrain(table.name, height or flat), states(table), table.group, touching(table))
+
+
+def read_formula(
+    place: Place, table: TerrainTable, text: str, starts: Sequence[Sequence[float]], faults: Faults
+) -> FormulaHeight | None:
+    """The height by a formula; None after a fault."""
+    for key in GRID_KEYS:
+        if getattr(table, key) is not None:
+            faults.add((*place, key), "belongs to a grid of heights; a formula needs none")
+    try:
+        formula = parse(text)
+        reason = refusal(formula, starts)
+    except FormulaError as error:
+        reason = str(error)
+    if reason:
+        faults.add((*place, "height"), reason)
+        return None
+    return FormulaHeight(formula)
+
+
+def refusal(formula: Formula, starts: Sequence[Sequence[float]]) -> str:
+    """Why a formula is no height; empty if it is one."""
+    others = sorted(formula.names - set(NAMES))
+    if others:
+        return f"{', '.join(quote(name) for name in others)}: a height is a formula of x and y alone"
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    height = formula.evaluate({"x": x, "y": y})
+    if height.shape[0] != 1:
+        return f"must be a number, but is a vector of {height.shape[0]}"
+    both = ca.vertcat(x, y)
+    slope = ca.gradient(ca.SX(height), both)
+    surface = ca.Function("surface", [x, y], [height, slope, ca.jacobian(slope, both)])
+    for start in starts:
+        for value, what in zip(surface(start[0], start[1]), ("height", "slope", "curvature"), strict=True):
+            if not value.is_regular():
+                at = f"x = {start[0]:g}, y = {start[1]:g}, where a body starts"
+                return f"its {what} is not finite at {at}; a height must be twice differentiable"
+    return ""

@@ -1,4 +1,4 @@
-"""The [[joint]] tables."""
+"""The [[joint]], [[coupling]] and [[site]] tables."""
 
 from __future__ import annotations
 
@@ -13,20 +13,65 @@ from symphys.model.gimbal import Screw, locks
 from symphys.model.joints import (
     JOINTS,
     JointFrame,
+    JointSpec,
     Kind,
     Limits,
     Motor,
     Spring,
+    kinematic_trees,
 )
-from symphys.model.joints.frames import WORLD
+from symphys.model.joints.coupling import DEGREE, CouplingSpec
+from symphys.model.joints.frames import WORLD, Pose, check_meeting, placed_joint_frames, pose
 from symphys.model.joints.motor import MOTORS
 from symphys.model.scalar import is_zero
+from symphys.model.world import World
 from symphys.problem.parametric.joints import OWN, ParametricJoint
+from symphys.problem.parametric.parts import ParametricSite
 from symphys.problem.reading.faults import Faults, Place
-from symphys.problem.schema.joints import JointTable, MotorTable
-from symphys.problem.tables.joint_frames import read_joint_frames
+from symphys.problem.schema.joints import CouplingTable, JointTable, MotorTable, SiteTable
+from symphys.problem.tables.bodies import read_orientation
 from symphys.suggest import hint, quote
 from symphys.types import Array
+
+
+def read_joint_frames(
+    place: Place, table: JointTable, spec: JointSpec, word: str, initial: Mapping[str, Array], faults: Faults
+) -> tuple[JointFrame, JointFrame]:
+    """Return the frames of the table's second body, whose coordinates count, then of the first.
+
+    Args:
+        place: of the table.
+        table: what it holds together is known.
+        spec: the same joint, of its kind.
+        word: the key of the table of its kind.
+        initial: the state of bodies at the start; see ``Problem.initial``.
+        faults: gets anchors that do not meet, axes that are none.
+    """
+    poses = [pose(name, initial) for name in reversed(table.between)]
+    try:
+        axes = spec.frame_axes
+    except ValueError as fault:
+        faults.add((*place, word, spec.own_fields()[0].name), str(fault))
+        axes = np.eye(3)
+    return placed_joint_frames(poses, read_points(place, table, spec, poses, faults), axes)
+
+
+def read_points(place: Place, table: JointTable, spec: JointSpec, poses: Sequence[Pose], faults: Faults) -> list[Array]:
+    """(3,) on each side, in its own frame."""
+    if table.anchors is not None:
+        if table.point is not None:
+            faults.add((*place, "point"), "anchors are given too; leave one out")
+        anchors = [np.array(anchor) for anchor in reversed(table.anchors)]
+        try:
+            check_meeting(poses, anchors)
+        except ValueError as fault:
+            faults.add((*place, "anchors"), str(fault))
+        return anchors
+    if table.point is None and not spec.anywhere:
+        text = "this key is required: where the joint is at the start [m], world coordinates; or give anchors"
+        faults.add((*place, "point"), text)
+    point = poses[0].position if table.point is None else np.array(table.point)
+    return [pose.to_body(point) for pose in poses]
 
 
 def read_joints(
@@ -303,3 +348,47 @@ class JointReader:
 def frozen(value: Any) -> Any:
     """Make tuples of lists."""
     return tuple(value) if isinstance(value, list) else value
+
+
+def read_sites(tables: Sequence[SiteTable], bodies: Sequence[str], faults: Faults) -> tuple[ParametricSite, ...]:
+    """The sites; notes bodies that there are none of."""
+    found = []
+    for index, table in enumerate(tables):
+        if table.body != WORLD and table.body not in bodies:
+            text = f"no body is called {quote(table.body)}; {hint(table.body, [WORLD, *bodies])}"
+            faults.add(("site", index, "body"), text)
+        x, y, z = table.position
+        orientation = read_orientation(("site", index, "orientation"), table.orientation, faults)
+        body = None if table.body == WORLD else table.body
+        found.append(ParametricSite(table.name, body, (x, y, z), tuple(orientation.tolist())))
+    return tuple(found)
+
+
+def check_couplings(world: World, faults: Faults) -> None:
+    """The joints of a coupling must be of one kinematic tree."""
+    for index, coupling in enumerate(world.couplings):
+        ends = {k for k in (coupling.first, coupling.second) if k is not None}
+        trees = [{link.joint for link in tree.links} for tree in kinematic_trees(world.joints)]
+        if not any(ends <= tree for tree in trees):
+            names = " and ".join(world.joints[k].name for k in sorted(ends))
+            text = f"{names} must be joints of one robot, and close no loop: they have no coordinates in common else"
+            faults.add(("coupling", index, "joints"), text)
+
+
+def read_couplings(
+    tables: Sequence[CouplingTable], joints: Sequence[ParametricJoint], faults: Faults
+) -> tuple[CouplingSpec, ...]:
+    """The couplings; notes joints that there are none of, or that have not one coordinate."""
+    known, found = {joint.name: joint for joint in joints}, []
+    for index, table in enumerate(tables):
+        place = ("coupling", index, "joints")
+        for name in table.joints:
+            if name not in known:
+                faults.add(place, f"no joint is called {quote(name)}; {hint(name, known)}")
+            elif len(known[name].kind.coordinates) != 1 or known[name].frequency:
+                faults.add(place, f"{name} must be a rigid hinge or slider, which has one coordinate")
+        if len(set(table.joints)) != len(table.joints):
+            faults.add(place, "names the same joint twice")
+        polynomial = (*table.polynomial, *(0.0,) * (DEGREE + 1 - len(table.polynomial)))
+        found.append(CouplingSpec(table.name, tuple(table.joints), polynomial))
+    return tuple(found)

@@ -20,7 +20,7 @@ from symphys.problem.model import (
     VariableSlot,
 )
 from symphys.problem.parametric.joints import ParametricJoint
-from symphys.problem.parametric.starts import check_starts
+from symphys.problem.parametric.placement import check_starts
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, SlotError, limits, read_slot
 from symphys.problem.reading.faults import Faults, Place

@@ -10,12 +10,10 @@ import numpy as np
 
 from symphys.dynamics.observation import SENSOR_KINDS
 from symphys.expression import Formula
-from symphys.problem.feedback import Sensor
-from symphys.problem.model import Phase, Simulation, Termination
+from symphys.problem.model import Phase, PlantSettings, RecedingHorizon, Sensor, Simulation, Termination
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, unknown
 from symphys.problem.reading.faults import Faults, Place
-from symphys.problem.receding_horizon import PlantSettings, RecedingHorizon
 from symphys.problem.schema import Document
 from symphys.problem.schema.mpc import MpcTable, PlantTable
 from symphys.problem.schema.objectives import PhaseTable

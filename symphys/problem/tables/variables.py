@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.problem.checks.magnitude import check_mass
+from symphys.problem.limits import check_mass
 from symphys.problem.model import Kind, Simulation, Variable, VariableSlot
 from symphys.problem.quantities import Quantity, SlotError, limits, read_slot
 from symphys.problem.reading.faults import Faults, Place

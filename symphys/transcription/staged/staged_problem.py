@@ -13,8 +13,7 @@ from symphys.codegen.backends import BEST, PRECISIONS
 from symphys.dynamics.observation import SensedState, joint_turn, named_sensors, sensor_readings
 from symphys.model.state_layout import Layout
 from symphys.problem import DURATION, Constraint, GuessedMotion
-from symphys.problem.guess.motion import is_orientation, turn_between
-from symphys.problem.guess.names import ball_joints, guessable, rate_of
+from symphys.problem.guess import ball_joints, guessable, is_orientation, rate_of, turn_between
 from symphys.shooting import AffinePolicy, CompiledRecursion, Expansion, Followed, Linearized, StagedMotion
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.expansion import ExpansionSums, SquareStack, square_stacks

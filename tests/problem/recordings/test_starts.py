@@ -10,7 +10,7 @@ import pytest
 from data.recorded import beside
 
 from symphys.problem import Problem
-from symphys.problem.checks.start_values import StartValues
+from symphys.problem.start import StartValues
 
 BOX = {"shape": {"box": {"size": [0.1, 0.05, 0.05]}}, "mass": 0.3}
 CHAIN: dict[str, Any] = {

@@ -12,7 +12,7 @@ import symphys
 from symphys import Problem
 from symphys.model.state_layout import Layout
 from symphys.problem import load_problem
-from symphys.problem.guess.recorded import recorded_guess
+from symphys.problem.guess import recorded_guess
 from symphys.transcription import guessed, transcribe
 from symphys.transcription.staged.staged_problem import RolloutStages
 

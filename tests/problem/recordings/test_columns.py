@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from symphys.problem.recordings import csv_file
-from symphys.problem.recordings.columns import RecordingFault
-from symphys.problem.recordings.csv_file import MISSING, read_csv
+from symphys.problem.recordings import columns
+from symphys.problem.recordings.columns import MISSING, RecordingFault, read_csv
 from symphys.types import Array
 
 CELLS = st.one_of(st.floats(allow_infinity=False, width=64), st.integers(-(10**6), 10**6).map(float))
@@ -43,7 +42,7 @@ def test_what_was_written_is_read(values: list[list[float]], missing: str, end: 
     lines = [mark.join(word if value != value else repr(value) for value in row) for row in values]
     content = end.join([mark.join(names), *lines])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(csv_file, "CHUNK", chunk)
+        patch.setattr(columns, "CHUNK", chunk)
         np.testing.assert_array_equal(read(content, *names), np.array(values))
 
 
@@ -90,7 +89,7 @@ def test_faults_name_row_and_column(content: str | bytes, message: str) -> None:
 
 
 def test_a_fault_far_down_is_found_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(csv_file, "CHUNK", 1000)
+    monkeypatch.setattr(columns, "CHUNK", 1000)
     lines = ["a,b", *(f"{k},{k}" for k in range(5000)), "7,?", *(f"{k},{k}" for k in range(100))]
     with pytest.raises(RecordingFault, match='row 5002, column "b"'):
         read("\n".join(lines), "a", "b")
@@ -112,15 +111,15 @@ def test_any_content_is_numbers_or_a_fault(content: bytes) -> None:
 @pytest.mark.slow
 def test_long_files_are_read_by_chunks_into_the_memory_of_their_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     """No chunk goes cell by cell, and rows are filled in where they stay; what is held beside them is a few chunks."""
-    monkeypatch.setattr(csv_file, "CHUNK", 1 << 14)
-    monkeypatch.setattr(csv_file, "cell_by_cell", pytest.fail)
+    monkeypatch.setattr(columns, "CHUNK", 1 << 14)
+    monkeypatch.setattr(columns, "cell_by_cell", pytest.fail)
     count = 100_000
     content = "time,x,y\n" + "".join(f"{k / 1000:.3f},{k % 1000},\n" for k in range(count))
     stream = io.BytesIO(content.encode())
     tracemalloc.start()
-    columns = read_csv(stream, "long.csv", {"time", "x"})
+    found = read_csv(stream, "long.csv", {"time", "x"})
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert columns.count == count and columns.values["x"][-1] == 999 and columns.values["time"][-1] == 99.999
-    assert columns.values["x"].base is not None
+    assert found.count == count and found.values["x"][-1] == 999 and found.values["time"][-1] == 99.999
+    assert found.values["x"].base is not None
     assert peak < 2 * count * 8 + 20 * (1 << 14)

@@ -12,8 +12,7 @@ import numpy as np
 from symphys.expression import FormulaError, parse
 from symphys.model.orientation import ANGLES, unit_quaternion
 from symphys.model.world import World
-from symphys.problem.guess.motion import GuessedMotion, is_orientation
-from symphys.problem.guess.names import guessable
+from symphys.problem.guess import GuessedMotion, guessable, is_orientation
 from symphys.problem.model import Simulation
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.references import ReferenceTrajectory, reference_values

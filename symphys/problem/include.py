@@ -1,25 +1,119 @@
-"""The files that a problem includes: found, read, and checked for what they may hold."""
+"""Included files: found, read, checked, renamed by their prefix, merged with the problem, and put in their places."""
 
 from __future__ import annotations
 
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import hypot
 from pathlib import Path
 from typing import Any, TypeVar, get_origin
 
+import numpy as np
 from pydantic import ValidationError
 
-from symphys.problem.include.merge import IncludedFile, MergedFiles, merge
-from symphys.problem.reading.faults import Faults, SourceLocation
-from symphys.problem.reading.messages import report
+from symphys.model.joints import JOINTS
+from symphys.model.joints.frames import WORLD
+from symphys.model.orientation import turned
+from symphys.problem.reading.faults import Faults, Place, SourceLocation
+from symphys.problem.reading.messages import report, shown
 from symphys.problem.reading.source import MAX_BYTES, parse_toml, read_source, refuse
-from symphys.problem.reading.value_texts import shown
 from symphys.problem.schema import Document, SchemaTable
 from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
+from symphys.problem.schema.joints import JointTable, SiteTable
+from symphys.problem.schema.physics import BlockTable, BodyTable, PlaneTable, TerrainTable
+from symphys.problem.tables.bodies import read_orientation
 from symphys.problems import parts
 from symphys.suggest import hint, quote
+
+
+@dataclass(frozen=True)
+class IncludedFile:
+    """A file.
+
+    Attributes:
+        file: its name.
+        written: its tables as they stand there.
+        data: those of them that are used, with prefixes.
+        table: what includes it; None for the problem itself.
+    """
+
+    file: str
+    written: Mapping[str, Any]
+    data: Mapping[str, Any]
+    table: IncludeTable | None = None
+
+
+@dataclass
+class MergedFiles:
+    """A problem together with what it includes.
+
+    Attributes:
+        data: all tables.
+        text: of the problem, with those of the included files.
+        origins: where what was written; see ``faults.Origins``. Empty if nothing is included.
+        moves: each include, with the places of its tables in the lists of ``data``.
+    """
+
+    data: dict[str, Any]
+    text: str
+    origins: dict[tuple[str | int, ...], SourceLocation] = field(default_factory=dict)
+    moves: list[tuple[IncludeTable, dict[str, range]]] = field(default_factory=list)
+
+    @property
+    def shared(self) -> Collection[str]:
+        """The lists that hold tables of included files."""
+        return {key for _, ranges in self.moves for key in ranges}
+
+
+def merge(sources: Sequence[IncludedFile], lists: Collection[str], text: str, faults: Faults) -> MergedFiles:
+    """All tables, in the order of the files; notes keys that two files give differently.
+
+    Args:
+        sources: the included files, whose tables are of the right kinds, then the problem.
+        lists: the names of tables that are lists.
+        text: of all.
+        faults: gets what does not fit together.
+    """
+    merged = MergedFiles({}, text)
+    for source in sources:
+        ranges = dict[str, range]()
+        for key, value in source.data.items():
+            if key in lists and isinstance(value, list):
+                ranges[key] = append(merged, source, key, value)
+            elif isinstance(value, dict) and isinstance(merged.data.get(key, {}), dict):
+                overlay(merged, source, key, value, faults)
+            else:
+                merged.data[key] = value
+        if source.table is not None:
+            merged.moves.append((source.table, ranges))
+    faults.stop_if_any()
+    return merged
+
+
+def append(merged: MergedFiles, source: IncludedFile, key: str, entries: Sequence[Any]) -> range:
+    """Put the tables of a list after those that are there; where they then are."""
+    known = merged.data.setdefault(key, [])
+    start = len(known)
+    known.extend(entries)
+    for index in range(len(entries)):
+        merged.origins[key, start + index] = SourceLocation(source.file, source.written, (key, index))
+    return range(start, len(known))
+
+
+def overlay(merged: MergedFiles, source: IncludedFile, key: str, table: Mapping[str, Any], faults: Faults) -> None:
+    """Add the keys of a table to those that are there."""
+    known = merged.data.setdefault(key, {})
+    for name, value in table.items():
+        origin = SourceLocation(source.file, source.written, (key, name))
+        if name not in known:
+            known[name], merged.origins[key, name] = value, origin
+        elif known[name] != value:
+            other = merged.origins[key, name].file
+            faults.add_at(origin, f"differs from what {other} gives; leave one of them out, or make them equal")
+
 
 LABELLED = ("cost", "target", "constraint", "scenario")
 """Tables whose names nothing refers to."""
@@ -240,3 +334,127 @@ def lines(text: str) -> str:
     """A TOML string of several lines, which the parser has let pass before: it has no control characters."""
     escaped = re.sub(r'"(?="")|"\Z', r"\"", text.replace("\\", "\\\\"))
     return f'"""\n{escaped}"""'
+
+
+def placed(document: Document, merged: MergedFiles, faults: Faults) -> Document:
+    """The document with the tables of included files where these were put.
+
+    Bodies, joints, planes and blocks move. The ground stays, and so does what variables set and formulas say. Terrain
+    cannot move; a fault says so.
+    """
+    changed = {key: list(getattr(document, key)) for key in MOVES}
+    for include, ranges in merged.moves:
+        shift = Placement(include, faults)
+        if not shift.moves:
+            continue
+        for key, move in MOVES.items():
+            for index in ranges.get(key, ()):
+                changed[key][index] = move(shift, (key, index), changed[key][index])
+    return document.model_copy(update=changed)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A turn about the z axis of the world, then a shift."""
+
+    include: IncludeTable
+    faults: Faults
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything changes."""
+        return any(self.include.position) or self.include.yaw_deg != 0
+
+    def direction(self, vector: Sequence[float]) -> list[float]:
+        """(3,) turned."""
+        angle = np.deg2rad(self.include.yaw_deg)
+        cos, sin = float(np.cos(angle)), float(np.sin(angle))
+        x, y, z = vector
+        return [cos * x - sin * y, sin * x + cos * y, z]
+
+    def point(self, vector: Sequence[float]) -> list[float]:
+        """(3,) turned and shifted."""
+        return [a + b for a, b in zip(self.direction(vector), self.include.position, strict=True)]
+
+    def orientation(self, place: Place, given: Any) -> Any:
+        """Return the orientation of the file, turned."""
+        if not self.include.yaw_deg:
+            return given
+        return turned(read_orientation((*place, "orientation"), given, self.faults), 2, self.include.yaw_deg).tolist()
+
+    def body(self, place: Place, table: BodyTable) -> SchemaTable:
+        """A body, with its velocities."""
+        update = {
+            "position": self.point(table.position),
+            "orientation": self.orientation(place, table.orientation),
+            "velocity": self.direction(table.velocity),
+            "angular_velocity": self.direction(table.angular_velocity),
+        }
+        return copied(table, update)
+
+    def block(self, place: Place, table: BlockTable) -> SchemaTable:
+        """A static solid."""
+        update = {
+            "position": self.point(table.position),
+            "orientation": self.orientation(place, table.orientation),
+        }
+        return copied(table, update)
+
+    def plane(self, place: Place, table: PlaneTable) -> SchemaTable:
+        """A static wall."""
+        update: dict[str, Any] = {"normal": self.direction(table.normal)}
+        if table.point is not None:
+            update["point"] = self.point(table.point)
+        if table.offset is not None:
+            unit = np.array(update["normal"]) / (hypot(*table.normal) or 1.0)
+            update["offset"] = table.offset + float(unit @ np.array(self.include.position))
+        return copied(table, update)
+
+    def joint(self, place: Place, table: JointTable) -> SchemaTable:
+        """A joint: its point, axes, and an anchor on the world."""
+        update: dict[str, Any] = {}
+        if table.point is not None:
+            update["point"] = self.point(table.point)
+        if table.anchors is not None:
+            sides = zip(table.between, table.anchors, strict=True)
+            update["anchors"] = [self.point(anchor) if name == WORLD else anchor for name, anchor in sides]
+        for word, spec in JOINTS.items():
+            if (own := getattr(table, word)) is not None:
+                moved: dict[str, Any] = {}
+                for each in spec.own_fields():
+                    given, value = getattr(own, each.name), each.metadata["value"]
+                    if value == "direction":
+                        moved[each.name] = self.direction(given)
+                    elif value == "directions":
+                        moved[each.name] = [self.direction(axis) for axis in given]
+                update[word] = own.model_copy(update=moved)
+        placed: SchemaTable = table.model_copy(update=update)
+        return placed
+
+    def site(self, place: Place, table: SiteTable) -> SchemaTable:
+        """A site of the world; one of a body moves with that."""
+        if table.body != WORLD:
+            return table
+        orientation = self.orientation(place, table.orientation)
+        return table.model_copy(update={"position": self.point(table.position), "orientation": orientation})
+
+    def terrain(self, place: Place, table: TerrainTable) -> SchemaTable:
+        """Terrain stays."""
+        text = "terrain cannot be moved; include this file without position and yaw_deg, or take the terrain out of it"
+        self.faults.add(place, text)
+        return table
+
+
+MOVES: dict[str, Callable[[Placement, Place, Any], SchemaTable]] = {
+    "body": Placement.body,
+    "joint": Placement.joint,
+    "site": Placement.site,
+    "plane": Placement.plane,
+    "block": Placement.block,
+    "terrain": Placement.terrain,
+}
+
+
+def copied(table: SchemaTable, update: Mapping[str, Any]) -> SchemaTable:
+    """Return a table with other values of some keys."""
+    return table.model_copy(update=update)

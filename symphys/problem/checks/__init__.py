@@ -1,1 +1,0 @@
-"""Whether a problem can be computed: sizes, masses, memory, overlaps at the start."""

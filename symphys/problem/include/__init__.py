@@ -1,1 +1,0 @@
-"""Included files: found, renamed, merged, placed."""
