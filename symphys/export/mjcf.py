@@ -48,11 +48,10 @@ from symphys.export.mjcf_bodies import NestedBody, StartState, links_of, nested_
 from symphys.export.mjcf_departures import Departure, departures, require_expressible, shorter_step
 from symphys.export.mjcf_joints import equalities, freedoms, names
 from symphys.export.mjcf_surfaces import FRICTION_RATIO, PAIRS_ONLY, geoms, height_field, meshes, middle, pairs, text
-from symphys.model.body import Body
+from symphys.model.body import Body, Site
 from symphys.model.joints import AffineMotor, Joint, Motor, Servo, TorqueMotor, VelocityMotor, kinematic_trees
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Terrain
-from symphys.model.site import Site
 from symphys.model.world import World
 from symphys.problem import Problem
 from symphys.problem.model import Sensor

@@ -12,8 +12,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.export.mjcf_bodies import StartState
-from symphys.model.height_limits import off_triangles
-from symphys.model.heightfield import FINER, Heightfield
+from symphys.model.heightfield import FINER, Heightfield, off_triangles
 from symphys.model.shapes import Capsule, Convex, Plane, Shape, Terrain, surface
 from symphys.model.world import Law, Side, World, side_name
 from symphys.types import Array

@@ -1,4 +1,4 @@
-"""A rigid body: mass, inertia, surface, and where a motion of it begins."""
+"""A rigid body, and sites: frames on bodies or in the world."""
 
 from __future__ import annotations
 
@@ -257,3 +257,20 @@ def _checked_start(name: str, start: Mapping[str, Any]) -> dict[str, tuple[float
 def _refused(name: str, text: str) -> SymphysError:
     """The error about a body."""
     return SymphysError(f"body {quote(name)}: {text}")
+
+
+@dataclass(frozen=True)
+class Site:
+    """A point with axes that is fixed in a body, or in the world.
+
+    Attributes:
+        name: formulas name ``<site>.position`` (3,) [m], ``.orientation`` (4,) and ``.velocity`` (3,) [m/s].
+        body: its index; None: the world.
+        position: (3,) from the centre of mass, body frame [m]; of the world: world frame.
+        orientation: (4,) unit quaternion w x y z from the site's axes to the body's, or the world's.
+    """
+
+    name: str
+    body: int | None
+    position: Sequence[Any] = (0.0, 0.0, 0.0)
+    orientation: Sequence[Any] = (1.0, 0.0, 0.0, 0.0)

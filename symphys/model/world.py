@@ -18,15 +18,14 @@ import casadi as ca
 import numpy as np
 
 from symphys.errors import SymphysError
-from symphys.model.body import Body
-from symphys.model.jointed import jointed
+from symphys.model.body import Body, Site
 from symphys.model.joints import Joint
 from symphys.model.joints.coupling import JointCoupling
+from symphys.model.joints.placing import jointed
 from symphys.model.joints.specs import JointSpec
 from symphys.model.numbers import declare, table_key
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Static, Surface, contact_points, surface
-from symphys.model.site import Site
 from symphys.suggest import hint, quote
 from symphys.types import Array
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -19,7 +18,7 @@ from symphys.model.joints.frames import WORLD
 from symphys.model.orientation import turned
 from symphys.problem.reading.faults import Faults, Place, SourceLocation
 from symphys.problem.reading.messages import report, shown
-from symphys.problem.reading.source import MAX_BYTES, parse_toml, read_source, refuse
+from symphys.problem.reading.source import MAX_BYTES, parse_toml, read_source, refuse, toml_string
 from symphys.problem.schema import Document, SchemaTable
 from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
 from symphys.problem.schema.joints import JointTable, SiteTable
@@ -120,19 +119,14 @@ LABELLED = ("cost", "target", "constraint", "scenario")
 OTHER_TEXTS = ("at", "during", "file", "interpolation", "height", "activation", "output", "weights")
 """Keys whose texts name nothing of the file."""
 
-BEFORE = r"(?:(?<![\w.])|(?<=\bstart\.)|(?<=\bend\.))"
-"""Before a mention of a name: nothing of a longer one, but ``end.`` in ``end.knee.angle``."""
-
 
 def prefixed(data: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     """The tables of a file with ``prefix`` before every name and group, and wherever a text mentions one."""
     lists = {key: value for key, value in data.items() if isinstance(value, list)}
     names = sorted(own_names(lists), key=len, reverse=True)
-    mention = (
-        re.compile(rf"(?:(?<![\w.])|(?<=\bstart\.)|(?<=\bend\.))(?:{'|'.join(map(re.escape, names))})(?!\w)")
-        if names
-        else None
-    )
+    # nothing of a longer name comes before a mention, but ``end.`` in ``end.knee.angle``
+    before = r"(?:(?<![\w.])|(?<=\bstart\.)|(?<=\bend\.))"
+    mention = re.compile(rf"{before}(?:{'|'.join(map(re.escape, names))})(?!\w)") if names else None
 
     def renamed(value: Any) -> Any:
         if isinstance(value, str):
@@ -322,12 +316,8 @@ def check_twice(sources: list[IncludedFile], faults: Faults) -> None:
 
 def appendix(texts: Mapping[str, str]) -> str:
     """Return [[included]] tables with the texts of included files, so that the problem's text is whole."""
-    return "".join(f"\n[[included]]\nfile = {basic(file)}\ntext = {lines(text)}\n" for file, text in texts.items())
-
-
-def basic(text: str) -> str:
-    """A TOML string on one line."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    tables = (f"file = {toml_string(file)}\ntext = {lines(text)}\n" for file, text in texts.items())
+    return "".join(f"\n[[included]]\n{table}" for table in tables)
 
 
 def lines(text: str) -> str:
@@ -384,21 +374,13 @@ class Placement:
 
     def body(self, place: Place, table: BodyTable) -> SchemaTable:
         """A body, with its velocities."""
-        update = {
-            "position": self.point(table.position),
-            "orientation": self.orientation(place, table.orientation),
-            "velocity": self.direction(table.velocity),
-            "angular_velocity": self.direction(table.angular_velocity),
-        }
-        return copied(table, update)
+        velocities = {key: self.direction(getattr(table, key)) for key in ("velocity", "angular_velocity")}
+        return self.block(place, table.model_copy(update=velocities))
 
-    def block(self, place: Place, table: BlockTable) -> SchemaTable:
-        """A static solid."""
-        update = {
-            "position": self.point(table.position),
-            "orientation": self.orientation(place, table.orientation),
-        }
-        return copied(table, update)
+    def block(self, place: Place, table: BodyTable | BlockTable | SiteTable) -> SchemaTable:
+        """Move what has a position and an orientation."""
+        orientation = self.orientation(place, table.orientation)
+        return table.model_copy(update={"position": self.point(table.position), "orientation": orientation})
 
     def plane(self, place: Place, table: PlaneTable) -> SchemaTable:
         """A static wall."""
@@ -408,7 +390,8 @@ class Placement:
         if table.offset is not None:
             unit = np.array(update["normal"]) / (hypot(*table.normal) or 1.0)
             update["offset"] = table.offset + float(unit @ np.array(self.include.position))
-        return copied(table, update)
+        changed: SchemaTable = table.model_copy(update=update)
+        return changed
 
     def joint(self, place: Place, table: JointTable) -> SchemaTable:
         """A joint: its point, axes, and an anchor on the world."""
@@ -428,15 +411,12 @@ class Placement:
                     elif value == "directions":
                         moved[each.name] = [self.direction(axis) for axis in given]
                 update[word] = own.model_copy(update=moved)
-        placed: SchemaTable = table.model_copy(update=update)
-        return placed
+        changed: SchemaTable = table.model_copy(update=update)
+        return changed
 
     def site(self, place: Place, table: SiteTable) -> SchemaTable:
         """A site of the world; one of a body moves with that."""
-        if table.body != WORLD:
-            return table
-        orientation = self.orientation(place, table.orientation)
-        return table.model_copy(update={"position": self.point(table.position), "orientation": orientation})
+        return self.block(place, table) if table.body == WORLD else table
 
     def terrain(self, place: Place, table: TerrainTable) -> SchemaTable:
         """Terrain stays."""
@@ -453,8 +433,3 @@ MOVES: dict[str, Callable[[Placement, Place, Any], SchemaTable]] = {
     "block": Placement.block,
     "terrain": Placement.terrain,
 }
-
-
-def copied(table: SchemaTable, update: Mapping[str, Any]) -> SchemaTable:
-    """Return a table with other values of some keys."""
-    return table.model_copy(update=update)

@@ -12,11 +12,10 @@ import numpy as np
 from symphys.errors import SymphysError
 from symphys.model.body import HOLLOW_SPHERE, Body
 from symphys.model.heightfield import Heightfield
-from symphys.model.jointed import REST
 from symphys.model.joints import JOINTS, Joint, Motor
 from symphys.model.joints.frames import MEET
 from symphys.model.joints.motor import motor_kind
-from symphys.model.joints.placing import PlacedJoint
+from symphys.model.joints.placing import REST, PlacedJoint
 from symphys.model.joints.start import State, moved_to_zero, placed_frames, spanning_tree, unmoved
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Fixture, Plane, Shape, Static, Terrain

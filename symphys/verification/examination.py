@@ -12,10 +12,9 @@ from symphys.types import Array
 from symphys.verification import gradient, refinement
 from symphys.verification.balance import balance, jumps
 from symphys.verification.contacts import contacts, slides
-from symphys.verification.held_bounds import held_bounds
 from symphys.verification.near_misses import near_misses, tunnelling
 from symphys.verification.sensitivity_growth import sensitivity_growth
-from symphys.verification.target_conflicts import target_conflicts
+from symphys.verification.target_conflicts import held_bounds, target_conflicts
 
 Tell = Callable[[str], None]
 

@@ -12,7 +12,7 @@ import pytest
 
 from symphys import SymphysError
 from symphys.model import Body, Box, Capsule, Sphere
-from symphys.model.jointed import REST
+from symphys.model.joints.placing import REST
 
 
 def test_a_box() -> None:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from symphys.transcription import Transcription
-from symphys.verification.held_bounds import held_bounds
-from symphys.verification.target_conflicts import constant_part, opposed, target_conflicts
+from symphys.verification.target_conflicts import constant_part, held_bounds, opposed, target_conflicts
 
 Make = Callable[..., Transcription]
 

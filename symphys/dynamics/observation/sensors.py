@@ -12,8 +12,7 @@ from symphys.dynamics.observation.joint_coordinates import JOINT_SENSORS
 from symphys.dynamics.observation.sensor_kind import MjcfSensor, SensedState, SensorKind
 from symphys.maths import rotation
 from symphys.maths.rotation import matrix
-from symphys.model.body import Body
-from symphys.model.site import Site
+from symphys.model.body import Body, Site
 from symphys.model.world import World
 from symphys.types import Expr
 

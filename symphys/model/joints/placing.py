@@ -1,4 +1,4 @@
-"""From joints as they are described to joints with frames, and bodies where these begin."""
+"""Joints of a world that is built in Python: bodies by name, and the frames where these were placed."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from symphys.errors import SymphysError
+from symphys.model.body import Body
 from symphys.model.joints import JOINTS
 from symphys.model.joints.frames import WORLD, Pose, check_meeting, placed_joint_frames, pose
 from symphys.model.joints.joint import Joint, JointFrame
 from symphys.model.joints.kind import Kind
 from symphys.model.joints.specs import JointSpec, MovingJoint
 from symphys.model.joints.start import State, moved_to_start, spanning_tree, unmoved
+from symphys.model.shapes import UPRIGHT
 from symphys.suggest import hint, quote
 from symphys.types import Array
 
@@ -134,3 +136,25 @@ def _three(key: str, given: object) -> Array:
 def _refused(name: str, text: str) -> SymphysError:
     """The error about a joint."""
     return SymphysError(f"joint {quote(name)}: {text}")
+
+
+ORIGIN = (0.0, 0.0, 0.0)
+REST = {"position": ORIGIN, "orientation": UPRIGHT, "velocity": ORIGIN, "angular_velocity": ORIGIN}
+"""Where bodies begin that do not say so."""
+
+
+def jointed(bodies: tuple[Body, ...], joints: Sequence[JointSpec]) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:
+    """Bodies where they begin, with every joint at its ``start``, and joints with frames.
+
+    Raises:
+        SymphysError: names the joint and what would be valid.
+    """
+    state = {f"{b.name}.{key}": np.array(b.start.get(key, rest), float) for b in bodies for key, rest in REST.items()}
+    made, moved = placed_joints(joints, [body.name for body in bodies], state)
+    return tuple(replace(body, start=begins(body, moved)) for body in bodies), made
+
+
+def begins(body: Body, state: Mapping[str, Array]) -> dict[str, tuple[float, ...]]:
+    """The start of a body in a state; what it did not say and is still at rest stays unsaid."""
+    found = {key: tuple(state[f"{body.name}.{key}"].tolist()) for key in REST}
+    return {key: value for key, value in found.items() if key in body.start or value != REST[key]}

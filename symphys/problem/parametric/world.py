@@ -14,12 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from symphys.model.body import Body
+from symphys.model.body import Body, Site
 from symphys.model.joints import Joint
 from symphys.model.joints.coupling import CouplingSpec, placed_couplings
 from symphys.model.numbers import Number
 from symphys.model.shapes import Scalar, Static
-from symphys.model.site import Site
 from symphys.model.world import Law, Pair, Side, Statements, World, points_of
 from symphys.problem.parametric.collision_filter import CollisionFilter
 from symphys.problem.parametric.joints import ParametricJoint

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import tomllib
@@ -56,6 +57,11 @@ def decode(path: Path, content: bytes) -> str:
     if not text.strip():
         raise refuse(path, f"the file is empty; {EXAMPLE}")
     return text.replace("\r\n", "\n")
+
+
+def toml_string(text: str) -> str:
+    """Return a text as a TOML string on one line."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def parse_toml(path: Path, text: str) -> dict[str, Any]:

@@ -1,4 +1,8 @@
-"""Columns of numbers by name, from CSV and NPZ files, and where a row of them lies in a message."""
+"""Columns of numbers by name, from CSV and NPZ files, and where a row of them lies in a message.
+
+Of a CSV file, ten million rows are read in seconds: whole chunks go through numpy's parser. A chunk that it refuses is
+read cell by cell, which is slower, knows other words for a missing number, and names the row and the column of a fault.
+"""
 
 from __future__ import annotations
 

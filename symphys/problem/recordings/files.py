@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import json
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -13,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from symphys.files import check_regular
+from symphys.problem.reading.source import toml_string
 from symphys.problem.recordings.columns import RecordingFault
 from symphys.problem.recordings.types import RecordedFile
 from symphys.problem.schema.recording import RecordedFileTable
@@ -35,20 +35,15 @@ def recorded_appendix(files: Iterable[RecordedFile]) -> str:
     """Return what a problem's text needs elsewhere: the content of small files, the paths of others."""
     parts = []
     for each in files:
-        place = "" if each.text is not None else f"path = {quoted(each.path)}\n"
-        text = "" if each.text is None else f"text = {quoted(each.text)}\n"
-        parts.append(f'{HEADING}file = {quoted(each.file)}\n{place}sha256 = "{each.sha256}"\n{text}')
+        place = "" if each.text is not None else f"path = {toml_string(each.path)}\n"
+        text = "" if each.text is None else f"text = {toml_string(each.text)}\n"
+        parts.append(f'{HEADING}file = {toml_string(each.file)}\n{place}sha256 = "{each.sha256}"\n{text}')
     return "".join(parts)
 
 
 def without_places(text: str) -> str:
     """A problem's text without the places of recorded files: digests say what is in them."""
     return PLACES.sub("", text) if HEADING in text else text
-
-
-def quoted(text: str) -> str:
-    """A TOML string."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 ARRAYS = (".npz",)

@@ -12,10 +12,10 @@ import numpy as np
 from symphys import json_values as values
 from symphys.findings import writing
 from symphys.findings.advice import advice, answers, findings, slopes
-from symphys.findings.endings import ending
 from symphys.findings.examination import Examination
 from symphys.findings.levels import MARKS, Judged
 from symphys.findings.physics import sliding
+from symphys.findings.verdict import ending
 from symphys.findings.writing import capital, show
 from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart

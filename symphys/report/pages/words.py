@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from symphys.findings.endings import ending
-from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, verdict_words
+from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, ending, verdict_words
 from symphys.findings.writing import capital, listed, plain, show
 from symphys.results.result import CheckRecord
 from symphys.results.run import Run
