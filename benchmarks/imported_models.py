@@ -30,7 +30,7 @@ from symphys.model.shapes import Plane
 from symphys.model.state_layout import initial_state
 from symphys.model.world import World
 from symphys.problem import Problem
-from symphys.problem.robot_alone import STANDS
+from symphys.problem.robot_alone import SUPPORTS
 from symphys.types import Array
 
 GYMNASIUM = (
@@ -499,7 +499,7 @@ def imported(model: RobotModel, self_collision: bool = True) -> Imported:
         if field in body
     }
     starts = {joint["name"]: joint["start"] for joint in robot.tables.get("joint", ()) if "start" in joint}
-    own = any(key in robot.tables for key in STANDS)
+    own = any(key in robot.tables for key in SUPPORTS)
     ground = [each for each in problem.world().statics if isinstance(each, Plane)]
     floor = None if own or not ground else float(ground[0].offset)
     return Imported(problem, placed, starts, robot.findings, floor)

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from symphys.cli.wording import duration, first_line, measured, number, verdict, whole
 from symphys.findings.examination import Examination, HeldBound
-from symphys.findings.obstacles import MOST_BOUNDS, bound_words, holding
+from symphys.findings.obstacles import MAX_BOUNDS, bound_words, holding
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, NOT_SOLVED
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ def held_back(group: list[Result]) -> list[str]:
     total = f"of {len(group)} seeds"
     return [
         f"{count} {total} {'ends' if count == 1 else 'end'} at {words}"
-        for words, count in counts.most_common(MOST_BOUNDS)
+        for words, count in counts.most_common(MAX_BOUNDS)
     ]
 
 

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.export.mjcf_bodies import StartState
-from symphys.model.heightfield import FINER, Heightfield, off_triangles
+from symphys.model.heightfield import GRID_REFINEMENT, Heightfield, off_triangles
 from symphys.model.shapes import Capsule, Convex, Plane, Shape, Terrain, surface
 from symphys.model.world import Law, Side, World, side_name
 from symphys.types import Array
@@ -156,8 +156,8 @@ def sampled(terrain: Terrain, grid: Grid, finer: int = 1) -> Array:
 
 def deviation(terrain: Terrain, grid: Grid) -> float:
     """Return the largest distance of a surface from triangles on its grid [m], for either diagonal of each square."""
-    fine = sampled(terrain, grid, FINER)
-    return off_triangles(fine, fine[::FINER, ::FINER], FINER)
+    fine = sampled(terrain, grid, GRID_REFINEMENT)
+    return off_triangles(fine, fine[::GRID_REFINEMENT, ::GRID_REFINEMENT], GRID_REFINEMENT)
 
 
 def height_field(start: StartState, terrain: Terrain) -> Element:

@@ -1,4 +1,4 @@
-"""From text to a formula: a Python syntax tree of bounded size, of which a fixed list of nodes is allowed.
+"""Parse a formula: a Python syntax tree of bounded size, of which a fixed list of nodes is allowed.
 
 Every failure is a FormulaError.
 """

@@ -1,4 +1,4 @@
-"""What the numbers of an examination mean: findings with levels, in words.
+"""Findings with levels, in words, from the numbers of an examination.
 
 It depends on numbers and texts alone: runs judge with it; the command line and the pages show it.
 """

@@ -1,4 +1,4 @@
-"""How far a solution can be trusted: every finding of an examination, and one paragraph of advice from them.
+"""The findings of an examination, and a paragraph of advice from them on how far a solution can be trusted.
 
 ``symphys check`` at a guess and the pages of runs use these words.
 """

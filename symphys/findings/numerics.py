@@ -1,4 +1,4 @@
-"""Whether gradient and answer are those of the problem: differences, refinement, growth, smoothing."""
+"""Findings on the numerics: gradients against differences, refinement, growth, smoothing."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from symphys.findings.numerics import NO_COSTS
 from symphys.findings.writing import capital, listed, several, show
 
 TARGETS, BOUNDS = "targets", "bounds"
-MOST_BOUNDS = 3
+MAX_BOUNDS = 3
 """How many bounds are named."""
 CONTRADICTING = (
     "{names} cannot {all} be met near here: whatever is varied, some combination of their values stays the same, and "
@@ -44,7 +44,7 @@ def obstacle_findings(trust: Examination, judged: Judged) -> list[Finding]:
         if trust.equations > trust.unknowns:
             number = f"{show(trust.equations)} for {several(int(trust.unknowns), 'unknown')}"
             lines.append(Finding(TARGETS, UNKNOWN, "Components of targets", number, EQUATIONS))
-    for bound in holding(trust, judged)[:MOST_BOUNDS]:
+    for bound in holding(trust, judged)[:MAX_BOUNDS]:
         lines.append(Finding(BOUNDS, FAIR, f"{capital(bound.side)} bound of {place(bound)}", extent(bound), HELD))
     return lines
 
@@ -61,8 +61,8 @@ def obstacles(trust: Examination, judged: Judged) -> tuple[str, ...]:
             clauses.append(said_of(trust.outweighed, OUTWEIGHED))
     bounds = holding(trust, judged)
     if bounds:
-        named = [bound_words(bound) for bound in bounds[:MOST_BOUNDS]]
-        more = [f"{len(bounds) - MOST_BOUNDS} more"] if len(bounds) > MOST_BOUNDS else []
+        named = [bound_words(bound) for bound in bounds[:MAX_BOUNDS]]
+        more = [f"{len(bounds) - MAX_BOUNDS} more"] if len(bounds) > MAX_BOUNDS else []
         verb = "holds" if len(bounds) == 1 else "hold"
         clauses.append(f"{listed([*named, *more])} {verb} the answer back, which would improve beyond")
     return tuple(clauses)

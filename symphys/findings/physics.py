@@ -1,4 +1,4 @@
-"""Whether the physics holds: contacts are resolved, energy and momentum are what physics allows.
+"""Findings on the physics: whether contacts are resolved, and energy and momentum are conserved.
 
 Contacts: settled, not too deep, no tunnelling, every impact in time, no near misses.
 """

@@ -1,4 +1,4 @@
-"""How a run ended, and its verdict: solved, done, not solved, not to be trusted, or failed."""
+"""The statuses with which runs end, and the verdict: solved, done, not solved, not to be trusted, or failed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a world is, as data: bodies, shapes, static surfaces, contact laws, joints, controllers, the state layout.
+"""The world as data: bodies, shapes, static surfaces, contact laws, joints, controllers, the state layout.
 
     from symphys.model import Body, Hinge, Law, Plane, Servo, make_world
 

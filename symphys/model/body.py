@@ -23,7 +23,7 @@ Vector = Sequence[float] | NDArray[np.float64]
 
 
 class BodyStart(TypedDict, total=False):
-    """Where a motion of a body begins, in world coordinates; what is missing is zero, and upright.
+    """The start of a body's motion, in world coordinates; missing values are zero, and upright.
 
     Attributes:
         position: (3,) of the centre of mass [m].

@@ -24,7 +24,7 @@ REACH = 1.0
 
 @dataclass(frozen=True)
 class Screw:
-    """One coordinate of a chain at the pose in which all are 0.
+    """A coordinate of a chain at the pose in which all are 0.
 
     Attributes:
         axis: (3,) unit vector.

@@ -21,7 +21,7 @@ import numpy as np
 
 from symphys.types import Array, Expr
 
-STEEPEST = 3.0
+MAX_SLOPE_RATIO = 3.0
 """Largest slope at a height, as a multiple of the smaller of the slopes to its neighbours."""
 SIDES = (-1, 1)
 
@@ -63,7 +63,7 @@ def limited_along(heights: Array, slopes: Array) -> Array:
     rises = np.diff(heights, axis=1)
     before, after = np.hstack([rises[:, :1], rises]), np.hstack([rises, rises[:, -1:]])
     rises_on = before * after > 0
-    most = np.where(rises_on, STEEPEST * np.minimum(np.abs(before), np.abs(after)), 0)
+    most = np.where(rises_on, MAX_SLOPE_RATIO * np.minimum(np.abs(before), np.abs(after)), 0)
     found: Array = np.sign(after) * np.clip(np.sign(after) * slopes, 0, most)
     return found
 
@@ -99,11 +99,11 @@ PIECES = (1, -4, 6, -4)
 """A cubic B-spline on the knots -2, -1, 0, 1, 2 is the sum of these times max(t - knot, 0)^3 / 6, up to t = 2."""
 VALUE, SLOPE = (1 / 6, 4 / 6, 1 / 6), (-1 / 2, 0, 1 / 2)
 """Values and slopes of a cubic B-spline at the heights before, at and after its middle."""
-ROUNDING = 1e-12
+ROUNDING_TOLERANCE = 1e-12
 """Smallest change of a slope that is made, as a share of the largest height."""
-FINER = 4
+GRID_REFINEMENT = 4
 """Number of parts of a spacing at whose ends a surface is compared with triangles."""
-MOST_COMPARED = 1_000_000
+MAX_COMPARED = 1_000_000
 """Largest number of places at which it is compared, roughly."""
 
 
@@ -170,7 +170,7 @@ class Heightfield:
         ``heights``: (m, n) [m], rows along y; None: its own.
         """
         corners = self._values if heights is None else heights
-        finer = max(1, min(FINER, int(np.sqrt(MOST_COMPARED / corners.size))))
+        finer = max(1, min(GRID_REFINEMENT, int(np.sqrt(MAX_COMPARED / corners.size))))
         sizes = zip(corners.shape, self._values.shape, strict=True)
         rows, columns = (np.linspace(0, own - 1, finer * (count - 1) + 1) for count, own in sizes)
         return off_triangles(self.on_grid(rows, columns), corners, finer)
@@ -199,7 +199,7 @@ class Heightfield:
         y, x = ({kind: banded(count, kind) for kind in (VALUE, SLOPE)} for count in (rows, columns))
         x_slope, y_slope, twist = ((VALUE, SLOPE), (SLOPE, VALUE), (SLOPE, SLOPE))
         own = Slopes(*(y[one] @ spline @ x[other].T for one, other in (x_slope, y_slope, twist)))
-        kept, least = limited(self._values, own), ROUNDING * float(np.abs(self._values).max())
+        kept, least = limited(self._values, own), ROUNDING_TOLERANCE * float(np.abs(self._values).max())
         changes = [kept.x - own.x, kept.y - own.y, kept.twist - own.twist]
         return Slopes(*(np.where(np.abs(change) > least, change, 0.0) for change in changes))
 

@@ -19,7 +19,7 @@ SLIDING: Mapping[str, str] = MappingProxyType({"torque": "N", "angle": "m", "ine
 
 @dataclass(frozen=True)
 class Number:
-    """What is known of a number.
+    """The declaration of a number.
 
     Attributes:
         unit: empty for a pure number; None: not known. Of what acts along a coordinate: with ``{torque}``, ``{angle}``

@@ -39,7 +39,7 @@ GIVEN = ("position", "orientation", "velocity", "angular_velocity")
 
 
 class Layout:
-    """Where each named quantity lies in x."""
+    """The places of named quantities in x."""
 
     def __init__(self, world: World) -> None:
         """Lay out the bodies, then the pairs, the joints and the lag."""
@@ -84,7 +84,7 @@ class Layout:
         return name in self._slices
 
     def names(self) -> tuple[str, ...]:
-        """All names, in the order of the columns."""
+        """Return all names, in the order of the columns."""
         return tuple(self._slices)
 
     def owner(self, column: int) -> str:

@@ -1,4 +1,4 @@
-"""What the physics is about: bodies, static surfaces, and which of their surfaces meet under which law.
+"""The world of the physics: bodies, static surfaces, and the pairs of their surfaces with contact laws.
 
 Everything here is frozen. A number may be a float or a casadi symbol: a symbol makes the step a function of it,
 so a mass, a radius or a coefficient of friction becomes a parameter with exact derivatives.
@@ -40,7 +40,7 @@ NOTHING: Mapping[Any, Any] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Law:
-    """How two surfaces act on each other.
+    """The contact law of two surfaces.
 
     [contact], [[pair]] and the tables of surfaces have a key for each field, by its metadata; see ``declare``. Surfaces
     state those with ``combine``, which makes one value of those of two surfaces.
@@ -281,7 +281,7 @@ def contradictions(names: Sequence[str], stated: Statements) -> Iterator[tuple[s
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a pair: a body's shape, or (``body`` None) the static surface with index ``shape``."""
+    """A side of a pair: a body's shape, or (``body`` None) the static surface with index ``shape``."""
 
     body: int | None
     shape: int
@@ -350,7 +350,7 @@ class World:
 
 @dataclass(frozen=True)
 class Scheme:
-    """How a step is taken; the switches exist so that a study can show what each trick buys.
+    """The options of a time step; the switches exist so that a study can show what each option buys.
 
     Attributes:
         dt: time step [s]; an SX expression of parameters where the duration is one of them.
@@ -438,7 +438,7 @@ def make_world(
 def all_pairs(
     bodies: Sequence[Body], statics: Sequence[Static], law: Law, laws: Mapping[frozenset[str], Law | None] = NOTHING
 ) -> tuple[Pair, ...]:
-    """Every shape of every body against every static surface, then against every shape of every later body.
+    """Pair every shape of every body with every static surface, then with every shape of every later body.
 
     ``laws`` are those of two of them by name, None where they never touch. Surfaces that no rule covers
     (``shapes.contact_points`` is 0) are left out.

@@ -66,7 +66,7 @@ def rate_of(name: str, sizes: dict[str, int]) -> str | None:
 
 @dataclass(frozen=True)
 class GuessedMotion:
-    """Where a motion is guessed to pass, by quantities over time.
+    """A guessed motion: quantities at known times.
 
     Numbers move on straight lines between the times at which they are known. Orientations turn on the shortest way,
     the geodesic, at constant angular velocity (Shoemake 1985). Before the first and after the last time all stay.

@@ -20,7 +20,7 @@ from symphys.problem.reading.faults import Faults, Place, SourceLocation
 from symphys.problem.reading.messages import report, shown
 from symphys.problem.reading.source import MAX_BYTES, parse_toml, read_source, refuse, toml_string
 from symphys.problem.schema import Document, SchemaTable
-from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
+from symphys.problem.schema.include import MAX_INCLUDES, IncludedTable, IncludeTable
 from symphys.problem.schema.joints import JointTable, SiteTable
 from symphys.problem.schema.physics import BlockTable, BodyTable, PlaneTable, TerrainTable
 from symphys.problem.tables.bodies import read_orientation
@@ -68,7 +68,7 @@ class MergedFiles:
 
 
 def merge(sources: Sequence[IncludedFile], lists: Collection[str], text: str, faults: Faults) -> MergedFiles:
-    """All tables, in the order of the files; notes keys that two files give differently.
+    """Merge the tables in the order of the files; note keys that two files give differently.
 
     Args:
         sources: the included files, whose tables are of the right kinds, then the problem.
@@ -157,14 +157,14 @@ def own_names(lists: Mapping[str, list[Any]]) -> set[str]:
 
 RECORDED = ("recording", "recorded", "identify")
 OF_THE_PROBLEM = ("simulation", "phase", "termination", "fall", "objective", "solver", "solvers", "sweep", *RECORDED)
-FURTHER = ("include", "included")
-OWN = ("title", "description")
+INCLUDING_KEYS = ("include", "included")
+DESCRIPTIVE_KEYS = ("title", "description")
 """What an included file says about itself alone."""
 MODELS = (".xml", ".mjcf", ".urdf")
 """Ends of the names of other programs' models."""
 PACKAGE = "package://"
 """Before the path of a file in an installed package."""
-OF_MODELS = {"keyframe", "self_collision", "base"}
+MODEL_KEYS = {"keyframe", "self_collision", "base"}
 """Keys about them."""
 LISTS = [name for name, field in Document.model_fields.items() if get_origin(field.annotation) is list]
 Model = TypeVar("Model", bound=SchemaTable)
@@ -207,8 +207,8 @@ def read_tables(data: Mapping[str, Any], key: str, model: type[Model], faults: F
     if key not in data:
         return []
     entries, found = data[key], []
-    if not isinstance(entries, list) or not 0 < len(entries) <= MOST_INCLUDES:
-        faults.add((key,), f"must be a list of 1 to {MOST_INCLUDES} tables, [[{key}]], not {shown(entries)}")
+    if not isinstance(entries, list) or not 0 < len(entries) <= MAX_INCLUDES:
+        faults.add((key,), f"must be a list of 1 to {MAX_INCLUDES} tables, [[{key}]], not {shown(entries)}")
         return []
     for index, entry in enumerate(entries):
         try:
@@ -236,7 +236,7 @@ def find(path: Path, index: int, table: IncludeTable, kept: Mapping[str, str], f
         faults.stop(place, "the file includes itself")
     if file.suffix.lower() in MODELS:
         return str(file), text_of_model(file, index, table, faults)
-    for key in sorted(OF_MODELS & table.model_fields_set):
+    for key in sorted(MODEL_KEYS & table.model_fields_set):
         faults.add((*place[:2], key), f"is for models of other programs, {', '.join(MODELS)}, and this file is none")
     return str(file), read_source(file)
 
@@ -280,7 +280,7 @@ def source(file: str, text: str, table: IncludeTable, faults: Faults) -> Include
         reason = key_fault(key, value, faults.file)
         if reason:
             faults.add_at(SourceLocation(file, written, (key,)), reason)
-        elif key not in OWN:
+        elif key not in DESCRIPTIVE_KEYS:
             found[key] = value
     return IncludedFile(file, written, prefixed(found, table.prefix) if table.prefix else found, table)
 
@@ -289,16 +289,16 @@ def key_fault(key: str, value: object, problem: str) -> str:
     """Return the fault of a table or key at the top of an included file; empty without one."""
     if key in OF_THE_PROBLEM:
         return f"belongs to a whole problem; move it to {problem}, which includes this file"
-    if key in FURTHER:
+    if key in INCLUDING_KEYS:
         return f"an included file includes no others; include them from {problem} too"
     if key not in Document.model_fields:
-        valid = [name for name in Document.model_fields if name not in (*OF_THE_PROBLEM, *FURTHER)]
+        valid = [name for name in Document.model_fields if name not in (*OF_THE_PROBLEM, *INCLUDING_KEYS)]
         return f"unknown key; {hint(key, valid)}"
     if key in LISTS:
         return "" if isinstance(value, list) else f"must be a list, not {shown(value)}; write [[{key}]]"
-    if key in OWN and not isinstance(value, str):
+    if key in DESCRIPTIVE_KEYS and not isinstance(value, str):
         return f"must be text, not {shown(value)}"
-    if key not in OWN and not isinstance(value, dict):
+    if key not in DESCRIPTIVE_KEYS and not isinstance(value, dict):
         return f"must be a table, not {shown(value)}"
     return ""
 

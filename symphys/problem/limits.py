@@ -32,31 +32,31 @@ from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.physics import BodyTable
 
-MASSES = (1e-100, 1e100)
+MASS_RANGE = (1e-100, 1e100)
 """[kg]"""
-MOMENTS = (1e-140, 1e140)
+MOMENT_RANGE = (1e-140, 1e140)
 """[kg m^2], of the principal moments of inertia."""
 
 
 def check_magnitudes(place: tuple[str, int], table: BodyTable, body: ParametricBody, faults: Faults) -> None:
     """Mass and inertia, given or following from density and shape, must be numbers that can be computed with."""
-    if not within(body.mass, MASSES):
+    if not within(body.mass, MASS_RANGE):
         key, origin = ("mass", "") if table.mass is not None else ("density", "the mass that follows from it ")
-        faults.add((*place, key), f"{origin}must be {spelled(MASSES)} kg, not {body.mass:g}")
+        faults.add((*place, key), f"{origin}must be {spelled(MASS_RANGE)} kg, not {body.mass:g}")
         return
     key, origin = ("inertia", "the principal moments ")
     if table.inertia is None:
         key, origin = ("shape", "the principal moments of the inertia that follows from it ")
     moments = principal(body)
-    if not within(moments, MOMENTS):
+    if not within(moments, MOMENT_RANGE):
         listed = ", ".join(f"{moment:g}" for moment in moments)
-        faults.add((*place, key), f"{origin}must be {spelled(MOMENTS)} kg m^2, not {listed}")
+        faults.add((*place, key), f"{origin}must be {spelled(MOMENT_RANGE)} kg m^2, not {listed}")
 
 
 def check_mass(where: Place, mass: float, faults: Faults) -> None:
     """A mass that a variable begins with."""
-    if not within(mass, MASSES):
-        faults.add(where, f"a mass must be {spelled(MASSES)} kg, not {mass:g}")
+    if not within(mass, MASS_RANGE):
+        faults.add(where, f"a mass must be {spelled(MASS_RANGE)} kg, not {mass:g}")
 
 
 def principal(body: ParametricBody) -> NDArray[np.float64]:
@@ -82,9 +82,9 @@ def spelled(limits: tuple[float, float]) -> str:
     return f"from {limits[0]:g} to {limits[1]:g}"
 
 
-LOOP, RECORD, NUMBER, WEIGHT = 500, 128, 300, 40
+BYTES_OF_LOOP, BYTES_OF_RECORD, BYTES_OF_NUMBER, BYTES_OF_WEIGHT = 500, 128, 300, 40
 """Bytes: of a state in a loop of steps; of a state and step; of a number in a variable; of a weight of a net."""
-LIMITS = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"))
+CGROUP_LIMITS = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"))
 """Where Linux states what a group of processes may use: version 2, version 1."""
 GIB = 2.0**30
 
@@ -95,7 +95,7 @@ def available() -> float:
         found = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, ValueError, OSError):  # not every system states it
         found = inf
-    return min([found, *(limit(path) for path in LIMITS)])
+    return min([found, *(limit(path) for path in CGROUP_LIMITS)])
 
 
 def limit(path: Path) -> float:
@@ -108,12 +108,12 @@ def limit(path: Path) -> float:
 
 def steps_need(states: int, steps: int) -> float:
     """Bytes for a rollout."""
-    return LOOP * states * 10.0 ** floor(log10(max(steps, 1))) + RECORD * states * steps
+    return BYTES_OF_LOOP * states * 10.0 ** floor(log10(max(steps, 1))) + BYTES_OF_RECORD * states * steps
 
 
 def check_net(place: Place, weights: int, varied: bool, faults: Faults) -> bool:
     """Whether there is memory for a net; notes it if there is none. ``varied``: its weights are variables."""
-    need, have = float(WEIGHT + NUMBER * varied) * weights, available()
+    need, have = float(BYTES_OF_WEIGHT + BYTES_OF_NUMBER * varied) * weights, available()
     if need > have:
         text = f"a net of {weights} weights takes about {shown(need)} of memory, {shown(have)} can be used here"
         faults.add(place, f"{text}; take smaller layers")
@@ -129,7 +129,7 @@ def check_rollout(world: World, simulation: Simulation, variables: Sequence[Vari
         faults.add(("simulation", "dt"), f"{text} used here; take a larger dt or a shorter duration")
         return
     for index, variable in enumerate(variables):
-        need += NUMBER * variable.guess.size
+        need += BYTES_OF_NUMBER * variable.guess.size
         if need > have:
             text = f"the steps, and all knots up to these, take about {shown(need)} of memory, {shown(have)} can be"
             faults.add(("variable", index, "knots"), f"{text} used here; take fewer")
@@ -141,20 +141,20 @@ def shown(size: float) -> str:
     return f"{size / GIB:.3g} GiB"
 
 
-LISTED = 3
-MOST_POINTS = 2000
+MAX_LISTED = 3
+MAX_POINTS = 2000
 """Points of contact of a world: all are looked at in every step."""
 
 
 def check_pair_limit(world: ParametricWorld, faults: Faults) -> None:
-    """Every point where two surfaces may touch is computed in every step."""
+    """Check that a time step can compute all contact points, and that each has a rule."""
     candidates = CollisionFilter(world.parts, (*world.pairs, *world.jointed))
-    counted = candidates.count(MOST_POINTS)
-    if counted.points > MOST_POINTS:
+    counted = candidates.count(MAX_POINTS)
+    if counted.points > MAX_POINTS:
         faults.stop(("body",), too_many(candidates, counted))
     if counted.uncovered:
-        listed = ", ".join(f"{a} and {b}" for a, b in counted.uncovered[:LISTED])
-        more = f" and {len(counted.uncovered) - LISTED} more" if len(counted.uncovered) > LISTED else ""
+        listed = ", ".join(f"{a} and {b}" for a, b in counted.uncovered[:MAX_LISTED])
+        more = f" and {len(counted.uncovered) - MAX_LISTED} more" if len(counted.uncovered) > MAX_LISTED else ""
         faults.stop(
             ("body",),
             f"contact of such shapes is not known: {listed}{more}; let them pass through each other, by collides_with "
@@ -165,7 +165,7 @@ def check_pair_limit(world: ParametricWorld, faults: Faults) -> None:
 def too_many(candidates: CollisionFilter, counted: PairCount) -> str:
     """Say how many contact points there are, where most come from, and what to do."""
     sets = list(candidates.sets.values())
-    largest = counted.shares.most_common(LISTED)
+    largest = counted.shares.most_common(MAX_LISTED)
     listed = ", ".join(f"{between(sets[a], sets[b], a == b)}: {count}" for (a, b), count in largest)
     count = f"{counted.points}" if counted.whole else f"more than {counted.points}"
     remedy = (
@@ -177,7 +177,7 @@ def too_many(candidates: CollisionFilter, counted: PairCount) -> str:
     others = sorted({solid.plural for solid in solids if most_points(type(solid)) > most_points(simplest)})
     if others:
         remedy += f"; or take {simplest.plural} in place of {' and '.join(others)}"
-    return f"{count} points of contact in every step are too many, {MOST_POINTS} are allowed ({listed}); {remedy}"
+    return f"{count} points of contact in every step are too many, {MAX_POINTS} are allowed ({listed}); {remedy}"
 
 
 def most_points(kind: type[Surface]) -> int:

@@ -1,4 +1,4 @@
-"""From the tables of a problem file to its data; everything that can be wrong with them is found here."""
+"""Build the data of a problem from the tables of its file, and find all faults in them."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def check_names(document: Document, faults: Faults) -> None:
 
 
 def groups(document: Document) -> list[tuple[Place, str]]:
-    """Every mention of a group, with its place."""
+    """Return every mention of a group with its place."""
     members = [((key, index), table) for key in MEMBERS for index, table in enumerate(getattr(document, key))]
     ground = [] if document.ground is None else [(("ground",), document.ground)]
     return [((*place, "group"), table.group) for place, table in (*members, *ground) if table.group is not None]

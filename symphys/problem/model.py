@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sensor:
-    """Something that controllers may use.
+    """Quantities that controllers may use.
 
     Attributes:
         name: as in the file.
@@ -43,7 +43,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class FeedbackController:
-    """What drives inputs in every step.
+    """A law that drives inputs in every step.
 
     Attributes:
         name: as in the file.
@@ -69,7 +69,7 @@ class FeedbackController:
 
 @dataclass(frozen=True)
 class ForceLaw:
-    """What adds to an input in every step, by a formula of the state.
+    """A formula of the state that adds to an input in every step.
 
     Attributes:
         name: as in the file.
@@ -103,7 +103,7 @@ class ForceLaw:
 
 @dataclass(frozen=True)
 class PlantSettings:
-    """How the plant differs from the model.
+    """Differences of the plant from the model.
 
     Attributes:
         dt: [s] its longest time step.
@@ -174,7 +174,7 @@ DURATION = "simulation.duration"
 
 @dataclass(frozen=True, kw_only=True)
 class Simulation(Scheme):
-    """How time passes: the switches of the time step, and for how long.
+    """The switches of the time step, its length and the duration.
 
     Attributes:
         dt: time step [s].
@@ -223,7 +223,7 @@ class Phase:
 
 @dataclass(frozen=True)
 class VariableSlot:
-    """Where a variable's components go.
+    """The components of a quantity that a variable sets.
 
     Attributes:
         name: ``ball.velocity``, ``ball.mass``, ``gravity``, ``ground.friction``, ``ball.force``, ``brain.weights``, ...
@@ -236,7 +236,7 @@ class VariableSlot:
 
 @dataclass(frozen=True)
 class Variable:
-    """Something that a solver may choose; every slot gets the same values.
+    """Numbers that a solver may choose; every slot gets the same values.
 
     Attributes:
         name: as in the file.
@@ -362,7 +362,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Termination:
-    """Where a motion is over before its time: from then on nothing moves.
+    """A condition that ends a motion before its time: from then on nothing moves.
 
     Attributes:
         margin: of a number of the state; over where it is below 0.
@@ -434,7 +434,7 @@ class Scenarios:
     discretisations: tuple[Discretisation, ...] = ()
 
     def __iter__(self) -> Iterator[RandomizedQuantity | RandomizedPose | Discretisation]:
-        """One after the other."""
+        """Iterate over quantities, poses, then discretisations."""
         return chain(self.quantities, self.poses, self.discretisations)
 
     def __bool__(self) -> bool:
@@ -444,7 +444,7 @@ class Scenarios:
 
 @dataclass(frozen=True, eq=False)
 class ProblemData:
-    """All that a problem file says, validated; equal to itself only.
+    """The validated content of a problem file; equal to itself only.
 
     Attributes:
         name: the file's stem.
@@ -521,7 +521,7 @@ class ProblemData:
 
     @property
     def identity(self) -> str:
-        """All that makes the problem this one: its text, and a digest of the numbers that controllers begin with."""
+        """Return the text, and a digest of the numbers that controllers begin with: equal problems share both."""
         digest = hashlib.sha256(b"".join(value.tobytes() for value in self.weights.values()))
         text = without_places(self.text)
         return f"{text}\n{digest.hexdigest()}" if self.controllers else text

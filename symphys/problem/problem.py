@@ -176,7 +176,7 @@ def listed(entries: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
 
 
 def plain(value: Any) -> Any:
-    """Without numpy's types and tuples, which TOML does not know."""
+    """Convert numpy's types and tuples, which TOML does not know."""
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if hasattr(value, "tolist"):

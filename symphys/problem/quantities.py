@@ -1,4 +1,4 @@
-"""What variables set and formulas read: every named quantity of a problem, with its value in the file and its unit."""
+"""The quantities that variables set and formulas read, with their values in the file and their units."""
 
 from __future__ import annotations
 
@@ -26,38 +26,38 @@ from symphys.types import Array
 
 SLOT = re.compile(r"\s*([^\[\]\s]+)\s*(?:\[\s*(-?\d{1,9})?\s*(:)?\s*(-?\d{1,9})?\s*\])?\s*")
 EDGE = "edge"
-LARGEST_EDGE = 0.99
+MAX_EDGE_SHARE = 0.99
 """Of half of a box's smallest edge: the largest radius of its edges, unless ``upper`` says otherwise."""
-LEAST_SHARE = 1e-3
+MIN_SHARE = 1e-3
 """What must exceed its least value stays above this share of its value in the file, unless ``lower`` is less."""
-START: Mapping[str, Number] = {
+START_NUMBERS: Mapping[str, Number] = {
     "position": Number("m", scale=1.0),
     "orientation": Number("", scale=1.0),
     "velocity": Number("m/s", scale=1.0),
     "angular_velocity": Number("rad/s", scale=1.0),
 }
 """Numbers of a body at the start."""
-INPUT: Mapping[str, Number] = {"force": Number("N", scale=1.0), "torque": Number("N m", scale=1.0)}
+INPUT_NUMBERS: Mapping[str, Number] = {"force": Number("N", scale=1.0), "torque": Number("N m", scale=1.0)}
 """Inputs of a body."""
-COMMAND = Number(None, scale=1.0)
+COMMAND_NUMBER = Number(None, scale=1.0)
 """The command of a motor; motors say more of it."""
-WEIGHT = Number("", scale=0.1)
+WEIGHT_NUMBER = Number("", scale=0.1)
 """A number of a controller."""
-OWN_SIZE = Number(None)
+FORCE_NUMBER = Number(None)
 """A number of a force law."""
-DELAYED = Number("s", scale=0.01)
+DELAY_NUMBER = Number("s", scale=0.01)
 DURATION_NUMBER = Number("s", least=0.0, exceeds=True)
-CLOCK: Mapping[str, Number] = {"offset": Number("s", scale=0.01), "scale": Number("", least=0.0)}
+CLOCK_NUMBERS: Mapping[str, Number] = {"offset": Number("s", scale=0.01), "scale": Number("", least=0.0)}
 """Numbers of the clock of a recording."""
 
 
 class SlotError(ValueError):
-    """Why a variable cannot set something."""
+    """A text that names nothing a variable can set."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """Something that a variable can set: (components,) as the file has it, and what is known of it."""
+    """A quantity that a variable can set: (components,) as the file has it, and its declaration."""
 
     kind: Kind
     nominal: Array
@@ -67,10 +67,11 @@ class Quantity:
 def quantities(
     parametric: ParametricWorld, initial: Mapping[str, Array], inputs: Mapping[str, int]
 ) -> dict[str, Quantity]:
-    """Every quantity of a world by name: states at the start, inputs with their sizes, then parameters."""
-    found = {name: Quantity("initial", value, START[last_part(name)]) for name, value in initial.items()}
+    """Return the quantities of a world by name: states at the start, inputs with their sizes, then parameters."""
+    found = {name: Quantity("initial", value, START_NUMBERS[last_part(name)]) for name, value in initial.items()}
     found |= {
-        name: Quantity("control", np.zeros(size), INPUT.get(last_part(name), COMMAND)) for name, size in inputs.items()
+        name: Quantity("control", np.zeros(size), INPUT_NUMBERS.get(last_part(name), COMMAND_NUMBER))
+        for name, size in inputs.items()
     }
     return found | {
         name: Quantity("parameter", value, parametric.numbers[name]) for name, value in parametric.parameters().items()
@@ -103,7 +104,7 @@ def duration_quantity(duration: float) -> dict[str, Quantity]:
 def weight_quantities(controllers: Iterable[FeedbackController]) -> dict[str, Quantity]:
     """The numbers of controllers by name, such as ``brain.weights``."""
     return {
-        name: Quantity("weight", value, WEIGHT)
+        name: Quantity("weight", value, WEIGHT_NUMBER)
         for controller in controllers
         for name, value in controller.weights.items()
     }
@@ -113,16 +114,18 @@ def recording_quantities(names: Iterable[str], delays: Iterable[tuple[str, float
     """Return the time offset [s] and the scale of each [[recording]], and the delays of inputs [s]."""
     found = dict[str, Quantity]()
     for name in names:
-        found[f"{name}.offset"] = Quantity("recording", np.zeros(1), CLOCK["offset"])
-        found[f"{name}.scale"] = Quantity("recording", np.ones(1), CLOCK["scale"])
+        found[f"{name}.offset"] = Quantity("recording", np.zeros(1), CLOCK_NUMBERS["offset"])
+        found[f"{name}.scale"] = Quantity("recording", np.ones(1), CLOCK_NUMBERS["scale"])
     for name, delay in delays:
-        found[f"{name}.{DELAY}"] = Quantity("recording", np.array([delay]), DELAYED)
+        found[f"{name}.{DELAY}"] = Quantity("recording", np.array([delay]), DELAY_NUMBER)
     return found
 
 
 def delay_quantities(references: Iterable[ReferenceTrajectory]) -> dict[str, Quantity]:
     """The delays of references by name, such as ``walk.delay`` [s]."""
-    return {name: Quantity("weight", value, DELAYED) for each in references for name, value in each.weights.items()}
+    return {
+        name: Quantity("weight", value, DELAY_NUMBER) for each in references for name, value in each.weights.items()
+    }
 
 
 def read_slot(text: str, known: Mapping[str, Quantity]) -> VariableSlot:
@@ -191,14 +194,14 @@ def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Ar
     quantity = known[slot.name]
     low, high = (np.full(len(slot.components), limit) for limit in (quantity.number.least, quantity.number.most))
     if quantity.number.exceeds or quantity.number.floored:
-        low = LEAST_SHARE * quantity.nominal[list(slot.components)]
+        low = MIN_SHARE * quantity.nominal[list(slot.components)]
     owner, _, key = slot.name.rpartition(".")
     if key == EDGE and quantity.kind == "parameter":
-        high = np.full(1, LARGEST_EDGE * known[f"{owner}.size"].nominal.min() / 2)
+        high = np.full(1, MAX_EDGE_SHARE * known[f"{owner}.size"].nominal.min() / 2)
     return low, high
 
 
-OTHERS = {
+OTHER_UNITS = {
     "reaction_force": "N",
     "reaction_torque": "N m",
     "lag": "s",
@@ -208,9 +211,9 @@ OTHERS = {
 }
 """By the last part of a name, of what is neither a sensor (``SENSOR_KINDS``) nor declared."""
 SIZES = {each.name: Number("m") for shape in SHAPES.values() for each in (*shape.size_keys, *shape.optional_keys)}
-DECLARED = {**COEFFICIENTS, **INERTIAL, **SIZES, **Plane.numbers, **START, **INPUT}
+DECLARED = {**COEFFICIENTS, **INERTIAL, **SIZES, **Plane.numbers, **START_NUMBERS, **INPUT_NUMBERS}
 """What is declared of numbers of bodies, of static surfaces and of laws of contact."""
-ALONG = {
+JOINT_UNITS = {
     **dict.fromkeys(("motor", "lower", "upper", "spring"), "{torque}"),
     "anchor": "m",
     "start": "{angle}",
@@ -231,7 +234,7 @@ def _unit(name: str, world: World, sensors: Mapping[str, NamedSensor]) -> str | 
     joint = next((joint for joint in world.joints if joint.name == owner), None)
     if joint is not None:
         return joint_unit(joint, key)
-    return DECLARED[key].unit if key in DECLARED else OTHERS.get(key)
+    return DECLARED[key].unit if key in DECLARED else OTHER_UNITS.get(key)
 
 
 def joint_unit(joint: Joint, key: str) -> str | None:
@@ -241,7 +244,7 @@ def joint_unit(joint: Joint, key: str) -> str | None:
     known = joint_numbers(joint.kind, joint.motor, joint.spring)
     if key == "command" and joint.motor is not None:
         return joint.motor.command.along(joint.kind.turning).unit
-    return known[key].unit if key in known else Number(ALONG.get(key)).along(joint.kind.turning).unit
+    return known[key].unit if key in known else Number(JOINT_UNITS.get(key)).along(joint.kind.turning).unit
 
 
 def formula_units(world: World, names: Iterable[str], variables: Iterable[Variable]) -> dict[str, str]:

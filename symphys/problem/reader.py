@@ -1,4 +1,4 @@
-"""From the text of a problem file to its data, under any settings such as ``body.ball.mass = 2``."""
+"""Read the text of a problem file under any settings such as ``body.ball.mass = 2``."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ALIASES = {"gravity": "world.gravity"}
 
 
 class SettingError(Exception):
-    """Why a setting has no place."""
+    """A setting that has no place in the file."""
 
 
 def apply_settings(
@@ -159,7 +159,7 @@ def entry_names(entry: object, index: int) -> Sequence[str]:
 
 
 def unopened(node: Mapping[str, Any], key: str, top: bool) -> str:
-    """Why a missing table is not made."""
+    """Return the reason why a setting does not make a missing table."""
     if top and key in Document.model_fields:
         return f"the file has no {quote(key)}, and a setting cannot add one"
     tables = [table for tables in node.values() if isinstance(tables, list) for table in tables] if top else []

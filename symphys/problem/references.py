@@ -19,21 +19,21 @@ from symphys.errors import ProblemError
 from symphys.files import check_regular
 from symphys.model.world import NOTHING
 from symphys.problem.reading.faults import Faults
-from symphys.problem.reading.source import LARGEST, TOO_LARGE, read_source
+from symphys.problem.reading.source import MAX_NUMBER, TOO_LARGE, read_source
 from symphys.problem.schema import Document
 from symphys.problem.schema.checks import IDENTIFIER
 from symphys.suggest import quote
 from symphys.types import Array, Expr
 
 TIME = "time"
-LEAST_ROWS, MOST_ROWS = 2, 1000
+MIN_ROWS, MAX_ROWS = 2, 1000
 """Each row is looked at in every evaluation of a formula."""
-MOST_BYTES = 10**7
+MAX_BYTES = 10**7
 """[bytes] Largest memory of the arrays of an NPZ file: a thousand rows of a thousand columns."""
 
 
 class SeriesError(ValueError):
-    """Why columns are no time series."""
+    """Columns that are no time series."""
 
 
 def series_text(path: Path) -> str:
@@ -43,7 +43,7 @@ def series_text(path: Path) -> str:
             return read_source(path)
         check_regular(path)
         with path.open("rb") as file:
-            _, columns = read_arrays(file, most=MOST_BYTES)
+            _, columns = read_arrays(file, most=MAX_BYTES)
     except ProblemError as error:
         raise SeriesError(f"{path}: {error.issues[0].message}") from None
     except (OSError, ArchiveError) as error:
@@ -52,8 +52,8 @@ def series_text(path: Path) -> str:
     for name, column in columns.items():
         if column.dtype.kind not in "fiu" or column.ndim != 1:
             raise SeriesError(f"{path}, array {quote(name)}: must be numbers, one for each time, not {column.shape}")
-        if column.size > MOST_ROWS:
-            raise SeriesError(f"{path} has {column.size} rows of numbers; {LEAST_ROWS} to {MOST_ROWS} are allowed")
+        if column.size > MAX_ROWS:
+            raise SeriesError(f"{path} has {column.size} rows of numbers; {MIN_ROWS} to {MAX_ROWS} are allowed")
     return written({name: column.tolist() for name, column in columns.items()}, str(path))
 
 
@@ -75,8 +75,8 @@ def read_series(text: str, file: str) -> tuple[Array, dict[str, Array]]:
             raise SeriesError(f"{file}, row 1: {quote(name)} is no name of a column; write time,hip,knee")
     if len(set(header)) < len(header) or TIME not in header or len(header) < 2:
         raise SeriesError(f"{file}, row 1: the columns are {', '.join(header)}; one {TIME} and others are needed")
-    if not LEAST_ROWS <= len(lines) - 1 <= MOST_ROWS:
-        raise SeriesError(f"{file} has {len(lines) - 1} rows of numbers; {LEAST_ROWS} to {MOST_ROWS} are allowed")
+    if not MIN_ROWS <= len(lines) - 1 <= MAX_ROWS:
+        raise SeriesError(f"{file} has {len(lines) - 1} rows of numbers; {MIN_ROWS} to {MAX_ROWS} are allowed")
     values = np.empty((len(lines) - 1, len(header)))
     for k, line in enumerate(lines[1:]):
         if len(line) != len(header):
@@ -90,7 +90,7 @@ def read_series(text: str, file: str) -> tuple[Array, dict[str, Array]]:
     for name, column in columns.items():
         with np.errstate(over="ignore"):
             rates = np.abs(np.diff(column)) / np.diff(time)
-        for k in np.flatnonzero(~((rates <= LARGEST) & (np.diff(time) >= 1 / LARGEST)))[:1]:
+        for k in np.flatnonzero(~((rates <= MAX_NUMBER) & (np.diff(time) >= 1 / MAX_NUMBER)))[:1]:
             text = f"{column[k]:g} becomes {column[k + 1]:g} within {time[k + 1] - time[k]:g} s"
             raise SeriesError(f"{file}, row {k + 3}, column {quote(name)}: {text}, too fast to be computed with")
     return time, columns
@@ -104,7 +104,7 @@ def number(cell: str, where: str) -> float:
         raise SeriesError(f"{where}: {quote(cell.strip())} is no number") from None
     if not np.isfinite(value):
         raise SeriesError(f"{where}: {quote(cell.strip())} is not finite")
-    if abs(value) > LARGEST:
+    if abs(value) > MAX_NUMBER:
         raise SeriesError(f"{where}: {quote(cell.strip())} {TOO_LARGE}")
     return value
 
@@ -170,7 +170,7 @@ class ReferenceTrajectory:
 
 
 def read_references(document: Document, faults: Faults) -> tuple[tuple[ReferenceTrajectory, ...], dict[str, str]]:
-    """All of the [[reference]] tables, and the texts of their files by the names that they have there."""
+    """Read the [[reference]] tables; return them, and the texts of their files by the names that they have there."""
     kept = {table.file: table.text for table in document.included}
     found, texts = list[ReferenceTrajectory](), dict[str, str]()
     for index, table in enumerate(document.reference):

@@ -22,11 +22,11 @@ from symphys.problem.reading.source import parse_toml, read_source
 
 DURATION, STEP = 2.0, 0.005
 """[s]"""
-DROP = 0.02
+DROP_HEIGHT = 0.02
 """[m] that the lowest point of a robot without a ground of its own begins above the one that it gets."""
-STANDS = ("ground", "plane", "block", "terrain")
+SUPPORTS = ("ground", "plane", "block", "terrain")
 """Tables of what a robot may stand on."""
-HOLD = "hold_the_start"
+HOLDING_CONTROLLER = "hold_the_start"
 """The controller of the motors."""
 
 
@@ -58,7 +58,7 @@ def robot_alone(path: Path, settings: Mapping[str, object] = NOTHING, **include:
     if not stands(merged.data):
         low = lowest(untouched)
         if low < inf:
-            whole["include"][0]["position"] = [0.0, 0.0, DROP - low]
+            whole["include"][0]["position"] = [0.0, 0.0, DROP_HEIGHT - low]
             whole["ground"] = {}
     hold = holding_controller(untouched)
     if hold is not None:
@@ -82,7 +82,7 @@ def parse_title(tables: Mapping[str, Any], name: str) -> object:
 def stands(tables: Mapping[str, Any]) -> bool:
     """Whether there is something to stand on, or a joint holds a body to the world."""
     held = any(WORLD in joint.get("between", ()) for joint in tables.get("joint", ()))
-    return held or any(key in tables for key in STANDS)
+    return held or any(key in tables for key in SUPPORTS)
 
 
 def lowest(problem: Problem) -> float:
@@ -105,7 +105,7 @@ def holding_controller(problem: Problem) -> dict[str, Any] | None:
     if not any(commands.values()):
         return None
     law = {"periodic": {"frequency": 0.0, "offsets": list(commands.values())}}
-    return {"name": HOLD, "drives": list(commands), **law}
+    return {"name": HOLDING_CONTROLLER, "drives": list(commands), **law}
 
 
 def holding(joints: tuple[ParametricJoint, ...]) -> Iterator[tuple[str, float]]:

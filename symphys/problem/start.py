@@ -17,7 +17,7 @@ import numpy as np
 from symphys.dynamics.kept import structure
 from symphys.dynamics.observation import NamedSensor, SensedState, gap_function, joint_readings, named_sensors
 from symphys.expression import FormulaError
-from symphys.model.joints.frames import MEET, WORLD
+from symphys.model.joints.frames import MEETING_TOLERANCE, WORLD
 from symphys.model.state_layout import GIVEN, Layout, initial_state, input_sizes
 from symphys.model.world import World
 from symphys.problem.model import DURATION, Variable
@@ -29,7 +29,7 @@ from symphys.problem.reading.faults import Faults
 from symphys.suggest import quote
 from symphys.types import Array, Expr
 
-MOST_KEPT = 8
+MAX_STRUCTURES = 8
 """How many structures of worlds are kept at once."""
 
 
@@ -111,7 +111,7 @@ class StartValues:
     """The starts of worlds, of which most differ in a few parameters."""
 
     def __init__(self) -> None:
-        """No world is known."""
+        """Start without known worlds."""
         self._first: dict[str, Array] = {}
         self._symbols: dict[str, Any] = {}
         self._kept: dict[Hashable, StartFunctions] = {}
@@ -135,7 +135,7 @@ class StartValues:
         """Return the readings of this world's structure, which worlds that differ in symbols alone share."""
         key = structure(world, symbols)
         if key not in self._kept:
-            if len(self._kept) >= MOST_KEPT:
+            if len(self._kept) >= MAX_STRUCTURES:
                 self._kept.clear()
             self._kept[key] = StartFunctions(world, symbols)
         return self._kept[key]
@@ -146,14 +146,14 @@ def parameter(value: Array) -> float | tuple[float, ...]:
     return float(value[0]) if value.size == 1 else tuple(value.tolist())
 
 
-OVERLAP = 1e-3
+MAX_OVERLAP = 1e-3
 """Deepest overlap at the start [m]; more would be pushed out in the first steps, which is never meant."""
 
 
 def at_guess(
     parametric: ParametricWorld, known: Mapping[str, Quantity], variables: Sequence[Variable]
 ) -> dict[str, Array]:
-    """Every quantity's value at t = 0, with the first knot of every guess put in."""
+    """Return every quantity's value at t = 0, with the first knot of every guess put in."""
     values = {name: quantity.nominal.copy() for name, quantity in known.items() if quantity.kind != "recording"}
     for variable in variables:
         for slot in variable.slots if variable.kind != "recording" else ():
@@ -180,7 +180,7 @@ def varied(variables: Sequence[Variable]) -> list[str]:
 def formula_names(
     values: Mapping[str, Array], start: Start, variables: Sequence[Variable], warm_start: bool = True
 ) -> dict[str, Any]:
-    """Every name that a formula may use, with a value of its shape; see ``Formula.evaluate``."""
+    """Return every name that a formula may use, with a value of its shape; see ``Formula.evaluate``."""
     named: dict[str, Any] = {name: ca.DM(value) for name, value in values.items() if "-" not in name}
     named |= {"time": ca.DM(0.0), "duration": ca.DM(values[DURATION])}
     named |= start.quantities()
@@ -200,12 +200,12 @@ def check_overlap(parametric: ParametricWorld, start: Start, faults: Faults) -> 
     deepest: dict[tuple[str, str], float] = {}
     for pair, gap in zip(start.world.pairs, start.gaps(), strict=True):
         depth, owners = -gap, parametric.owners(pair)
-        if not depth <= max(OVERLAP, deepest.get(owners, OVERLAP)):
+        if not depth <= max(MAX_OVERLAP, deepest.get(owners, MAX_OVERLAP)):
             deepest[owners] = depth
     for (a, b), depth in deepest.items():
         index = body_index(parametric, a)
         verb = "overlaps" if any(body.name == b for body in parametric.bodies) else "sinks into"
-        message = f"{a} {verb} {b} by {depth:.4g} m at the start; at most {OVERLAP:g} m is allowed"
+        message = f"{a} {verb} {b} by {depth:.4g} m at the start; at most {MAX_OVERLAP:g} m is allowed"
         faults.add(("body", index, "position"), message)
 
 
@@ -216,13 +216,15 @@ def check_joints(parametric: ParametricWorld, start: Start, faults: Faults) -> N
     for index, (joint, reading) in enumerate(zip(parametric.joints, start.joints(), strict=True)):
         both, place = f"{joint.second or WORLD} and {joint.first}", ("joint", index)
         apart, tilt = (round(part, 9) for part in reading[:2])
-        if not max(apart, tilt) <= MEET:
+        if not max(apart, tilt) <= MEETING_TOLERANCE:
             text = f"{apart:.4g} m and {tilt:.4g} rad from where the joint holds them; one variable must move both"
             cause = "the start of other joints, or " * any(each.start for each in parametric.joints)
             faults.add((*place, "between"), f"{cause}the guess of a variable puts {both} {text}")
         low, high = joint.limits.lower, joint.limits.upper
         for value in reading[2].round(9) + 0.0:
-            if (low is not None and value < low - MEET) or (high is not None and value > high + MEET):
+            if (low is not None and value < low - MEETING_TOLERANCE) or (
+                high is not None and value > high + MEETING_TOLERANCE
+            ):
                 text = f"leave out where {both} are at the start, at {value:.6g}; it is 0 as the bodies lie in the file"
                 key = "limits" if faults.data["joint"][index].get("limits") is not None else "limits_deg"
                 faults.add((*place, key), text)

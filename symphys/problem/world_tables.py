@@ -13,7 +13,7 @@ from symphys.errors import SymphysError
 from symphys.model.body import HOLLOW_SPHERE, Body
 from symphys.model.heightfield import Heightfield
 from symphys.model.joints import JOINTS, Joint, Motor
-from symphys.model.joints.frames import MEET
+from symphys.model.joints.frames import MEETING_TOLERANCE
 from symphys.model.joints.motor import motor_kind
 from symphys.model.joints.placing import REST, PlacedJoint
 from symphys.model.joints.start import State, moved_to_zero, placed_frames, spanning_tree, unmoved
@@ -39,9 +39,9 @@ def floats(value: Any) -> Any:
     return np.asarray(value, float).tolist()
 
 
-LONGEST = 20_000
+MAX_FORMULA_LENGTH = 20_000
 """Characters; beyond that an expression repeats so much that a grid of heights serves better."""
-WORDS: dict[int, str] = {
+OPERATION_FORMATS: dict[int, str] = {
     ca.OP_ADD: "({} + {})",
     ca.OP_SUB: "({} - {})",
     ca.OP_MUL: "({} * {})",
@@ -83,20 +83,20 @@ def formula_text(height: Callable[[Any, Any], Any]) -> str:
         elif operation == ca.OP_CONST:
             constant = made.instruction_constant(k)
             values[out[0]] = repr(constant) if constant >= 0 else f"({constant!r})"
-        elif operation not in WORDS:
+        elif operation not in OPERATION_FORMATS:
             raise SymphysError("it has an operation that formulas lack, such as a comparison or if_else")
         else:
-            values[out[0]] = WORDS[operation].format(*(values[i] for i in given))
-            if len(values[out[0]]) > LONGEST:
-                raise SymphysError(f"its formula is longer than {LONGEST} characters")
+            values[out[0]] = OPERATION_FORMATS[operation].format(*(values[i] for i in given))
+            if len(values[out[0]]) > MAX_FORMULA_LENGTH:
+                raise SymphysError(f"its formula is longer than {MAX_FORMULA_LENGTH} characters")
     return text
 
 
 Start = Mapping[str, Any]
 """States by name, such as ``ball.position``; what is missing is zero, and upright."""
-ROUNDING = 1e-13
+INERTIA_TOLERANCE = 1e-13
 """Inertias whose difference is below this share of the trace are the same."""
-GIVEN = ("position", "orientation", "velocity", "angular_velocity")
+STATE_FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 
 
 def world_tables(world: World, start: Start) -> dict[str, Any]:
@@ -109,9 +109,11 @@ def world_tables(world: World, start: Start) -> dict[str, Any]:
     Raises:
         SymphysError: names what a problem file cannot say.
     """
-    unknown = start.keys() - {f"{body.name}.{key}" for body in world.bodies for key in GIVEN}
+    unknown = start.keys() - {f"{body.name}.{key}" for body in world.bodies for key in STATE_FIELDS}
     if unknown:
-        raise SymphysError(f"start: there is no {', '.join(sorted(unknown))}; valid: <body>.{', <body>.'.join(GIVEN)}")
+        raise SymphysError(
+            f"start: there is no {', '.join(sorted(unknown))}; valid: <body>.{', <body>.'.join(STATE_FIELDS)}"
+        )
     law, pairs = contact_tables(world)
     joints, start = joint_tables(world, {**world.start, **start})
     tables = {
@@ -150,7 +152,7 @@ def attached_tables(world: World) -> dict[str, Any]:
 
 def body_table(body: Body, start: Start) -> dict[str, Any]:
     """A body and its start; its inertia is left to the file where that would make the same of mass and shape."""
-    state = {key: floats(start[f"{body.name}.{key}"]) for key in GIVEN if f"{body.name}.{key}" in start}
+    state = {key: floats(start[f"{body.name}.{key}"]) for key in STATE_FIELDS if f"{body.name}.{key}" in start}
     parts, mass = [part_table(shape) for shape in body.shapes], floats(body.mass)
     table: dict[str, Any] = {"name": body.name, "mass": mass, **state}
     if body.massless:
@@ -173,7 +175,7 @@ def same_inertia(given: Any, other: Any) -> bool:
         value * np.eye(3) if value.ndim == 0 else np.diag(value) if value.ndim == 1 else value
         for value in (np.array(floats(each), float) for each in (given, other))
     )
-    return bool(np.allclose(one, two, rtol=0, atol=ROUNDING * float(np.trace(two))))
+    return bool(np.allclose(one, two, rtol=0, atol=INERTIA_TOLERANCE * float(np.trace(two))))
 
 
 def size_table(shape: Shape) -> dict[str, Any]:
@@ -228,7 +230,7 @@ def contact_tables(world: World) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     stated = {names: next(iter(several)) for names, several in laws.items()}
     most = Counter(stated.values()).most_common(1)[0][0] if stated else Law()
     tables = []
-    for names in meetings(world):
+    for names in candidate_pairs(world):
         law = stated.get(names)
         if law is None:
             tables.append({"between": list(names), "collide": False})
@@ -246,8 +248,8 @@ def law_table(law: Law) -> dict[str, Any]:
     return found if law.soft else {key: found[key] for key in found if key not in ("frequency", "damping")}
 
 
-def meetings(world: World) -> Iterator[tuple[str, str]]:
-    """Every two surfaces that could touch, by name; joints keep the bodies that they connect apart by themselves."""
+def candidate_pairs(world: World) -> Iterator[tuple[str, str]]:
+    """Yield every two surfaces that could touch, by name; bodies that a joint connects are left out."""
     joined = {frozenset(joint.bodies) for joint in world.joints}
     for i, body in enumerate(world.bodies):
         if body.shapes:
@@ -261,7 +263,7 @@ def side_name(world: World, side: Side) -> str:
     return world.statics[side.shape].name if side.body is None else world.bodies[side.body].name
 
 
-ZERO = 1e-9
+ZERO_TOLERANCE = 1e-9
 """Coordinates below this are 0 [rad] or [m]."""
 
 
@@ -325,7 +327,7 @@ def placed_joint(world: World, joint: Joint, state: State) -> PlacedJoint:
     placed, _ = placed_frames(still, state)
     count = len(joint.kind.coordinates)
     values = tuple(float(joint.value(k, placed, joint.start or (0.0,) * count)) for k in range(count))
-    bent = any(abs(value) > ZERO for value in values)
+    bent = any(abs(value) > ZERO_TOLERANCE for value in values)
     return PlacedJoint(
         still.name, still.kind, still.first, second, joint.frames, floats(joint.frequency), values if bent else ()
     )
@@ -336,7 +338,7 @@ def axes_at_zero(joint: PlacedJoint, zero: State, bent: bool) -> Array:
     placed, _ = placed_frames(joint, zero)
     apart = float(np.linalg.norm(placed.apart))
     tilt = 0.0 if not joint.kind.turns else float(np.linalg.norm(placed.a - placed.b)) / np.sqrt(2)
-    if not max(apart, tilt) <= MEET:
+    if not max(apart, tilt) <= MEETING_TOLERANCE:
         cause = "; where joints close a loop, a problem file needs all of their coordinates 0 at the start" * bent
         raise SymphysError(
             f"joint {joint.name!r}: its two sides are {apart:.4g} m and {tilt:.4g} rad from where it holds them at the "

@@ -22,15 +22,15 @@ from symphys.verification.bodies import bodies, coordinates, floating, joint_wor
 from symphys.verification.contacts import acting, slip_speeds, touching
 from symphys.verification.sensitivity_growth import samples
 
-MOST_SAMPLES = 400
-MOST_GAINS = 5
+MAX_SAMPLES = 400
+MAX_GAINS = 5
 MIN_GAIN = 1e-6
 """Energy that a contact must add in a step to be reported, as a share of the largest kinetic energy."""
 MIN_STOP = 0.05
 """Energy that contacts take, beyond the slip, when they stop a body, as a share of the largest kinetic energy."""
-ACROSS = 0.5
+SIDEWAYS_COSINE = 0.5
 """Cosine of the angle to the force that bore a body before, below which a force counts as sideways."""
-MARGIN = 1.5
+SPEED_MARGIN = 1.5
 """Places may move by this factor times the larger speed at a step's ends, since speeds between them may be larger."""
 
 
@@ -67,7 +67,7 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
     gains = np.where(rigid, contact, 0.0)
     floor = MIN_GAIN * kinetic.max() + 1e-12 * np.abs(potential).max()
     gains = np.where(gains > floor, gains, 0.0)
-    first = np.argsort(-gains, kind="stable")[:MOST_GAINS]
+    first = np.argsort(-gains, kind="stable")[:MAX_GAINS]
     free = np.where(touched, 0.0, surplus)
     unknown = np.where(np.abs(free) <= 2 * uncertain, 0.0, free)
     return {
@@ -92,7 +92,7 @@ def _stops(rollout: Rollout, record: Record, taken: Array, least: float) -> list
     lasting = np.minimum(size, np.vstack([size[:1], size[:-1]]))
     taken = taken - rollout.dt * (lasting * slip_speeds(rollout, record)).sum(axis=1)
     found = [k for k in np.argsort(-taken, kind="stable") if k and taken[k] > least and _sideways(rollout, motion, k)]
-    return [_gain(motion, int(k), float(taken[k])) for k in found[:MOST_GAINS]]
+    return [_gain(motion, int(k), float(taken[k])) for k in found[:MAX_GAINS]]
 
 
 def _sideways(rollout: Rollout, motion: Trajectory, k: int) -> bool:
@@ -104,7 +104,7 @@ def _sideways(rollout: Rollout, motion: Trajectory, k: int) -> bool:
     for c, body, sign in sides:
         push = sign * motion.contact_force[k, c]
         both = float(np.linalg.norm(push) * np.linalg.norm(bore[body]))
-        if both > 0 and push @ bore[body] < ACROSS * both:
+        if both > 0 and push @ bore[body] < SIDEWAYS_COSINE * both:
             return True
     return False
 
@@ -182,7 +182,7 @@ def _gain(motion: Trajectory, k: int, energy: float) -> dict[str, Any]:
 
 
 def _thinned(time: Array, kinetic: Array, potential: Array, applied: Array, contact: Array) -> dict[str, list[float]]:
-    keep = samples(len(time), MOST_SAMPLES)
+    keep = samples(len(time), MAX_SAMPLES)
     given, taken = (np.concatenate([[0.0], np.cumsum(part)]) for part in (applied, contact))
     columns = {"time": time, "kinetic": kinetic, "potential": potential, "applied": given, "contact": taken}
     return {name: column[keep].tolist() for name, column in columns.items()}
@@ -209,7 +209,7 @@ def jumps(rollout: Rollout, record: Record) -> dict[str, Any]:
     found: dict[str, Any] = {"jump": 0.0, "jump_at": None}
     for name, step, velocity, size in moving:
         speed = np.linalg.norm(velocity, axis=1)
-        beyond = step - MARGIN * dt * np.maximum(speed[:-1], speed[1:])
+        beyond = step - SPEED_MARGIN * dt * np.maximum(speed[:-1], speed[1:])
         k = int(beyond.argmax())
         if size > 0 and beyond[k] > found["jump"] * size:
             at = {"name": name, "time": float(motion.time[k]), "size": float(step[k])}

@@ -21,7 +21,7 @@ from symphys.transcription import Record, Rollout
 from symphys.types import Array, Bools
 
 WORKING = ("motor", "spring", "friction")
-AT_LIMIT = 1e-6
+LIMIT_DISTANCE = 1e-6
 """[rad], [m] Distance from a limit that counts as being there, plus the motion in a step."""
 
 
@@ -100,7 +100,7 @@ def uncounted(rollout: Rollout, record: Record) -> Bools:
     """Return the steps (N,) in which a joint may take or store other energy: at a limit, or where it is compliant."""
     found = np.full(rollout.steps, any(joint.soft for joint in rollout.world.joints))
     for joint, value, rate in coordinates(rollout, record):
-        reach = rollout.dt * np.abs(rate) + AT_LIMIT
+        reach = rollout.dt * np.abs(rate) + LIMIT_DISTANCE
         for sign, limit in ((-1, joint.limits.lower), (1, joint.limits.upper)):
             if limit is not None:
                 bound = number(rollout, record, limit)

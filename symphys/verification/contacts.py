@@ -14,7 +14,7 @@ from symphys.types import Array
 from symphys.verification.bodies import bodies
 from symphys.verification.refinement import UNSETTLED
 
-MOST_SLIDES = 5
+MAX_SLIDES = 5
 
 
 def contacts(rollout: Rollout, record: Record) -> dict[str, Any]:
@@ -80,7 +80,7 @@ def slides(rollout: Rollout, record: Record) -> list[dict[str, Any]]:
         if distance > 0:
             slide = {"contact": name, "distance": distance, "speed": speed, "time": float(motion.time[k])}
             furthest.setdefault(name, slide)
-    return list(furthest.values())[:MOST_SLIDES]
+    return list(furthest.values())[:MAX_SLIDES]
 
 
 def slip_speeds(rollout: Rollout, record: Record) -> Array:

@@ -17,7 +17,7 @@ DIFFERENCE_STEPS = (1e-4, 1e-5, 1e-6)
 """Steps of the central differences, as shares of the scale; the best counts, and a wrong slope passes none."""
 EVERY_COMPONENT = 12
 """Variables up to this size are differenced component by component, larger ones along as many random directions."""
-NOTICED = 1e-4
+SIDE_CHECK_ERROR = 1e-4
 """Relative error of central differences from which each side is examined by itself."""
 
 
@@ -49,7 +49,7 @@ def _compare_block(value: Values, block: VariableBlock, z: Array, slope: Array) 
     middle, at = _best(lambda steps: _mismatches(value, z, slope, directions, steps))
     found = {"variable": block.name, "scale": float(np.linalg.norm(slope[block.start : block.stop]))}
     found |= {"error": middle / norm, "step": at, "jump": 0.0}
-    if middle > NOTICED * norm:
+    if middle > SIDE_CHECK_ERROR * norm:
         sides, near = _best(lambda steps: _mismatches_beside(value, z, slope, directions, steps))
         if sides < middle:
             jumps = 2 * near * _mismatches(value, z, slope, directions, (near,))

@@ -36,21 +36,21 @@ from symphys.verification.bodies import bodies, parameters
 from symphys.verification.contacts import acting
 from symphys.verification.sensitivity_growth import DIRECTIONS
 
-MOST = 4
+MAX_MISSES = 4
 """Pairs of surfaces that are examined: those that come closest, and those that touch first."""
 CLOSE_INSTANTS = 16
 """Instants in each step around the closest."""
-LONGEST = 100
+MAX_STEPS = 100
 """Steps for which a flight through each other is followed."""
 INSTANTS_PER_STEP = 16
 """Instants in each of these steps."""
-FAST = 0.5
+TUNNEL_SHARE = 0.5
 """Motion in a step, as a share of a body's size, below which nothing passes unseen."""
 SPACING = 0.25
 """Distance of the places that are computed, as a share of a body's size."""
-MOST_PLACES = 64
+MAX_PLACES = 64
 """Places that are computed in one step, at most."""
-MOST_TURN = 1.0
+MAX_TURN = 1.0
 """[rad] Rotation in a step beyond which the path of a body that is no ball is unknown between its ends."""
 
 
@@ -188,7 +188,7 @@ def _closest(rollout: Rollout, record: Record) -> list[ClosestApproach]:
     gaps, loaded = record.motion.contact_gap[:-1], acting(record.motion)
     near = [each for each in surface_pairs(rollout) if not loaded[:, list(each.columns)].any()]
     least = [gaps[:, list(each.columns)].min(axis=1) for each in near]
-    order = np.argsort([float(np.min(each)) for each in least], kind="stable")[:MOST]
+    order = np.argsort([float(np.min(each)) for each in least], kind="stable")[:MAX_MISSES]
     found = (_around(near[i], record, int(least[i].argmin())) for i in order)
     return [approach for approach in found if approach.gap > 0]
 
@@ -213,7 +213,7 @@ def _touches(rollout: Rollout, record: Record) -> list[ClosestApproach]:
         each for each in surface_pairs(rollout) if loaded[:, list(each.columns)].any() and not held & {*each.bodies}
     ]
     starts = [int(loaded[:, list(each.columns)].any(axis=1).argmax()) for each in touching]
-    first = sorted(range(len(starts)), key=lambda i: starts[i])[:MOST]
+    first = sorted(range(len(starts)), key=lambda i: starts[i])[:MAX_MISSES]
     found = (_through(touching[i], record, starts[i]) for i in first if starts[i] > 0)
     return [approach for approach in found if approach is not None]
 
@@ -221,7 +221,7 @@ def _touches(rollout: Rollout, record: Record) -> list[ClosestApproach]:
 def _through(pair: SurfacePair, record: Record, k: int) -> ClosestApproach | None:
     """Return the deepest point of the flight through each other; None if it does not come out again."""
     rollout = pair.rollout
-    steps = min(LONGEST, rollout.steps - k)
+    steps = min(MAX_STEPS, rollout.steps - k)
     after = np.arange(steps * INSTANTS_PER_STEP + 1) * rollout.dt / INSTANTS_PER_STEP
     gaps = pair.least(_flown(pair, record, k, after), record.arrays.p)
     inside = gaps < 0
@@ -309,12 +309,12 @@ def tunnelling(rollout: Rollout, record: Record) -> dict[str, Any]:
 def _fast_steps(pair: SurfacePair, record: Record, size: float) -> list[tuple[int, Array]]:
     """Return the steps with fast relative motion, each with the fractions of the step to look at."""
     way = np.linalg.norm(np.diff(relative(pair, record), axis=0), axis=1)
-    outside = record.motion.contact_gap[:-1, list(pair.columns)].min(axis=1) > -FAST * size
-    fast = outside & (way > FAST * size)
+    outside = record.motion.contact_gap[:-1, list(pair.columns)].min(axis=1) > -TUNNEL_SHARE * size
+    fast = outside & (way > TUNNEL_SHARE * size)
     if not _balls(pair):
         spin = np.linalg.norm(record.motion.angular_velocity[:-1, list(pair.bodies)], axis=2).max(axis=1)
-        fast &= spin * pair.rollout.dt < MOST_TURN
-    counts = np.minimum(np.ceil(way / (SPACING * size)), MOST_PLACES)
+        fast &= spin * pair.rollout.dt < MAX_TURN
+    counts = np.minimum(np.ceil(way / (SPACING * size)), MAX_PLACES)
     return [(int(k), np.linspace(0, 1, int(counts[k]) + 1)[1:]) for k in np.flatnonzero(fast)]
 
 

@@ -24,17 +24,17 @@ SETTLED = 1e-3
 """Residuals below this share of the largest impulse are negligible."""
 UNSETTLED = 5e-2
 """Residuals above this share of the largest impulse mean that impulses have not settled."""
-LEFT = 1e-4
+LEFT_RESIDUAL = 1e-4
 """Residuals below this share of the largest impulse leave no significant velocity error."""
 CYCLING = 0.5
 """Share of a residual left by twice the sweeps above which the solver cycles and more sweeps do not help."""
-MOST_STEPS = 5
+MAX_STEPS = 5
 """Steps with the largest velocity errors, which are followed further."""
 LATER = 10
 """Steps after which a velocity error counts."""
 ROUNDING = 1e-9
 """Relative changes below this are rounding, and show no order of convergence."""
-TRIED = (1e-3, 1e-2, 1e-1)
+TRIED_SMOOTHING = (1e-3, 1e-2, 1e-1)
 """[m/s] Smoothings that are tried where the problem itself has none."""
 
 
@@ -110,7 +110,7 @@ def left(transcription: Transcription, record: Record, residual: float, impulse:
     """
     rollout, arrays, motion = transcription.timed(record).rollout, record.arrays, record.motion
     free = [group[0] for group in floating(rollout) if len(group) == 1]
-    if not (free and residual > LEFT * impulse > 0):
+    if not (free and residual > LEFT_RESIDUAL * impulse > 0):
         return {}
     finer = finer_problem(transcription, MORE_SWEEPS).timed(record).rollout
     p = np.tile(arrays.p[:, None], rollout.steps)
@@ -120,7 +120,7 @@ def left(transcription: Transcription, record: Record, residual: float, impulse:
     numbers, settled = bodies(rollout, record), np.array(after).T
     off = scale[:, None] * speeds(rollout, numbers, settled - arrays.x[1:])[:, free]
     stays = np.zeros_like(off)
-    for k in np.argsort(-off.max(axis=1), kind="stable")[:MOST_STEPS]:
+    for k in np.argsort(-off.max(axis=1), kind="stable")[:MAX_STEPS]:
         x, end = settled[k], min(k + 1 + LATER, rollout.steps)
         for later in range(k + 1, end):
             x = np.array(rollout.report(x, arrays.u[later], arrays.p, 0.0)[0]).ravel()
@@ -181,14 +181,14 @@ def smoothed(transcription: Transcription, record: Record) -> list[dict[str, Any
     """Compare the exact motion of ``record`` with smoothed rollouts.
 
     Returns:
-        For each "smoothing" [m/s] of the problem's own stages, or of ``TRIED`` where it has none, the "objective" and
-        the "worst" error / tolerance and "costs", the sum of what is minimised; "own" says which of the two it is.
+        For each "smoothing" [m/s] of the problem's own stages, or of ``TRIED_SMOOTHING`` where it has none, the
+        "objective", the "worst" error / tolerance and "costs", the sum of what is minimised; "own" says which it is.
         "moved": how far bodies get from their places in the exact motion, as a share of the longest way of one.
     """
     z = record.z
     own = [smoothing for smoothing in transcription.problem.simulation.smoothing if smoothing > 0]
     rows = []
-    for smoothing in own or TRIED:
+    for smoothing in own or TRIED_SMOOTHING:
         verdict = transcription.judge(z, smoothing)
         found = {"objective": verdict.objective, "worst": verdict.worst, "costs": sum(verdict.costs.values())}
         moved = _moved(record, transcription, smoothing)

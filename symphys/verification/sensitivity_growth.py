@@ -18,7 +18,7 @@ from symphys.types import Array
 from symphys.verification.bodies import bodies
 
 DIRECTIONS = 4
-MOST_SAMPLES = 200
+MAX_SAMPLES = 200
 
 
 def sensitivity_growth(transcription: Transcription, record: Record) -> dict[str, list[float]]:
@@ -33,7 +33,7 @@ def sensitivity_growth(transcription: Transcription, record: Record) -> dict[str
     count = len(state_columns(rollout))
     ends = np.linalg.qr(np.random.default_rng(2).standard_normal((count, min(DIRECTIONS, count))))[0]
     factors = np.full(rollout.steps + 1, np.nan)
-    keep = samples(rollout.steps + 1, MOST_SAMPLES)
+    keep = samples(rollout.steps + 1, MAX_SAMPLES)
     kept = set(keep.tolist())
     for k, swept in backwards(transcription, record, ends):
         if not np.isfinite(swept).all():

@@ -75,7 +75,7 @@ def _rows(block: VariableBlock, side: str, gains: Array, least: float) -> list[d
     return rows
 
 
-MOST_COMPONENTS = 16
+MAX_COMPONENTS = 16
 """Components of targets up to which contradictions are searched."""
 MORE_SAMPLES = 2
 """Points beside z in addition to one for each component."""
@@ -91,7 +91,7 @@ BALANCED = 0.05
 """The gradients of targets and of all else cancel where their sum is below this share of the sum of their lengths."""
 NEARER = 0.5
 """A step towards targets that can be met leaves less than this share of what is missed; a linear one leaves 0.25."""
-SHARE = 0.05
+MIN_SHARE = 0.05
 """Targets with less than this share of the largest part are not named."""
 
 
@@ -208,7 +208,7 @@ def opposed(slopes: Array, fixed: NDArray[np.bool_]) -> list[int]:
     lengths = np.linalg.norm(slopes, axis=1)
     if float(np.linalg.norm(slopes.sum(axis=0))) > OPPOSED * float(lengths.sum()):
         return []
-    parts = np.flatnonzero(lengths > max(SHARE * float(lengths.max(initial=0.0)), NO_CHANGE))
+    parts = np.flatnonzero(lengths > max(MIN_SHARE * float(lengths.max(initial=0.0)), NO_CHANGE))
     return parts.tolist() if parts.size > 1 else []
 
 
@@ -257,7 +257,7 @@ def contradicting(
     """
     here = joined(samples)
     owners = np.repeat(np.arange(len(samples)), [sample.value.size for sample in samples])
-    if here.size > MOST_COMPONENTS:
+    if here.size > MAX_COMPONENTS:
         return []
     changes = _changes(transcription, samples, z, free)
     if changes is None:
@@ -267,7 +267,7 @@ def contradicting(
     if float(np.linalg.norm(part)) <= np.sqrt(len(samples)):
         return []
     shares = np.array([np.linalg.norm(part[owners == i]) for i in range(len(samples))])
-    found = np.flatnonzero(shares > SHARE * shares.max())
+    found = np.flatnonzero(shares > MIN_SHARE * shares.max())
     return found.tolist() if found.size > 1 else []
 
 

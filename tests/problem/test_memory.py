@@ -63,7 +63,7 @@ def test_one_that_is_not_varied_takes_less(tmp_path: Path, monkeypatch: pytest.M
     """The numbers of a variable take more than weights that stay as they are."""
     text = BALL + NET.replace("WIDTH", "300")
     size = 300 * 300 + 6 * 300 + 603
-    monkeypatch.setattr(limits, "available", lambda: limits.WEIGHT * size + 1e6)
+    monkeypatch.setattr(limits, "available", lambda: limits.BYTES_OF_WEIGHT * size + 1e6)
     assert load(tmp_path, text).controllers[0].numbers["weights"].size == size
     assert "c" in refused(tmp_path, text + WEIGHTS)
 
@@ -72,7 +72,7 @@ def test_one_that_is_not_varied_takes_less(tmp_path: Path, monkeypatch: pytest.M
 def test_steps_and_knots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Which key is to be changed is the one that brings it over what there is."""
     states = 20
-    monkeypatch.setattr(limits, "available", lambda: limits.steps_need(states, 100) + 300 * limits.NUMBER)
+    monkeypatch.setattr(limits, "available", lambda: limits.steps_need(states, 100) + 300 * limits.BYTES_OF_NUMBER)
     assert load(tmp_path, BALL + PUSH).variables[0].knots == 100
     assert 'variable "more".knots: the steps, and all knots up to these, take' in refused(
         tmp_path, BALL + PUSH + PUSH.replace("push", "more").replace("force", "torque")
@@ -92,15 +92,15 @@ def test_the_estimate_of_what_a_variable_takes_is_of_the_right_order(tmp_path: P
     weights = load(tmp_path, text).controllers[0].numbers["weights"].size
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert 0.3 < peak / (weights * (limits.WEIGHT + limits.NUMBER)) < 2
+    assert 0.3 < peak / (weights * (limits.BYTES_OF_WEIGHT + limits.BYTES_OF_NUMBER)) < 2
 
 
 def test_what_a_group_of_processes_may_use_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No limit where the file says "max", or is not there."""
-    monkeypatch.setattr(limits, "LIMITS", ())
+    monkeypatch.setattr(limits, "CGROUP_LIMITS", ())
     whole = limits.available()
     assert whole > 1e8
     for text, expected in (("1000000\n", 1e6), ("max\n", whole), (f"{2**62}\n", whole)):
         (tmp_path / "memory.max").write_text(text)
-        monkeypatch.setattr(limits, "LIMITS", (tmp_path / "memory.max", tmp_path / "none"))
+        monkeypatch.setattr(limits, "CGROUP_LIMITS", (tmp_path / "memory.max", tmp_path / "none"))
         assert limits.available() == expected

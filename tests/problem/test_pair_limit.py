@@ -28,7 +28,7 @@ from symphys.model.shapes import (
 )
 from symphys.model.world import Law
 from symphys.problem import Problem
-from symphys.problem.limits import MOST_POINTS
+from symphys.problem.limits import MAX_POINTS
 from symphys.problem.parametric.collision_filter import KINDS, CollisionFilter
 from symphys.problem.parametric.parts import PairRule, ParametricBody, ParametricStatic, Part
 from symphys.problem.parametric.world import ParametricWorld
@@ -79,7 +79,7 @@ def test_what_may_not_meet_does_not_count(load: Load) -> None:
 
 @pytest.mark.slow
 def test_the_most_that_is_allowed(load: Load, refused: Refused) -> None:
-    assert MOST_POINTS == 2000
+    assert MAX_POINTS == 2000
     text = BASE + crowd(2000 // DOWN, 'collides_with = ["ground"]')
     assert len(load(text=text).world().pairs) == 2000
     more = text + '[[body]]\nname = "one"\nshape = { sphere = { radius = 1 } }\nmass = 1\ncollides_with = ["ground"]\n'
@@ -126,9 +126,7 @@ def test_the_work_of_counting_grows_as_the_number_of_parts(keys: dict[str, Any])
     """Not as that of pairs: twice as many parts take at most twice as many lines."""
 
     def count(parts: list[Part]) -> None:
-        assert (
-            CollisionFilter([*parts, ParametricStatic(Plane.ground(), {})], []).count(MOST_POINTS).points > MOST_POINTS
-        )
+        assert CollisionFilter([*parts, ParametricStatic(Plane.ground(), {})], []).count(MAX_POINTS).points > MAX_POINTS
 
     few, many = (lines_of(partial(count, plans(n, **keys))) for n in (600, 1200))
     assert 600 < few < many <= 2.1 * few
@@ -180,7 +178,7 @@ def test_classes_meet_as_their_members_do(seed: int) -> None:
             expected.append((i, j))
     assert list(plan.collision_pairs) == expected
     points = sum(contact_points(s, t) for i, j in expected for s in parts[i].surfaces for t in parts[j].surfaces)
-    assert CollisionFilter(parts, tables).count(MOST_POINTS).points == points
+    assert CollisionFilter(parts, tables).count(MAX_POINTS).points == points
     assert len(plan.world({}).pairs) == points
 
 

@@ -1,4 +1,4 @@
-"""What every kind of controller gives."""
+"""The interface of every kind of controller."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from symphys.types import Expr
 
 
 class DeclaredLaw(Protocol):
-    """What a kind of controller says of its table in problem files; see ``CONTROLLERS``.
+    """The declaration of a kind of controller for its table in problem files; see ``CONTROLLERS``.
 
     Its other fields with metadata are keys of the table too; see ``symphys.model.numbers``.
 

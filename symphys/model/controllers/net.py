@@ -17,7 +17,7 @@ ACTIVATIONS: tuple[Activation, ...] = ("tanh", "relu", "linear")
 
 
 class Layer(NamedTuple):
-    """One matrix product among the weights.
+    """A matrix product among the weights.
 
     Attributes:
         inputs, outputs: its size.

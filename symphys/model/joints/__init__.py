@@ -1,4 +1,4 @@
-"""What joints are: which motions of one body against another they lock, and what acts along those that they leave."""
+"""Joints: the relative motions of two bodies that they lock, and what acts along those that they leave."""
 
 from symphys.model.joints.ball import BALL, BallJoint
 from symphys.model.joints.coupling import CouplingSpec, JointCoupling

@@ -13,7 +13,7 @@ FIXED = Kind("fixed", turns=((0, 1), (1, 2), (2, 0)))
 
 @dataclass(frozen=True)
 class FixedJoint(JointSpec):
-    """Nothing is left free."""
+    """A joint without degrees of freedom."""
 
     summary: ClassVar[str] = "no degrees of freedom"
     anywhere: ClassVar[bool] = True

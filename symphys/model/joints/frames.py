@@ -1,4 +1,4 @@
-"""Where the frames of a joint are: from a point or anchors, from axes, and from where the bodies lie.
+"""The frames of a joint, from a point or anchors, from axes, and from the poses of the bodies.
 
 A fault is a ValueError whose text completes the name of what is wrong: "must be perpendicular".
 """
@@ -18,15 +18,15 @@ from symphys.types import Array
 Vector = Sequence[float] | Array
 WORLD = "world"
 """What joints call that which stands still."""
-MEET = 1e-6
+MEETING_TOLERANCE = 1e-6
 """How far the anchors of a joint may be apart at the start [m]."""
-SQUARE = 1e-6
+SQUARE_TOLERANCE = 1e-6
 """Largest cosine of the angle between axes that count as perpendicular."""
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a body lies: (3,) [m], and (3, 3) from its frame to the world's."""
+    """The pose of a body: (3,) [m], and (3, 3) from its frame to the world's."""
 
     position: Array
     axes: Array
@@ -67,10 +67,10 @@ def check_meeting(poses: Sequence[Pose], anchors: Sequence[Array]) -> None:
     """ValueError unless the anchors of the first and of the second side are in one place."""
     places = [pose.to_world(anchor) for pose, anchor in zip(poses, anchors, strict=True)]
     distance = float(np.linalg.norm(places[0] - places[1]))
-    if not distance <= MEET:
+    if not distance <= MEETING_TOLERANCE:
         first, second = (", ".join(f"{x:.6g}" for x in place) for place in reversed(places))
         text = f"are {distance:.6g} m apart at the start, at [{first}] and [{second}] in the world; they must meet"
-        raise ValueError(f"{text}, to {MEET:g} m")
+        raise ValueError(f"{text}, to {MEETING_TOLERANCE:g} m")
 
 
 def single_axis(axis: Vector) -> Array:
@@ -86,7 +86,7 @@ def two_axes(axes: Sequence[Vector]) -> Array:
     """
     y, x = (unit(axis) for axis in axes)
     cosine = float(np.clip(x @ y, -1, 1))
-    if abs(cosine) > SQUARE:
+    if abs(cosine) > SQUARE_TOLERANCE:
         angle = float(np.rad2deg(np.arccos(cosine)))
         raise ValueError(f"must be perpendicular; the angle between them is {angle:.6g} degrees")
     return about(x, y)

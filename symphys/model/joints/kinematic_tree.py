@@ -1,4 +1,4 @@
-"""Which bodies hang together by rigid joints, as trees: their velocities are those of coordinates that joints leave.
+"""Kinematic trees: bodies that rigid joints connect, whose velocities are those of the joints' coordinates.
 
 Joints that close a loop or are soft are no part of a tree; sweeps project them as they project contacts.
 """

@@ -32,7 +32,7 @@ DIRECTION = table_key("direction", f"about or along which the second body moves:
 
 @dataclass(frozen=True)
 class JointSpec:
-    """What all joints have.
+    """The data that all joints share.
 
     Attributes:
         name: how states, commands and formulas refer to it.
@@ -128,7 +128,7 @@ class MovingJoint(JointSpec):
 
     @property
     def start_coordinates(self) -> tuple[float, ...]:
-        """One for each coordinate, empty if all are 0; ValueError for a wrong number of them or one out of bounds."""
+        """Return one for each coordinate, empty if all are 0; ValueError for a wrong number or one out of bounds."""
         bounds = self.bounds
         if self.start is None:
             return ()

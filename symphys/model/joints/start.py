@@ -89,7 +89,7 @@ def moved_to_zero(joints: Sequence[NamedJoint], state: Mapping[str, Array]) -> S
 
 
 def unmoved(joint: NamedJoint, tree: Tree) -> str:
-    """Why a joint cannot have a ``start`` of its own, "closes a loop"; empty if it can."""
+    """Return the reason why a joint cannot have a ``start`` of its own, "closes a loop"; empty if it can."""
     if joint.name in tree[joint.first]:
         return ""
     return "gives way" if joint.frequency else "closes a loop"

@@ -9,7 +9,7 @@ from math import hypot
 from typing import Any, ClassVar, Self
 
 from symphys.model.scalar import Scalar, is_zero
-from symphys.model.shapes.shape import FLATTEST, UPRIGHT, RoundedHull, SizeKey, SolidShape
+from symphys.model.shapes.shape import MIN_FLATNESS, UPRIGHT, RoundedHull, SizeKey, SolidShape
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,11 @@ class Box(SolidShape):
     def flatness(self) -> str:
         """Implement ``SolidShape.flatness``."""
         least, most = 2 * min(self.half_sizes), 2 * max(self.half_sizes)
-        if least >= FLATTEST * most:
+        if least >= MIN_FLATNESS * most:
             return ""
         return (
-            f"the smallest edge, {least:g} m, is less than {FLATTEST:g} of the largest, {most:g} m: that is no solid; "
-            f"make it {FLATTEST * most:g} m or more, or use a [[plane]] for a wall"
+            f"the smallest edge, {least:g} m, is less than {MIN_FLATNESS:g} of the largest, {most:g} m: that is no "
+            f"solid; make it {MIN_FLATNESS * most:g} m or more, or use a [[plane]] for a wall"
         )
 
     @property

@@ -8,7 +8,7 @@ from math import pi
 from typing import Any, ClassVar, Self
 
 from symphys.model.scalar import Scalar
-from symphys.model.shapes.shape import FLATTEST, UPRIGHT, RoundedHull, SizeKey, SolidShape
+from symphys.model.shapes.shape import MIN_FLATNESS, UPRIGHT, RoundedHull, SizeKey, SolidShape
 from symphys.model.shapes.sphere import SOLID_SPHERE
 
 
@@ -87,8 +87,8 @@ class Capsule(SolidShape):
     def flatness(self) -> str:
         """Implement ``SolidShape.flatness``."""
         least, most = sorted((2 * self.radius, 2 * self.half_length))
-        if least >= FLATTEST * most:
+        if least >= MIN_FLATNESS * most:
             return ""
         thin = self.radius < self.half_length
-        remedy = f"make the radius {FLATTEST * most / 2:g} m or more" if thin else "use a sphere"
+        remedy = f"make the radius {MIN_FLATNESS * most / 2:g} m or more" if thin else "use a sphere"
         return f"radius {self.radius:g} m and length {2 * self.half_length:g} m are of sizes too different; {remedy}"

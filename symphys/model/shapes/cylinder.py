@@ -8,7 +8,7 @@ from math import cos, hypot, pi, sin
 from typing import Any, ClassVar, Self
 
 from symphys.model.scalar import Scalar
-from symphys.model.shapes.shape import FLATTEST, UPRIGHT, RoundedHull, SizeKey, SolidShape
+from symphys.model.shapes.shape import MIN_FLATNESS, UPRIGHT, RoundedHull, SizeKey, SolidShape
 
 DRAWN = 24
 """Corners of a rim in pictures."""
@@ -80,9 +80,9 @@ class Cylinder(SolidShape):
     def flatness(self) -> str:
         """Implement ``SolidShape.flatness``."""
         least, most = sorted((2 * self.radius, 2 * self.half_length))
-        if least >= FLATTEST * most:
+        if least >= MIN_FLATNESS * most:
             return ""
         thin = self.radius < self.half_length
-        remedy = f"make the {'radius' if thin else 'length'} {FLATTEST * most / (2 if thin else 1):g} m or more"
+        remedy = f"make the {'radius' if thin else 'length'} {MIN_FLATNESS * most / (2 if thin else 1):g} m or more"
         text = f"radius {self.radius:g} m and length {2 * self.half_length:g} m"
         return f"{text} are of sizes too different; {remedy}"

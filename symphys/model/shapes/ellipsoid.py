@@ -8,7 +8,7 @@ from math import cos, pi, sin
 from typing import Any, ClassVar, Self
 
 from symphys.model.scalar import Scalar
-from symphys.model.shapes.shape import FLATTEST, UPRIGHT, RoundedHull, SizeKey, SolidShape
+from symphys.model.shapes.shape import MIN_FLATNESS, UPRIGHT, RoundedHull, SizeKey, SolidShape
 
 DRAWN = 16
 """Meridians in pictures, and half as many circles of latitude."""
@@ -80,9 +80,9 @@ class Ellipsoid(SolidShape):
     def flatness(self) -> str:
         """Implement ``SolidShape.flatness``."""
         least, most = min(self.radii), max(self.radii)
-        if least >= FLATTEST * most:
+        if least >= MIN_FLATNESS * most:
             return ""
         return (
-            f"the smallest radius, {least:g} m, is less than {FLATTEST:g} of the largest, {most:g} m: that is no "
-            f"solid; make it {FLATTEST * most:g} m or more"
+            f"the smallest radius, {least:g} m, is less than {MIN_FLATNESS:g} of the largest, {most:g} m: that is no "
+            f"solid; make it {MIN_FLATNESS * most:g} m or more"
         )

@@ -7,10 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from symphys.model.shapes.shape import FLATTEST
+from symphys.model.shapes.shape import MIN_FLATNESS
 from symphys.types import Array, Ints
 
-COPLANAR = 1e-6
+COPLANAR_TOLERANCE = 1e-6
 """Faces whose planes agree to this, by the size of the hull, are one."""
 
 
@@ -49,7 +49,7 @@ def hull_of(points: Corners) -> Hull | None:
     given = np.array(points, float)
     middle = given.mean(axis=0)
     extent = np.linalg.svd(given - middle, compute_uv=False)
-    if len(given) < 4 or extent[2] < FLATTEST * extent[0]:
+    if len(given) < 4 or extent[2] < MIN_FLATNESS * extent[0]:
         return None
     size = float(np.abs(given - middle).max())
     try:
@@ -65,7 +65,7 @@ def hull_of(points: Corners) -> Hull | None:
     inward = (normals * planes[:, :3]).sum(axis=1) < 0
     triangles[inward] = triangles[inward][:, ::-1]
     height = ((corners - middle) / size) @ planes[:, :3].T + planes[:, 3]
-    faces = sorted({tuple(np.flatnonzero(near).tolist()) for near in (height > -COPLANAR).T})
+    faces = sorted({tuple(np.flatnonzero(near).tolist()) for near in (height > -COPLANAR_TOLERANCE).T})
     return Hull(corners, triangles, tuple(faces), *solid(corners, triangles, middle))
 
 

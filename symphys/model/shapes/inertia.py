@@ -15,7 +15,7 @@ from symphys.types import Array
 
 Tensor = list[list[Scalar]]
 """(3, 3)"""
-NOISE = 1e-14
+MOMENT_ROUNDING = 1e-14
 """Products of inertia below this share of the trace are rounding."""
 OFF_CENTRE = 1e-6
 """How far a compound's centre of mass may be from the body's origin, relative to the size of the compound."""
@@ -115,5 +115,5 @@ def inertia_of(tensor: Tensor, mass: Scalar) -> Any:
 def negligible(product: Scalar, diagonal: Sequence[Scalar]) -> bool:
     """Whether a product of inertia is zero up to rounding."""
     if all(isinstance(entry, int | float) for entry in (product, *diagonal)):
-        return bool(abs(product) <= NOISE * sum(diagonal))
+        return bool(abs(product) <= MOMENT_ROUNDING * sum(diagonal))
     return is_zero(product)

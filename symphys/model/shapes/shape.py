@@ -1,4 +1,4 @@
-"""What every shape of a body says of itself: sizes, volume, inertia, contact points, and how other formats write it.
+"""The interface of every shape of a body: sizes, volume, inertia, contact points, and its forms in other formats.
 
 A new shape is a module beside this one and an entry in ``shapes.SHAPES``; a rule in ``dynamics.collision`` computes
 each of its contact pairs. Everything else asks the shape.
@@ -16,7 +16,7 @@ from symphys.model.scalar import Scalar, is_zero
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 """The quaternion of no rotation."""
-FLATTEST = 1e-6
+MIN_FLATNESS = 1e-6
 """Least ratio of a shape's smallest size to its largest."""
 
 
@@ -43,7 +43,7 @@ class SizeKey:
 
 @dataclass(frozen=True)
 class RoundedHull:
-    """All points within a radius of the convex hull of some corners.
+    """The points within a radius of the convex hull of some corners.
 
     A sphere has one corner, a capsule two. A polytope has radius 0. A curved surface is approximated by many corners.
 
@@ -141,12 +141,12 @@ class SolidShape(ABC):
 
     @property
     def flatness(self) -> str:
-        """Why it is too flat or thin to differ from a surface or a line without volume; empty if it is not."""
+        """Return the reason why it is too flat or thin to have a volume; empty if it is not."""
         return ""
 
     @property
     def optional_fault(self) -> str:
-        """Why one of the ``optional_keys`` is impossible; empty if none is."""
+        """Return the reason why one of the ``optional_keys`` is impossible; empty if none is."""
         return ""
 
     @property

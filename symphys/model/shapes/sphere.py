@@ -62,7 +62,7 @@ class Sphere(SolidShape):
 
     @property
     def rounded_hull(self) -> RoundedHull:
-        """One corner."""
+        """Return the centre as the only corner, with the radius."""
         return RoundedHull(float(self.radius), ((0.0, 0.0, 0.0),))
 
     @property

@@ -19,7 +19,7 @@ from symphys.types import Bools, Ints
 
 KINDS = tuple(SURFACES.values())
 """All kinds of surfaces."""
-ENOUGH_ROWS = 256
+MIN_COUNTED_CLASSES = 256
 """Where there are more classes than this and already too many points, the rest need not be counted."""
 
 
@@ -45,7 +45,7 @@ class BodyClass:
 
 @dataclass
 class PairCount:
-    """How many points of contact there are to compute.
+    """The number of contact points to compute.
 
     Attributes:
         points: how many are computed in every step.
@@ -100,13 +100,13 @@ class CollisionFilter:
             found.add(int(place[c]), place[met], counts)
             bare = (pairs > 0) & (surfaces[met] @ (missing @ surfaces[c]) > 0)
             found.uncovered += [self._example(c, int(d)) for d in met[bare]]
-            if found.points > most and c >= ENOUGH_ROWS:
+            if found.points > most and c >= MIN_COUNTED_CLASSES:
                 found.whole = False
                 break
         return found
 
     def pairs(self) -> list[tuple[int, int]]:
-        """Every two parts that may touch and have surfaces, as places among the parts, in their order."""
+        """Return every two parts that may touch and have surfaces, as places among the parts, in their order."""
         found = []
         for c, met in self._rows():
             for d in met.tolist():

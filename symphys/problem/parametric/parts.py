@@ -23,7 +23,7 @@ from symphys.model.body import Body
 from symphys.model.numbers import Number, numbers_of
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Shape, Sphere, Static, Surface
-from symphys.model.shapes.inertia import NOISE, Tensor, inertia_of, specific
+from symphys.model.shapes.inertia import MOMENT_ROUNDING, Tensor, inertia_of, specific
 from symphys.model.world import Law
 
 
@@ -32,7 +32,7 @@ def distribution(tensor: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
     given = np.asarray(tensor, float)
     whole = given if given.ndim == 2 else np.diag(np.broadcast_to(given, 3))
     sigma = np.trace(whole) / 2 * np.eye(3) - whole
-    moments = np.where(np.diag(sigma) > NOISE * np.trace(whole), np.diag(sigma), 0.0)
+    moments = np.where(np.diag(sigma) > MOMENT_ROUNDING * np.trace(whole), np.diag(sigma), 0.0)
     if not np.any(whole - np.diag(np.diag(whole))):
         return tuple(moments.tolist()), (0.0, 0.0, 0.0)
     width = np.sqrt(moments)
@@ -193,7 +193,7 @@ def less(point: Any, shift: Any) -> tuple[Scalar, ...]:
 
 
 def _times(numbers: Any, factor: float) -> Any:
-    """Each number in nested tuples, times a factor; None stays."""
+    """Multiply each number in nested tuples by a factor; None stays."""
     if isinstance(numbers, tuple):
         return tuple(_times(each, factor) for each in numbers)
     return None if numbers is None else numbers * factor
@@ -254,7 +254,7 @@ Part = ParametricBody | ParametricStatic
 
 @dataclass(frozen=True)
 class PairRule:
-    """What a [[pair]] table states between two surfaces or groups; ``states`` holds any coefficients of a law.
+    """The content of a [[pair]] table of two surfaces or groups; ``states`` holds any coefficients of a law.
 
     ``between`` has one name where a group meets itself.
     """

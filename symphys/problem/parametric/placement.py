@@ -1,4 +1,4 @@
-"""Where bodies begin: joints with a ``start``, and anchors, centres of mass and starts of joints that vary.
+"""The placement of bodies at the start: joints with a ``start``, and anchors, centres of mass and starts that vary.
 
 A subtree moves with its joint's anchor, and a robot goes on standing on the ground. A body whose centre of mass varies
 stays where it is: what a state has as its position is another point of it.

@@ -63,7 +63,7 @@ class ParametricWorld:
     sites: tuple[ParametricSite, ...] = ()
 
     def parameters(self) -> dict[str, Array]:
-        """Every parameter with its value: (1,), or (3,) for gravity, the size of a box and the place of a block."""
+        """Return every parameter: (1,), or (3,) for gravity, the size of a box and the place of a block."""
         found: dict[str, Numbers] = {"gravity": self.gravity, **self.contact_parameters}
         for part in self.owners_of_numbers:
             found |= part.parameters()
@@ -71,7 +71,7 @@ class ParametricWorld:
 
     @cached_property
     def numbers(self) -> dict[str, Number]:
-        """What is known of each of the ``parameters``, by name."""
+        """Return the declarations of the ``parameters``, by name."""
         found = {"gravity": Number("m/s^2", phase="start")}
         found |= {name: COEFFICIENTS[name.rpartition(".")[2]] for name in self.contact_parameters}
         for part in self.owners_of_numbers:
@@ -155,7 +155,7 @@ class ParametricWorld:
 
     @cached_property
     def collision_pairs(self) -> tuple[tuple[int, int], ...]:
-        """Every two parts that may touch, as places in ``parts``: each lets the other, and nothing forbids it."""
+        """Return every two parts that may touch, as places in ``parts``: both allow it, and no rule forbids it."""
         return tuple(CollisionFilter(self.parts, (*self.pairs, *self.jointed)).pairs())
 
     @cached_property

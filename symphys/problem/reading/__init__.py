@@ -1,1 +1,1 @@
-"""From a path to parsed tables, and how faults of a file are collected and worded."""
+"""Parsed tables from a path, and the faults of a file with their wording."""

@@ -16,7 +16,7 @@ Place = Sequence[str | int]
 
 @dataclass(frozen=True)
 class SourceLocation:
-    """Where something was written: the file's name, its parsed content, and the place there."""
+    """The file, its parsed content, and the place there at which something was written."""
 
     file: str
     data: Mapping[str, Any]

@@ -1,4 +1,4 @@
-"""From a path to parsed TOML, whose numbers are small enough to be computed with."""
+"""Read and parse TOML, and check that its numbers are small enough to be computed with."""
 
 from __future__ import annotations
 
@@ -81,24 +81,24 @@ def parse_toml(path: Path, text: str) -> dict[str, Any]:
         raise refuse(path, f"this is not valid TOML: {reason}") from None
 
 
-LARGEST = 1e150
+MAX_NUMBER = 1e150
 """Largest absolute value of a number; its square is finite."""
-TOO_LARGE = f"is too large to be computed with; numbers are from {-LARGEST:g} to {LARGEST:g}"
-OWN = ("solver", "recording")
+TOO_LARGE = f"is too large to be computed with; numbers are from {-MAX_NUMBER:g} to {MAX_NUMBER:g}"
+UNCHECKED_TABLES = ("solver", "recording")
 """Tables that are not checked: their numbers go to libraries, or have a range of their own."""
-APART = ("axis", "axes", "normal", "mass", "density", "inertia", "noise")
+UNCHECKED_KEYS = ("axis", "axes", "normal", "mass", "density", "inertia", "noise")
 """Keys that are not checked: directions, whose length does not matter, and numbers with a range of their own."""
-MOST = 3
+MAX_FAULTS = 3
 """Largest number of faults of one table that are named."""
 
 
 def check_range(data: Mapping[str, Any], faults: Faults) -> None:
     """Name the finite numbers of a file that are too large."""
     for key, table in data.items():
-        if key in OWN:
+        if key in UNCHECKED_TABLES:
             continue
         for count, (place, value) in enumerate(_beyond((key,), table)):
-            if count < MOST:
+            if count < MAX_FAULTS:
                 faults.add(place, f"{_shown(value)} {TOO_LARGE}")
 
 
@@ -108,10 +108,12 @@ def _beyond(place: Place, value: Any) -> Iterator[tuple[Place, float]]:
     while stack:
         where, here = stack.pop()
         if isinstance(here, Mapping):
-            stack += [((*where, str(key)), each) for key, each in reversed(list(here.items())) if key not in APART]
+            stack += [
+                ((*where, str(key)), each) for key, each in reversed(list(here.items())) if key not in UNCHECKED_KEYS
+            ]
         elif isinstance(here, list | tuple):
             stack += [((*where, k), each) for k, each in reversed(list(enumerate(here)))]
-        elif isinstance(here, int | float) and LARGEST < abs(here) < math.inf:
+        elif isinstance(here, int | float) and MAX_NUMBER < abs(here) < math.inf:
             yield where, here
 
 

@@ -21,7 +21,7 @@ from symphys.types import Array
 
 
 class RecordingFault(ValueError):
-    """Why numbers are no recording.
+    """Numbers that are no recording.
 
     Attributes:
         key: of the [[recording]] table that it concerns, or the place below that table.
@@ -91,12 +91,12 @@ class RecordedColumns:
         return np.column_stack([self.values[name] for name in names])
 
 
-CHUNK = 1 << 23
+CHUNK_BYTES = 1 << 23
 """Bytes."""
-LONGEST_LINE = 1 << 20
+MAX_LINE_BYTES = 1 << 20
 """Bytes; a longer one is no line of a table."""
 DELIMITERS = ",;\t"
-MISSING = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
+MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
 """Cells that are a missing number, in small letters."""
 
 
@@ -124,7 +124,7 @@ def read_csv(stream: BinaryIO, label: str, wanted: set[str]) -> RecordedColumns:
         return RecordedColumns(label, {}, header.names, 2)
     places = [k for k, name in enumerate(header.names) if name in wanted]
     begins = stream.tell()
-    most = sum(part.count(b"\n") for part in iter(lambda: stream.read(CHUNK), b"")) + 1
+    most = sum(part.count(b"\n") for part in iter(lambda: stream.read(CHUNK_BYTES), b"")) + 1
     stream.seek(begins)
     values, filled = np.empty((most, len(places))), 0
     for chunk in whole_lines(stream, label):
@@ -139,7 +139,7 @@ def read_csv(stream: BinaryIO, label: str, wanted: set[str]) -> RecordedColumns:
 
 def read_header(stream: BinaryIO, label: str) -> Header:
     """The first line, of names that differ; the stream then stands at the second."""
-    line = stream.readline(LONGEST_LINE)
+    line = stream.readline(MAX_LINE_BYTES)
     try:
         text = line.decode("utf-8-sig").strip("\r\n").removeprefix("#")  # numpy.savetxt writes one
     except UnicodeDecodeError:
@@ -176,10 +176,10 @@ def is_number(text: str) -> bool:
 def whole_lines(stream: BinaryIO, label: str) -> Iterator[bytes]:
     """The rest of the file in chunks that end with a line."""
     rest = b""
-    while chunk := stream.read(CHUNK):
+    while chunk := stream.read(CHUNK_BYTES):
         end = chunk.rfind(b"\n") + 1
-        if not end and len(rest) > LONGEST_LINE:
-            raise RecordingFault("files", f"{label} has a line of over {LONGEST_LINE:,} bytes; it is no CSV file")
+        if not end and len(rest) > MAX_LINE_BYTES:
+            raise RecordingFault("files", f"{label} has a line of over {MAX_LINE_BYTES:,} bytes; it is no CSV file")
         if end:
             yield rest + chunk[:end]
             rest = b""
@@ -257,7 +257,7 @@ def cell_by_cell(chunk: bytes, header: Header, places: Sequence[int], label: str
 def number(cell: str, where: str) -> float:
     """A finite number, NaN where it is missing; RecordingFault that says where it is none."""
     text = cell.strip()
-    if text.lower() in MISSING:
+    if text.lower() in MISSING_WORDS:
         return np.nan
     try:
         value = float(text) if "_" not in text else None
@@ -274,7 +274,7 @@ def number(cell: str, where: str) -> float:
     return value
 
 
-MOST_BYTES = 2**29
+MAX_BYTES = 2**29
 """[bytes] Largest memory of the arrays of one recording: some 67 million numbers."""
 
 
@@ -291,7 +291,7 @@ def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -
         RecordingFault: names the array.
     """
     try:
-        names, arrays = read_arrays(stream, wanted if rows is None else {*wanted, rows}, MOST_BYTES)
+        names, arrays = read_arrays(stream, wanted if rows is None else {*wanted, rows}, MAX_BYTES)
     except OSError as error:
         raise RecordingFault("files", f"{label} cannot be read: {error.strerror or 'it is no NPZ file'}") from None
     except ArchiveError as error:

@@ -1,4 +1,4 @@
-"""From columns to quantities of the engine: times, units, order of quaternions, the frame of the measurement system."""
+"""Conversion of columns to quantities: times, units, order of quaternions, the frame of the measurement system."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MIN_ROWS = 2
 """Samples of a recording."""
 MAX_STEPS = 1e15
 """Steps: more are not told apart."""
-SLACK = 1e-9
+TIME_TOLERANCE = 1e-9
 """Relative, of the end of the simulation."""
 
 
@@ -54,11 +54,11 @@ def read_times(
             time = columns.numbers(name, "time")[first:last] * table.time_factor
         check_order(time, columns, first, name)
     time = time - (time[0] if from_first_row(table) else 0.0) + table.offset
-    if time[0] < -SLACK * duration:
+    if time[0] < -TIME_TOLERANCE * duration:
         text = f"{where}: the time {time[0]:g} s is before the start of the simulation"
         raise RecordingFault("offset", f'{text}; add offset = {-time[0]:g}, or clock = "first row"')
     time = np.maximum(time, 0.0)
-    kept = len(time) if table.until is None else int(np.searchsorted(time, table.until * (1 + SLACK), "right"))
+    kept = len(time) if table.until is None else int(np.searchsorted(time, table.until * (1 + TIME_TOLERANCE), "right"))
     if kept < MIN_ROWS:
         raise RecordingFault("until", f"{where}: only {kept} samples of this recording are before {table.until:g} s")
     found = np.where(within(time[:kept], duration), np.minimum(time[:kept], duration), time[:kept])
@@ -93,7 +93,7 @@ def check_order(time: Array, columns: RecordedColumns, first: int, name: str) ->
 
 def within(time: Array, duration: float) -> NDArray[np.bool_]:
     """(n,): whether times are not after the end of the simulation, but for rounding."""
-    return np.asarray(time <= duration * (1 + SLACK))
+    return np.asarray(time <= duration * (1 + TIME_TOLERANCE))
 
 
 def check_ends(recordings: Sequence[Recording], duration: float, dt: float) -> None:
@@ -116,7 +116,7 @@ def check_ends(recordings: Sequence[Recording], duration: float, dt: float) -> N
 
 def steps_until(end: float, dt: float) -> int:
     """The time steps after which a sample at ``end`` [s] lies within the simulation, at least one."""
-    return max(1, ceil(min(end / dt * (1 - SLACK), MAX_STEPS)))
+    return max(1, ceil(min(end / dt * (1 - TIME_TOLERANCE), MAX_STEPS)))
 
 
 def steps_apart(time: Array, dt: float) -> float:
@@ -130,7 +130,7 @@ PLACED = "position"
 TURNED = frozenset({*INPUT_FIELDS, *(kind.key for kind in SENSOR_KINDS if kind.axes == "world")} - {PLACED})
 """Fields of vectors in world coordinates, which a frame turns."""
 ORIENTATION = "orientation"
-LARGEST = 1e30
+MAX_MEASUREMENT = 1e30
 """In the unit of the engine: larger numbers mark what is missing in some programs, and have no finite squares."""
 LENGTH = "m"
 """The unit of lengths."""
@@ -140,7 +140,7 @@ MAX_LENGTH_ERROR = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class MeasurementFrame:
-    """Where the measurement system lies in the world: origin (3,) [m] and unit quaternion (4,) of its axes."""
+    """The frame of the measurement system in the world: origin (3,) [m] and unit quaternion (4,) of its axes."""
 
     position: Array
     orientation: Array
@@ -183,7 +183,7 @@ def convert(
         raise RecordingFault(
             key, f"{columns.where(int(infinite[0][0]))}: the number is not finite, after factor and offset"
         )
-    large = np.argwhere(np.abs(values) > LARGEST)
+    large = np.argwhere(np.abs(values) > MAX_MEASUREMENT)
     if large.size:
         row, column = (int(k) for k in large[0])
         text = f"the number {values[row, column]:g} is no measurement; a missing one is nan, or an empty cell"

@@ -48,10 +48,10 @@ def without_places(text: str) -> str:
 
 ARRAYS = (".npz",)
 TEXTS = (".csv", ".tsv", ".txt", ".dat")
-WILD = re.compile(r"[*?\[]")
-MOST_FILES = 10_000
+WILDCARD = re.compile(r"[*?\[]")
+MAX_FILES = 10_000
 """Of one pattern."""
-SMALL, SMALL_TOGETHER = 100_000, 200_000
+MAX_KEPT_BYTES, MAX_KEPT_BYTES_TOGETHER = 100_000, 200_000
 """Bytes of a CSV file that is kept in the text of the problem, and of all of them: each run folder has that text."""
 
 
@@ -72,7 +72,7 @@ class FileFinder:
         """The files that names and patterns mean, relative to the folder; numbers in names count as numbers."""
         names = dict[str, None]()
         for pattern in patterns:
-            wild = WILD.search(pattern) is not None
+            wild = WILDCARD.search(pattern) is not None
             matching = [name for name in self.kept if matches(name, pattern)] if wild else [pattern]
             matching = matching or globbed(pattern, folder)
             names |= dict.fromkeys(sorted(matching, key=natural))
@@ -112,14 +112,14 @@ class FileFinder:
         text = None
         size = stream.seek(0, io.SEEK_END)
         stream.seek(0)
-        if size <= min(SMALL, SMALL_TOGETHER - self._together) and path.suffix.lower() not in ARRAYS:
+        if size <= min(MAX_KEPT_BYTES, MAX_KEPT_BYTES_TOGETHER - self._together) and path.suffix.lower() not in ARRAYS:
             text = plain_text(stream.read())
             stream.seek(0)
             self._together += size if text is not None else 0
         self.found[name] = RecordedFile(name, str(path.resolve()), digest, text)
 
     def _absent(self, name: str, folder: Path, kept: RecordedFile | None, changed: bool) -> str:
-        """Why a file cannot be opened."""
+        """Return the reason why a file cannot be opened."""
         if changed:
             return f"{name} has changed since this problem was kept: its SHA-256 is another"
         if kept is not None:
@@ -149,8 +149,8 @@ def globbed(pattern: str, folder: Path) -> list[str]:
         for path in folder.glob(pattern):
             if path.is_file():
                 found.append(path.relative_to(folder).as_posix())
-            if len(found) > MOST_FILES:
-                raise RecordingFault("files", f"{quote(pattern)} matches more than {MOST_FILES:,} files")
+            if len(found) > MAX_FILES:
+                raise RecordingFault("files", f"{quote(pattern)} matches more than {MAX_FILES:,} files")
     if not found:
         parent = folder.joinpath(*parts[:-1])
         there: list[str] = []

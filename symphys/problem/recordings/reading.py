@@ -23,8 +23,8 @@ from symphys.problem.quantities import formula_units
 from symphys.problem.reading.faults import Faults
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault, read_csv, read_npz
 from symphys.problem.recordings.conversion import (
-    LARGEST,
     LENGTH,
+    MAX_MEASUREMENT,
     ORIENTATION,
     PLACED,
     TURNED,
@@ -130,7 +130,7 @@ def as_columns(table: ColumnsTable) -> ColumnsTable:
     return ColumnsTable(**{key: getattr(table, key) for key in ColumnsTable.model_fields})
 
 
-MOST = 100_000
+MAX_RECORDINGS = 100_000
 """Recordings of one table."""
 
 
@@ -152,9 +152,11 @@ def pieces(columns: RecordedColumns, starts: Array | None, split: str | None) ->
         edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0) + 1, [columns.count]])
     else:
         edges = np.array([0, columns.count])
-    if len(edges) - 1 > MOST:
+    if len(edges) - 1 > MAX_RECORDINGS:
         key = "rows" if starts is not None else "split"
-        raise RecordingFault(key, f"{columns.label} makes {len(edges) - 1:,} recordings; at most {MOST:,} are allowed")
+        raise RecordingFault(
+            key, f"{columns.label} makes {len(edges) - 1:,} recordings; at most {MAX_RECORDINGS:,} are allowed"
+        )
     return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
 
 
@@ -205,13 +207,13 @@ def held_back(wanted: bool | float | Sequence[int | str], names: Sequence[Sequen
     return chosen
 
 
-SMALLEST = 1e-30
+MIN_NOISE = 1e-30
 """Of a noise: squares of what is divided by it are numbers."""
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedWorld:
-    """What recordings are checked against.
+    """The world against which recordings are checked.
 
     Attributes:
         sample: a value for each name in formulas, as the guess has it.
@@ -320,7 +322,7 @@ class RecordedRows:
                 yield Piece(name, aliases, columns, first, last)
 
     def _check_columns(self, columns: RecordedColumns) -> None:
-        """Every column that is named must be there."""
+        """Check that every named column exists."""
         name = time_column(self.table)
         if name is not None and name not in columns.names and self.table.time is None:
             text = f'{columns.label} has no column "{name}"; name it with time = "...", or give rate [Hz]'
@@ -359,7 +361,7 @@ class RecordingReader(RecordedRows):
         self.world, self.frame = world, frame
 
     def read(self) -> list[Recording]:
-        """All recordings of the table."""
+        """Read all recordings of the table."""
         self._check_keys()
         measured = [self._measured(k, each) for k, each in enumerate(self.table.measured)]
         start = read_start_columns(self.table, self.world.sample, self.world.units, self.world.starts)
@@ -400,8 +402,10 @@ class RecordingReader(RecordedRows):
         if len(table.noise) not in (1, residuals):
             wanted = f"a number or {residuals} numbers" if residuals > 1 else "a number"
             raise RecordingFault((*key, "noise"), f"must be {wanted}, not a list of {len(table.noise)}")
-        if not SMALLEST <= min(table.noise) <= max(table.noise) <= LARGEST:
-            raise RecordingFault((*key, "noise"), f"must be from {SMALLEST:g} to {LARGEST:g}, not {table.noise}")
+        if not MIN_NOISE <= min(table.noise) <= max(table.noise) <= MAX_MEASUREMENT:
+            raise RecordingFault(
+                (*key, "noise"), f"must be from {MIN_NOISE:g} to {MAX_MEASUREMENT:g}, not {table.noise}"
+            )
         noise = np.broadcast_to(np.array(table.noise), residuals).copy()
         return MeasuredColumns(table, formula, quantity, value, unit, noise)
 
@@ -417,7 +421,7 @@ class RecordingReader(RecordedRows):
         start: Sequence[StartColumns],
         inputs: Sequence[InputColumns],
     ) -> Recording:
-        """One recording, in the units of the engine."""
+        """Read one recording, in the units of the engine."""
         columns, first, last = piece.columns, piece.first, piece.last
         time, cut = read_times(columns, first, last, self.table, self.world.duration)
         rows = columns.part(first, last)
@@ -475,13 +479,13 @@ def read_recordings(
     return tuple(found)
 
 
-MOST_STEPS = 100_000
+MAX_STEPS = 100_000
 """Of a duration that comes from recordings: times in milliseconds, or since 1970, are not simulated by mistake."""
 
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What there is to identify from.
+    """The recordings and settings of identification.
 
     Attributes:
         recordings: of all tables.
@@ -563,7 +567,7 @@ def with_duration(document: Document, faults: Faults) -> Document:
             faults.add(("recording", index, *fault.key), str(fault))
     faults.stop_if_any()
     steps = steps_until(max(ends), dt)
-    if steps > MOST_STEPS:
+    if steps > MAX_STEPS:
         text = f"samples go on to {max(ends):.6g} s, {steps:.4g} steps of {dt:g} s"
         advice = 'take until, clock = "first row", time_factor or rate, or state duration in [simulation]'
         faults.add(("recording", ends.index(max(ends))), f"{text}; {advice}")
@@ -582,7 +586,7 @@ def read_frame(index: int, table: RecordingTable, faults: Faults) -> Measurement
 
 
 def check_unused(document: Document, faults: Faults) -> None:
-    """Without recordings, nothing refers to them."""
+    """Check that nothing refers to recordings where there are none."""
     if document.identify is not None:
         faults.add(("identify",), "there is no [[recording]] to identify from")
     for index, table in enumerate(document.variable):

@@ -1,4 +1,4 @@
-"""Where a motion begins as its recording has it: the bodies that it names, and those that joints carry with them."""
+"""The start of a motion as its recording has it: the bodies that it names, and those that joints carry with them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 
 @dataclass(frozen=True)
 class RecordedJoint:
-    """What a recording may set of a joint: a coordinate and its rate, ``hinge.angle`` and ``hinge.rate``."""
+    """A coordinate or rate of a joint that a recording may set: ``hinge.angle``, ``hinge.rate``."""
 
     joint: ParametricJoint
     rate: bool

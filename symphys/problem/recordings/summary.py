@@ -1,4 +1,4 @@
-"""What recordings hold, in lines for people."""
+"""A summary of recordings, in lines for people."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from symphys.problem.model import ProblemData
 from symphys.problem.recordings.conversion import steps_apart
 from symphys.problem.recordings.types import Recording
-from symphys.problem.start import OVERLAP, StartValues
+from symphys.problem.start import MAX_OVERLAP, StartValues
 
-WHOLE = 1e-6
+STEP_TOLERANCE = 1e-6
 """How far the distance of samples may be off a whole number of steps."""
 
 
@@ -48,11 +48,11 @@ def table_lines(problem: ProblemData, table: str, own: Sequence[Recording]) -> l
     if own[0].start:
         lines.append(f"  starts with {', '.join(name for name in own[0].start if name in problem.initial)}")
         depth, which = deepest_start(problem, own)
-        if depth > OVERLAP:
+        if depth > MAX_OVERLAP:
             text = f"surfaces overlap by {depth:.3g} m at the start of {which.name}, more than elsewhere"
             lines.append(f"  {text}; are frame and units right?")
     apart = [steps_apart(each.time, dt) for each in own]
-    uneven = [steps for steps in apart if abs(steps - round(steps)) > WHOLE * max(steps, 1.0)]
+    uneven = [steps for steps in apart if abs(steps - round(steps)) > STEP_TOLERANCE * max(steps, 1.0)]
     if uneven:
         steps = float(np.median(uneven))
         text = f"samples are {steps:.4g} steps of {dt:g} s apart, so that most fall between two steps"

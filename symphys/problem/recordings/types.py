@@ -61,7 +61,7 @@ class RecordedInput:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One measured motion.
+    """A measured motion.
 
     Attributes:
         name: "toss/0017", or "toss" where the table has one recording.
@@ -118,7 +118,7 @@ class RecordedFile:
 
 @dataclass(frozen=True)
 class IdentifySettings:
-    """What [identify] says.
+    """The settings of [identify].
 
     Attributes:
         loss: of residuals over their noise: squares, or Huber's, which grows linearly beyond ``threshold``.

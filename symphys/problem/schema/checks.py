@@ -22,8 +22,8 @@ MAX_LABEL = 100
 STAGES = "[0.1, 0.01, 0]"
 LEAST_POINTS, MOST_POINTS = 4, 2000
 """Points whose hull is a shape."""
-LEAST_SIDE = 2
-MOST_HEIGHTS = 1024
+MIN_GRID_SIDE = 2
+MAX_HEIGHTS = 1024
 """Each height of a terrain is in every contact with it, in every step."""
 
 
@@ -169,12 +169,12 @@ def grid(value: object) -> list[list[float]]:
     uneven = next((k for k, row in enumerate(rows) if len(row) != len(rows[0])), None)
     if uneven is not None:
         raise fault(f"row {uneven} has {len(rows[uneven])} heights, row 0 has {len(rows[0])}; rows are equally long")
-    if min(len(rows), len(rows[0])) < LEAST_SIDE:
-        raise fault(f"has {len(rows)} rows of {len(rows[0])}; {LEAST_SIDE} or more rows and columns are needed")
+    if min(len(rows), len(rows[0])) < MIN_GRID_SIDE:
+        raise fault(f"has {len(rows)} rows of {len(rows[0])}; {MIN_GRID_SIDE} or more rows and columns are needed")
     count = len(rows) * len(rows[0])
-    if count > MOST_HEIGHTS:
+    if count > MAX_HEIGHTS:
         remedy = "take a coarser grid, or give height as a formula of x and y"
-        raise fault(f"has {count} heights ({len(rows)} x {len(rows[0])}), at most {MOST_HEIGHTS} are allowed; {remedy}")
+        raise fault(f"has {count} heights ({len(rows)} x {len(rows[0])}), at most {MAX_HEIGHTS} are allowed; {remedy}")
     for k, row in enumerate(rows):
         for item in row:
             if not is_number(item):

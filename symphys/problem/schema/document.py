@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ConfigDict, Field
 
 from symphys.problem.schema.control import ControllerTable, ForceTable, ReferenceTable, SensorTable
-from symphys.problem.schema.include import MOST_INCLUDES, IncludedTable, IncludeTable
+from symphys.problem.schema.include import MAX_INCLUDES, IncludedTable, IncludeTable
 from symphys.problem.schema.joints import CouplingTable, JointTable, SiteTable
 from symphys.problem.schema.mpc import MpcTable
 from symphys.problem.schema.objectives import (
@@ -50,8 +50,8 @@ class Document(SchemaTable):
     )
     simulation: SimulationTable
     world: WorldTable = WorldTable()
-    include: list[IncludeTable] = Field(default=[], max_length=MOST_INCLUDES)
-    included: list[IncludedTable] = Field(default=[], max_length=MOST_INCLUDES)
+    include: list[IncludeTable] = Field(default=[], max_length=MAX_INCLUDES)
+    included: list[IncludedTable] = Field(default=[], max_length=MAX_INCLUDES)
     body: list[BodyTable] = Field(default=[], min_length=1, validate_default=True)
     ground: GroundTable | None = None
     plane: list[PlaneTable] = Field(default=[])

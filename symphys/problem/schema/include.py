@@ -9,7 +9,7 @@ from pydantic import Field, PlainValidator, WithJsonSchema
 from symphys.problem.schema import checks
 from symphys.problem.schema.types import Finite, SchemaTable, Vector
 
-MOST_INCLUDES = 100
+MAX_INCLUDES = 100
 Prefix = Annotated[
     str,
     PlainValidator(checks.prefix),

@@ -11,7 +11,7 @@ from symphys.problem.reading.messages import listed
 from symphys.problem.schema import checks
 from symphys.problem.schema.types import NonNegative, Orientation, Points, Positive, SchemaTable, Size, Vector
 
-MOST_PARTS = 1000
+MAX_PARTS = 1000
 EXAMPLES = listed([f"{{ {kind} = {shape.example} }}" for kind, shape in SHAPES.items()], "or")
 """A table of each shape."""
 UPRIGHT = "quaternion [w, x, y, z], or { roll_deg, pitch_deg, yaw_deg }"
@@ -80,12 +80,12 @@ class ShapeTable(SolidTable):
     spheres: list[PlacedSphereTable] | None = Field(
         default=None,
         min_length=1,
-        max_length=MOST_PARTS,
+        max_length=MAX_PARTS,
         description="a compound of spheres: [{ radius = 0.1, centre = [0.2, 0, 0] }, ...]",
     )
     parts: list[PartTable] | None = Field(
         default=None,
         min_length=1,
-        max_length=MOST_PARTS,
+        max_length=MAX_PARTS,
         description="a compound: [{ box = { size = [0.2, 0.1, 0.3] }, centre = [0.2, 0, 0] }, ...]",
     )

@@ -8,8 +8,8 @@ from pydantic import ConfigDict, Field
 
 from symphys.problem.schema.types import Finite, SchemaTable
 
-MOST_SAMPLES = 1_000_000
-MOST_VALUES = 10_000
+MAX_SAMPLES = 1_000_000
+MAX_VALUES = 10_000
 Samples = Literal["grid", "latin hypercube", "sobol"]
 
 
@@ -18,7 +18,7 @@ class RangeTable(SchemaTable):
 
     start: Finite = Field(alias="from", description="the first value")
     to: Finite = Field(description="the last value; it is included")
-    count: Annotated[int, Field(ge=2, le=MOST_VALUES)] | None = Field(
+    count: Annotated[int, Field(ge=2, le=MAX_VALUES)] | None = Field(
         default=None, description="how many values; samples may do without, and then take any number between the ends"
     )
     spacing: Literal["linear", "log"] = Field(default="linear", description='"log": by equal factors')
@@ -32,7 +32,7 @@ AXIS: dict[str, Any] = {
             "properties": {
                 "from": {"type": "number"},
                 "to": {"type": "number"},
-                "count": {"type": "integer", "minimum": 2, "maximum": MOST_VALUES},
+                "count": {"type": "integer", "minimum": 2, "maximum": MAX_VALUES},
                 "spacing": {"enum": ["linear", "log"]},
             },
         },
@@ -51,7 +51,7 @@ class SweepTable(SchemaTable):
     model_config = ConfigDict(extra="allow", json_schema_extra={"additionalProperties": AXIS})
 
     samples: Samples = Field(default="grid", description='every combination, or samples that fill the space: "sobol"')
-    count: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] | None = Field(
+    count: Annotated[int, Field(ge=1, le=MAX_SAMPLES)] | None = Field(
         default=None, description="how many samples; a grid has none, and Sobol samples a power of two"
     )
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of the random numbers of samples")

@@ -87,8 +87,8 @@ Grid = Annotated[
     WithJsonSchema(
         {
             "type": "array",
-            "items": {"type": "array", "items": {"type": "number"}, "minItems": checks.LEAST_SIDE},
-            "minItems": checks.LEAST_SIDE,
+            "items": {"type": "array", "items": {"type": "number"}, "minItems": checks.MIN_GRID_SIDE},
+            "minItems": checks.MIN_GRID_SIDE,
         }
     ),
 ]

@@ -109,7 +109,7 @@ class Family:
 
 
 def stacked(values: Mapping[str, Array]) -> bytes:
-    """All numbers of these arrays."""
+    """Return the bytes of all numbers of these arrays."""
     return b"".join(value.tobytes() for value in values.values())
 
 
@@ -230,7 +230,7 @@ def by_both(key: str, axis: Axis, own: Sweep | None, axes: Sequence[Axis]) -> st
 
 
 def swept(problem: Problem, sweep: Sweep, tell: Callable[[], None] | None = None) -> Iterator[Problem]:
-    """Each point as a problem with settings; it is validated when it is asked for, and read again where it is used.
+    """Yield each point as a problem with settings, validated when it is asked for, and read again where it is used.
 
     Args:
         problem: whose settings all points have.

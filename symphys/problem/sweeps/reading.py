@@ -75,7 +75,7 @@ def entries(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, ob
 
 
 def read_entry(key: str, value: object, faults: Faults) -> Axis | None:
-    """One axis; None after a fault."""
+    """Read one axis; None after a fault."""
     place: Place = (SWEEP, key)
     try:
         if isinstance(value, list):
@@ -134,8 +134,8 @@ OPTION_FORMS = "KEY=FROM:TO:COUNT, KEY=FROM:TO:COUNT:log, KEY=FROM:TO for sample
 OPTION_EXAMPLE = "ball.mass=0.2:2:10"
 NUMBER = r"[-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 RANGE = re.compile(rf"\s*{NUMBER}\s*:.*", re.DOTALL)
-SHORT: dict[str, Kind] = {"lhs": "latin hypercube", "latin-hypercube": "latin hypercube"}
-CLOSED_BY = {"[": "]", "{": "}"}
+SHORT_KINDS: dict[str, Kind] = {"lhs": "latin hypercube", "latin-hypercube": "latin hypercube"}
+CLOSING_BRACKETS = {"[": "]", "{": "}"}
 
 
 def read_axes(texts: Sequence[str]) -> tuple[tuple[Axis, ...], bool]:
@@ -201,8 +201,8 @@ def split(text: str) -> list[str]:
             quote = "" if letter == quote else quote
         elif letter in "\"'":
             quote = letter
-        elif letter in CLOSED_BY:
-            open_ends.append(CLOSED_BY[letter])
+        elif letter in CLOSING_BRACKETS:
+            open_ends.append(CLOSING_BRACKETS[letter])
         elif open_ends and letter == open_ends[-1]:
             open_ends.pop()
         elif letter == "," and not open_ends:
@@ -215,8 +215,8 @@ def split(text: str) -> list[str]:
 def read_samples(text: str) -> Samples:
     """``grid``, ``lhs:64``, ``sobol:64``, and with a seed ``sobol:64:1``; SweepError names what is wrong."""
     word, *numbers = (part.strip() for part in text.split(":"))
-    names = (*KINDS, *SHORT)
-    kind = SHORT.get(word) or next((each for each in KINDS if each == word), None)
+    names = (*KINDS, *SHORT_KINDS)
+    kind = SHORT_KINDS.get(word) or next((each for each in KINDS if each == word), None)
     try:
         if kind is None:
             raise SweepError(f"there are no samples of the kind {word!r}; {hint(word, names)}")

@@ -10,13 +10,13 @@ from typing import Literal
 
 from symphys.errors import SymphysError
 from symphys.problem.reading.messages import shown
-from symphys.problem.schema.sweep import MOST_SAMPLES, MOST_VALUES
+from symphys.problem.schema.sweep import MAX_SAMPLES, MAX_VALUES
 
 Spacing = Literal["linear", "log"]
 SPACINGS: tuple[Spacing, ...] = ("linear", "log")
 DIGITS = 6
 """Of the distance between the ends of an axis, to which its values are rounded: they are parts of folder names."""
-MOST_WHOLE = 1e15
+MAX_WHOLE = 1e15
 """Whole numbers up to this are written without a point."""
 
 
@@ -80,8 +80,8 @@ Axis = Levels | Interval
 def spaced(key: str, ends: tuple[float, float], count: int, spacing: Spacing = "linear") -> Levels:
     """``count`` values from one end to the other, both included."""
     check_ends(*ends, spacing)
-    if not 2 <= count <= MOST_VALUES:
-        raise SweepError(f"needs a count of 2 to {MOST_VALUES:,} from one end to the other, not {count}")
+    if not 2 <= count <= MAX_VALUES:
+        raise SweepError(f"needs a count of 2 to {MAX_VALUES:,} from one end to the other, not {count}")
     inner = [between(*ends, k / (count - 1), spacing) for k in range(1, count - 1)]
     return Levels(key, (shortest(ends[0]), *inner, shortest(ends[1])))
 
@@ -110,7 +110,7 @@ def between(low: float, high: float, share: float, spacing: Spacing) -> float:
 
 def shortest(value: float) -> float:
     """A whole number without a point, as a person would type it: it is part of the name of a folder."""
-    return int(value) if abs(value) < MOST_WHOLE and value == int(value) else value
+    return int(value) if abs(value) < MAX_WHOLE and value == int(value) else value
 
 
 def sign(value: object) -> str:
@@ -129,7 +129,7 @@ KINDS: tuple[Kind, ...] = ("grid", "latin hypercube", "sobol")
 
 @dataclass(frozen=True)
 class Samples:
-    """How many points of which kind.
+    """The kind and number of points.
 
     Attributes:
         kind: "grid", "latin hypercube" or "sobol".
@@ -147,8 +147,8 @@ class Samples:
             if self.count:
                 raise SweepError("a grid has as many points as its axes make; a count belongs to samples")
             return
-        if not 1 <= self.count <= MOST_SAMPLES:
-            raise SweepError(f"{self.kind} samples need a count of 1 to {MOST_SAMPLES:,}")
+        if not 1 <= self.count <= MAX_SAMPLES:
+            raise SweepError(f"{self.kind} samples need a count of 1 to {MAX_SAMPLES:,}")
         if self.kind == "sobol" and self.count & (self.count - 1):
             below = 1 << (self.count.bit_length() - 1)
             raise SweepError(f"a count of Sobol points is a power of two, such as {below} or {2 * below}")
@@ -204,12 +204,12 @@ class Sweep:
         """SweepError where there is no point, or more than can be."""
         if not self.axes:
             raise SweepError("there is nothing to sample; add an axis: --sweep ball.mass=0.2:2")
-        if self.samples.kind == "grid" and len(self) > MOST_SAMPLES:
+        if self.samples.kind == "grid" and len(self) > MAX_SAMPLES:
             sizes = " x ".join(str(len(axis.values)) for axis in self.grid())
-            raise SweepError(f"a grid of {sizes} points is too large; at most {MOST_SAMPLES:,} are allowed")
+            raise SweepError(f"a grid of {sizes} points is too large; at most {MAX_SAMPLES:,} are allowed")
 
     def points(self) -> Iterator[dict[str, object]]:
-        """Every point: values by key. Of a grid, the last key changes fastest.
+        """Yield every point: values by key. Of a grid, the last key changes fastest.
 
         SweepError where two samples are the same: they would be one run.
         """

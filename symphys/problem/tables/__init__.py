@@ -1,1 +1,1 @@
-"""One module for each kind of table of a problem file: from validated values to the problem's parts."""
+"""Readers of the tables of a problem file, a module for each kind."""

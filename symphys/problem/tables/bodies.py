@@ -60,7 +60,7 @@ def read_shape(place: Place, table: ShapeTable | None, faults: Faults) -> tuple[
 
 
 def read_part(place: Place, table: PartTable, faults: Faults) -> Shape | None:
-    """One part of a compound; None after a fault."""
+    """Read a part of a compound; None after a fault."""
     orientation = read_orientation((*place, "orientation"), table.orientation, faults)
     return read_solid(place, table, table.centre, orientation, faults)
 
@@ -120,26 +120,28 @@ def read_orientation(place: Place, given: Any, faults: Faults) -> Array:
         return np.array(UPRIGHT)
 
 
-ROUNDING = 1e-9
+INERTIA_TOLERANCE = 1e-9
 """Relative slack for symmetry and the triangle inequality, which flat and thin bodies meet with equality."""
 
 
 def inertia_fault(value: float | Sequence[float] | Sequence[Sequence[float]]) -> str:
-    """Why no rigid body has this inertia; empty if one has."""
+    """Return the reason why no rigid body has this inertia; empty if one has."""
     given = np.asarray(value, float)
-    if given.ndim == 2 and not np.allclose(given, given.T, rtol=ROUNDING, atol=ROUNDING * np.abs(given).max()):
+    if given.ndim == 2 and not np.allclose(
+        given, given.T, rtol=INERTIA_TOLERANCE, atol=INERTIA_TOLERANCE * np.abs(given).max()
+    ):
         return "the matrix must be symmetric"
     moments = np.sort(np.linalg.eigvalsh(given) if given.ndim == 2 else np.broadcast_to(given, 3))
     listed = ", ".join(f"{moment:.6g}" for moment in moments)
     if moments[0] <= 0:
         return f"the principal moments must be positive; they are {listed}"
-    if moments[0] + moments[1] < moments[2] * (1 - ROUNDING):
+    if moments[0] + moments[1] < moments[2] * (1 - INERTIA_TOLERANCE):
         return f"no principal moment may exceed the sum of the other two; they are {listed}"
     return ""
 
 
 def read_body(index: int, table: BodyTable, faults: Faults) -> ParametricBody:
-    """One body; notes a mass or inertia that is missing, doubled or impossible."""
+    """Read a body; note a mass or inertia that is missing, doubled or impossible."""
     place = ("body", index)
     if table.mass == 0:
         return read_frame(place, table, faults)
@@ -227,7 +229,7 @@ def frozen(inertia: object) -> object:
     return float(inertia) if isinstance(inertia, int | float) else None
 
 
-NAMES = ("x", "y")
+HEIGHT_NAMES = ("x", "y")
 GRID_KEYS = ("spacing", "origin")
 
 
@@ -246,7 +248,7 @@ def read_ground(table: GroundTable) -> ParametricStatic:
 
 
 def read_plane(index: int, table: PlaneTable, faults: Faults) -> ParametricStatic:
-    """One plane."""
+    """Read a plane."""
     place = ("plane", index)
     length = hypot(*table.normal)  # squares of large numbers overflow
     if not (isfinite(length) and length > 1e-12):
@@ -261,7 +263,7 @@ def read_plane(index: int, table: PlaneTable, faults: Faults) -> ParametricStati
 
 
 def read_block(index: int, table: BlockTable, faults: Faults) -> ParametricStatic:
-    """One static solid."""
+    """Read a static solid."""
     place = ("block", index)
     orientation = read_orientation((*place, "orientation"), table.orientation, faults)
     shape = read_solid((*place, "shape"), table.shape, table.position, orientation, faults)
@@ -287,7 +289,7 @@ def flat(x: Any, y: Any) -> Any:
 def read_terrain(
     index: int, table: TerrainTable, starts: Sequence[Sequence[float]], faults: Faults
 ) -> ParametricStatic:
-    """One terrain; ``starts``: where bodies are at first, so that a formula can be tried there."""
+    """Read a terrain; ``starts``: where bodies are at first, so that a formula can be tried there."""
     place = ("terrain", index)
     height: Callable[[Any, Any], Any] | None = None
     if (table.height is None) == (table.heights is None):
@@ -322,8 +324,8 @@ def read_formula(
 
 
 def refusal(formula: Formula, starts: Sequence[Sequence[float]]) -> str:
-    """Why a formula is no height; empty if it is one."""
-    others = sorted(formula.names - set(NAMES))
+    """Return the reason why a formula is no height; empty if it is one."""
+    others = sorted(formula.names - set(HEIGHT_NAMES))
     if others:
         return f"{', '.join(quote(name) for name in others)}: a height is a formula of x and y alone"
     x, y = ca.SX.sym("x"), ca.SX.sym("y")

@@ -46,7 +46,7 @@ def read_pairs(
 
 
 def check_collides_with(names: Sequence[str], groups: Sequence[str], document: Document, faults: Faults) -> None:
-    """Every name in collides_with must be another body's, a static surface's or a group's."""
+    """Check that names in collides_with are those of other bodies, static surfaces or groups."""
     tables: list[tuple[Place, MemberTable, str]] = [
         ((kind, index), table, table.name)
         for kind in ("body", "plane", "block", "terrain")

@@ -17,7 +17,7 @@ from symphys.files import check_regular
 from symphys.model.controllers import CONTROLLERS, ControlLaw, Custom, Net
 from symphys.problem.limits import check_net
 from symphys.problem.model import FeedbackController, ForceLaw, Phase, Sensor, Variable, VariableSlot
-from symphys.problem.quantities import OWN_SIZE, Quantity, SlotError, read_slot
+from symphys.problem.quantities import FORCE_NUMBER, Quantity, SlotError, read_slot
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema.control import ControllerTable, ForceTable, NetTable, SensorTable
 from symphys.problem.tables.simulation import find_phase
@@ -32,7 +32,7 @@ LAWS = {
 
 
 def read_sensors(tables: Sequence[SensorTable], sample: Mapping[str, Any], faults: Faults) -> tuple[Sensor, ...]:
-    """Every sensor; ``sample`` has a value for each name that a sensor may read."""
+    """Read the sensors; ``sample`` has a value for each name that a sensor may read."""
     return tuple(_read_sensor(index, table, sample, faults) for index, table in enumerate(tables))
 
 
@@ -61,7 +61,7 @@ def read_controllers(
     faults: Faults,
     varied: Collection[str] = (),
 ) -> tuple[FeedbackController, ...]:
-    """Every controller that is clear.
+    """Read the controllers; those that are unclear are left out.
 
     Args:
         tables: as they are in the file.
@@ -118,7 +118,7 @@ class ControllerReader:
         return FeedbackController(self.table.name, law, tuple(self.table.senses), drives, scale, numbers)
 
     def drives(self) -> tuple[tuple[str, int], ...]:
-        """Every input and component."""
+        """Return the driven inputs and their components."""
         found: list[tuple[str, int]] = []
         inputs = {name: quantity for name, quantity in self.known.items() if quantity.kind == "control"}
         for text in self.table.drives:
@@ -255,16 +255,16 @@ def read_weights(faults: Faults, place: Place, name: str, net: Net) -> Array:
     return np.zeros(count)
 
 
-NOT_AHEAD = tuple(f".{kind.key}" for kind in SENSOR_KINDS if not kind.ahead)
+UNKNOWN_AHEAD = tuple(f".{kind.key}" for kind in SENSOR_KINDS if not kind.ahead)
 """Ends of the names of what is not known half a step ahead."""
-VARYING = ("parameter", "weight")
+CONSTANT_KINDS = ("parameter", "weight")
 """Kinds of variables that have one value over the whole motion, which a law may name."""
 
 
 def force_quantities(tables: Sequence[ForceTable]) -> dict[str, Quantity]:
     """The numbers of all force laws by the names that variables and formulas use, such as ``drag.c``."""
     return {
-        f"{table.name}.{key}": Quantity("weight", np.ravel(np.array(value, float)), OWN_SIZE)
+        f"{table.name}.{key}": Quantity("weight", np.ravel(np.array(value, float)), FORCE_NUMBER)
         for table in tables
         for key, value in table.numbers.items()
     }
@@ -278,7 +278,7 @@ def read_forces(
     phases: Mapping[str, Phase],
     faults: Faults,
 ) -> tuple[ForceLaw, ...]:
-    """Every law that is clear.
+    """Read the force laws; those that are unclear are left out.
 
     Args:
         tables: as they are in the file.
@@ -318,10 +318,10 @@ def _read_force(
         return None
     kinds = {variable.name: variable.kind for variable in variables}
     for name in sorted(formula.names):
-        if kinds.get(name, VARYING[0]) not in VARYING:
+        if kinds.get(name, CONSTANT_KINDS[0]) not in CONSTANT_KINDS:
             instead = " or ".join(slot.name for v in variables if v.name == name for slot in v.slots)
             faults.add((*place, "value"), f"the variable {quote(name)} sets {instead}; name that instead")
-        if name.endswith(NOT_AHEAD):
+        if name.endswith(UNKNOWN_AHEAD):
             faults.add((*place, "value"), f"{quote(name)} is not known while the force is; take velocities")
     size = int(value.shape[0])
     if size != len(slot.components):

@@ -20,7 +20,7 @@ from symphys.problem.schema.objectives import GuessTable
 from symphys.suggest import hint, quote
 
 AT = "at"
-MOST_SAMPLES = 200
+MAX_SAMPLES = 200
 """Of a formula, over the duration."""
 TURNED = f"a unit quaternion w x y z, or turns about fixed axes such as {{ yaw_deg = 90 }}; valid: {', '.join(ANGLES)}"
 
@@ -126,7 +126,7 @@ def _followed(
     faults: Faults,
 ) -> tuple[Any, Any] | None:
     """Times and values (K, size) of a formula; None after a fault."""
-    times, rows = np.linspace(0, simulation.duration, min(simulation.steps, MOST_SAMPLES) + 1), []
+    times, rows = np.linspace(0, simulation.duration, min(simulation.steps, MAX_SAMPLES) + 1), []
     try:
         formula = parse(text)
         for time in times.tolist():

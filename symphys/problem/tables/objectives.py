@@ -72,7 +72,7 @@ NO_PHASES: Mapping[str, Phase] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Objectives:
-    """All that should come out."""
+    """The objective of a problem: costs, targets and constraints, with outputs and phases."""
 
     costs: tuple[Cost, ...]
     targets: tuple[Target, ...]
@@ -90,7 +90,7 @@ def read_objectives(
     phases: Mapping[str, Phase] = NO_PHASES,
     free: bool = False,
 ) -> Objectives:
-    """All of them; ``sample`` has a value for each name in formulas, ``units`` its unit where that is known.
+    """Read the tables; ``sample`` has a value for each name in formulas, ``units`` its unit where that is known.
 
     ``phases`` by name; ``free``: whether a variable sets the duration.
     """
@@ -171,7 +171,7 @@ class ObjectiveReader:
         return formula, int(value.shape[0])
 
     def cost(self, index: int, table: CostTable) -> Cost | None:
-        """One cost."""
+        """Read a cost."""
         place = ("cost", index)
         at, during = self.moment(table, place)
         if (table.value is None) == (table.squares is None):
@@ -188,7 +188,7 @@ class ObjectiveReader:
         return found and Cost(table.name, found[0], at, table.weight, squares, during)
 
     def target(self, index: int, table: TargetTable) -> Target | None:
-        """One target."""
+        """Read a target."""
         place = ("target", index)
         at = self.instant(table.at, place)
         found = self.formula((*place, "value"), table.value, at)
@@ -198,7 +198,7 @@ class ObjectiveReader:
         return Target(table.name, found[0], at, table.tolerance, table.weight, unit)
 
     def output(self, index: int, table: OutputTable) -> Output | None:
-        """One output."""
+        """Read an output."""
         place = ("output", index)
         at = self.instant(table.at, place)
         found = self.formula((*place, "value"), table.value, at)
@@ -207,7 +207,7 @@ class ObjectiveReader:
         return found and Output(table.name, found[0], at, table.unit or "")
 
     def constraint(self, index: int, table: ConstraintTable) -> Constraint | None:
-        """One constraint."""
+        """Read a constraint."""
         place = ("constraint", index)
         at, during = self.moment(table, place)
         found = self.formula((*place, "value"), table.value, at)

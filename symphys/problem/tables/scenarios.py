@@ -42,7 +42,7 @@ def read_scenarios(
     variables: Sequence[Variable],
     faults: Faults,
 ) -> Scenarios:
-    """All tables; what a variable sets cannot differ, nor can anything differ twice."""
+    """Read the tables; a quantity that a variable sets cannot differ, nor can one differ twice."""
     taken: Taken = {}
     for variable in variables:
         for slot in variable.slots:
@@ -77,7 +77,7 @@ class ScenarioReader:
         self.discretisations: list[Discretisation] = []
 
     def read(self, index: int, table: ScenarioTable) -> None:
-        """One table."""
+        """Read a table."""
         place: Place = ("scenario", index)
         given = [key for key in KINDS if getattr(table, key) is not None]
         if len(given) != 1:

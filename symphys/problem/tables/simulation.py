@@ -1,4 +1,4 @@
-"""How time passes: the [simulation] table, the [[phase]] tables that divide its duration, and [mpc]."""
+"""The tables of time: [simulation], the [[phase]] tables that divide its duration, and [mpc]."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from symphys.problem.schema.physics import SimulationTable
 from symphys.suggest import hint, quote
 
 MAX_STEPS = 1_000_000
-WHOLE = 1e-9
+STEP_RATIO_TOLERANCE = 1e-9
 """Relative slack for a whole number of steps."""
-FIVE = 5
+CLOSED_LOOP_DURATIONS = 5
 """Durations of the problem that the closed loop lasts, unless the file says otherwise."""
 
 
@@ -39,10 +39,10 @@ def check_steps(duration: float, dt: float, faults: Faults, place: Place = ("sim
     ratio = duration / dt
     if dt > duration:
         faults.add(place, f"the step {dt:g} s is longer than the duration {duration:g} s")
-    elif ratio > MAX_STEPS * (1 + WHOLE):
+    elif ratio > MAX_STEPS * (1 + STEP_RATIO_TOLERANCE):
         least = duration / MAX_STEPS
         faults.add(place, f"{ratio:.4g} steps are too many, {MAX_STEPS} are allowed; take dt = {least:.6g} or more")
-    elif abs(ratio - round(ratio)) > WHOLE * ratio:
+    elif abs(ratio - round(ratio)) > STEP_RATIO_TOLERANCE * ratio:
         below, above = floor(ratio), ceil(ratio)
         faults.add(
             place,
@@ -197,7 +197,7 @@ def read_mpc(table: MpcTable | None, simulation: Simulation, faults: Faults) -> 
         damping=table.damping,
         smoothing=simulation.smoothing[-1] if table.smoothing is None else table.smoothing,
         feedback=table.feedback,
-        duration=FIVE * simulation.duration if table.duration is None else table.duration,
+        duration=CLOSED_LOOP_DURATIONS * simulation.duration if table.duration is None else table.duration,
         plant=read_plant(table.plant, simulation),
     )
 

@@ -106,7 +106,7 @@ class VariableReader:
         return values[0] if same else None
 
     def usual_scale(self, slots: Sequence[VariableSlot]) -> Array | float:
-        """How much quantities typically change: by the least of their scales, else by their own size."""
+        """Return the typical change of the quantities: the least of their scales, else their own size."""
         scales = [scale for slot in slots if (scale := self.known[slot.name].number.scale) is not None]
         if scales:
             return min(scales)
@@ -197,7 +197,7 @@ def spread_out(value: NestedList | Array, components: int, knots: int) -> Array:
 def read_variables(
     tables: Sequence[VariableTable], known: Mapping[str, Quantity], simulation: Simulation, faults: Faults
 ) -> tuple[Variable, ...]:
-    """All variables; notes quantities that are set twice."""
+    """Read the variables; note quantities that are set twice."""
     found = [VariableReader(index, table, known, faults).read(simulation) for index, table in enumerate(tables)]
     owners: dict[str, NDArray[np.intp]] = {name: np.full(quantity.nominal.size, -1) for name, quantity in known.items()}
     for index, variable in enumerate(found):

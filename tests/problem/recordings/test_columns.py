@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from symphys.problem.recordings import columns
-from symphys.problem.recordings.columns import MISSING, RecordingFault, read_csv
+from symphys.problem.recordings.columns import MISSING_WORDS, RecordingFault, read_csv
 from symphys.types import Array
 
 CELLS = st.one_of(st.floats(allow_infinity=False, width=64), st.integers(-(10**6), 10**6).map(float))
@@ -29,7 +29,7 @@ def read(content: str | bytes, *wanted: str) -> Array:
     values=st.integers(1, 4).flatmap(
         lambda m: st.lists(st.lists(CELLS, min_size=m, max_size=m), min_size=1, max_size=30)
     ),
-    missing=st.sampled_from(sorted(MISSING)),
+    missing=st.sampled_from(sorted(MISSING_WORDS)),
     end=st.sampled_from(["\n", "\r\n"]),
     mark=st.sampled_from([",", ";", "\t"]),
     chunk=st.integers(4, 200),
@@ -42,7 +42,7 @@ def test_what_was_written_is_read(values: list[list[float]], missing: str, end: 
     lines = [mark.join(word if value != value else repr(value) for value in row) for row in values]
     content = end.join([mark.join(names), *lines])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(columns, "CHUNK", chunk)
+        patch.setattr(columns, "CHUNK_BYTES", chunk)
         np.testing.assert_array_equal(read(content, *names), np.array(values))
 
 
@@ -89,7 +89,7 @@ def test_faults_name_row_and_column(content: str | bytes, message: str) -> None:
 
 
 def test_a_fault_far_down_is_found_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(columns, "CHUNK", 1000)
+    monkeypatch.setattr(columns, "CHUNK_BYTES", 1000)
     lines = ["a,b", *(f"{k},{k}" for k in range(5000)), "7,?", *(f"{k},{k}" for k in range(100))]
     with pytest.raises(RecordingFault, match='row 5002, column "b"'):
         read("\n".join(lines), "a", "b")
@@ -111,7 +111,7 @@ def test_any_content_is_numbers_or_a_fault(content: bytes) -> None:
 @pytest.mark.slow
 def test_long_files_are_read_by_chunks_into_the_memory_of_their_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     """No chunk goes cell by cell, and rows are filled in where they stay; what is held beside them is a few chunks."""
-    monkeypatch.setattr(columns, "CHUNK", 1 << 14)
+    monkeypatch.setattr(columns, "CHUNK_BYTES", 1 << 14)
     monkeypatch.setattr(columns, "cell_by_cell", pytest.fail)
     count = 100_000
     content = "time,x,y\n" + "".join(f"{k / 1000:.3f},{k % 1000},\n" for k in range(count))

@@ -21,7 +21,7 @@ def written(folder: Path, large: bool, rows: list[str] = ROWS) -> Problem:
     folder.mkdir(exist_ok=True)
     (folder / "a.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(files, "SMALL", 10 if large else 100_000)
+        patch.setattr(files, "MAX_KEPT_BYTES", 10 if large else 100_000)
         return beside(folder, {"files": "a.csv"})
 
 
