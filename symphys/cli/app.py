@@ -12,20 +12,15 @@ from typing import Any
 import click
 
 from symphys.cli.arguments import INTERRUPTED
-from symphys.cli.best import best
-from symphys.cli.cache import cache
 from symphys.cli.check import check
-from symphys.cli.diff import diff
-from symphys.cli.doctor import doctor
 from symphys.cli.export import export
 from symphys.cli.identify import identify
 from symphys.cli.importing import import_robot
-from symphys.cli.ls import ls
+from symphys.cli.installation import cache, doctor, listing, new, schema
 from symphys.cli.mpc import mpc
 from symphys.cli.replay import replay
 from symphys.cli.report import report
-from symphys.cli.schema import schema
-from symphys.cli.shipped import listing, new
+from symphys.cli.runs import best, diff, ls
 from symphys.cli.show import show
 from symphys.cli.solve import solve
 from symphys.errors import SymphysError

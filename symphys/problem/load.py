@@ -27,7 +27,7 @@ from symphys.problem.model import (
     Variable,
 )
 from symphys.problem.parametric.parts import Part
-from symphys.problem.parametric.placement import check_anchors, check_starts, forward_kinematics
+from symphys.problem.parametric.placement import check_carried, forward_kinematics
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import (
     Quantity,
@@ -49,6 +49,7 @@ from symphys.problem.schema import Document
 from symphys.problem.start import StartValues, at_guess, check_joints, check_overlap, formula_names
 from symphys.problem.tables.bodies import read_body, read_state, read_statics
 from symphys.problem.tables.contact import (
+    MEMBERS,
     check_collides_with,
     check_laws,
     check_varied,
@@ -74,7 +75,6 @@ from symphys.types import Array
 if TYPE_CHECKING:
     from symphys.problem.sweeps.sweep import Sweep
 
-MEMBERS = ("body", "plane", "block", "terrain")
 SHARED_NAMES = (
     *MEMBERS,
     "joint",
@@ -255,9 +255,9 @@ def check_variables(
 ) -> None:
     """Check that what variables and phases set fits the world, and that the rollout fits into memory."""
     check_rollout(nominal, simulation, variables, faults)
-    check_varied(parametric, nominal, varied_names(document, variables), faults)
-    check_anchors(parametric, variables, faults)
-    check_starts(parametric, varied_names(document, variables), faults)
+    varied = varied_names(document, variables)
+    check_varied(parametric, nominal, varied, faults)
+    check_carried(parametric, varied, faults, ("anchor", "start", "start_rate"))
 
 
 def varied_names(document: Document, variables: Sequence[Variable | None]) -> list[tuple[Place, str]]:

@@ -216,7 +216,8 @@ class ProblemReader:
     def tables(self, settings: Mapping[str, object]) -> tuple[MergedFiles, dict[str, object]]:
         """The tables with those of included files, to be changed by the caller, and the settings that are left."""
         settings = {key: copied(value) for key, value in {**self.own, **settings}.items()}
-        early = {key: value for key, value in settings.items() if of_includes(key)}
+        # what is included must be known before all other settings
+        early = {key: value for key, value in settings.items() if key.partition(".")[0] in ("include", "included")}
         late = {key: value for key, value in settings.items() if key not in early}
         known = repr(early)
         if self._merged is None or self._merged[0] != known:
@@ -236,8 +237,3 @@ def copied(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: copied(each) for key, each in value.items()}
     return [copied(each) for each in value] if isinstance(value, list) else value
-
-
-def of_includes(key: str) -> bool:
-    """Whether a setting says what is included, and must be known before all others."""
-    return key.partition(".")[0] in ("include", "included")

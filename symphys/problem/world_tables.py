@@ -12,7 +12,7 @@ import numpy as np
 from symphys.errors import SymphysError
 from symphys.model.body import HOLLOW_SPHERE, Body
 from symphys.model.heightfield import Heightfield
-from symphys.model.joints import JOINTS, Joint, Motor
+from symphys.model.joints import JOINTS, Joint
 from symphys.model.joints.frames import MEETING_TOLERANCE
 from symphys.model.joints.motor import motor_kind
 from symphys.model.joints.placing import REST, PlacedJoint
@@ -20,6 +20,7 @@ from symphys.model.joints.start import State, moved_to_zero, placed_frames, span
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Fixture, Plane, Shape, Static, Terrain
 from symphys.model.shapes.inertia import inertia_of, off_centre, specific
+from symphys.model.state_layout import GIVEN
 from symphys.model.world import Law, Side, World
 from symphys.problem.parametric.parts import LAW
 from symphys.types import Array
@@ -96,7 +97,6 @@ Start = Mapping[str, Any]
 """States by name, such as ``ball.position``; what is missing is zero, and upright."""
 INERTIA_TOLERANCE = 1e-13
 """Inertias whose difference is below this share of the trace are the same."""
-STATE_FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 
 
 def world_tables(world: World, start: Start) -> dict[str, Any]:
@@ -109,11 +109,9 @@ def world_tables(world: World, start: Start) -> dict[str, Any]:
     Raises:
         SymphysError: names what a problem file cannot say.
     """
-    unknown = start.keys() - {f"{body.name}.{key}" for body in world.bodies for key in STATE_FIELDS}
+    unknown = start.keys() - {f"{body.name}.{key}" for body in world.bodies for key in GIVEN}
     if unknown:
-        raise SymphysError(
-            f"start: there is no {', '.join(sorted(unknown))}; valid: <body>.{', <body>.'.join(STATE_FIELDS)}"
-        )
+        raise SymphysError(f"start: there is no {', '.join(sorted(unknown))}; valid: <body>.{', <body>.'.join(GIVEN)}")
     law, pairs = contact_tables(world)
     joints, start = joint_tables(world, {**world.start, **start})
     tables = {
@@ -152,8 +150,12 @@ def attached_tables(world: World) -> dict[str, Any]:
 
 def body_table(body: Body, start: Start) -> dict[str, Any]:
     """A body and its start; its inertia is left to the file where that would make the same of mass and shape."""
-    state = {key: floats(start[f"{body.name}.{key}"]) for key in STATE_FIELDS if f"{body.name}.{key}" in start}
-    parts, mass = [part_table(shape) for shape in body.shapes], floats(body.mass)
+    state = {key: floats(start[f"{body.name}.{key}"]) for key in GIVEN if f"{body.name}.{key}" in start}
+    parts = [
+        {**size_table(shape), "centre": floats(shape.centre), "orientation": floats(shape.orientation)}
+        for shape in body.shapes
+    ]
+    mass = floats(body.mass)
     table: dict[str, Any] = {"name": body.name, "mass": mass, **state}
     if body.massless:
         return table
@@ -181,11 +183,6 @@ def same_inertia(given: Any, other: Any) -> bool:
 def size_table(shape: Shape) -> dict[str, Any]:
     """A shape by its sizes: ``{"box": {"size": [...]}}``."""
     return {shape.kind: {key: floats(value) for key, value in shape.sizes.items()}}
-
-
-def part_table(shape: Shape) -> dict[str, Any]:
-    """A shape in its place."""
-    return {**size_table(shape), "centre": floats(shape.centre), "orientation": floats(shape.orientation)}
 
 
 def static_tables(statics: Sequence[Static]) -> dict[str, Any]:
@@ -362,7 +359,7 @@ def joint_table(world: World, joint: Joint, named: PlacedJoint, axes: Array) -> 
     if named.start:
         table["start"] = list(named.start)
     if joint.motor is not None:
-        table["motor"] = motor_table(joint.motor)
+        table["motor"] = {motor_kind(joint.motor): numbers(joint.motor)}
     if joint.spring is not None:
         table["spring"] = numbers(joint.spring)
     table |= {key: floats(value) for key in ("armature", "friction") if not is_zero(value := getattr(joint, key))}
@@ -375,8 +372,3 @@ def joint_table(world: World, joint: Joint, named: PlacedJoint, axes: Array) -> 
 def ends(limits: Sequence[Any]) -> list[float]:
     """[lower, upper]; infinite where there is none."""
     return [sign * np.inf if end is None else floats(end) for sign, end in zip((-1, 1), limits, strict=True)]
-
-
-def motor_table(motor: Motor) -> dict[str, Any]:
-    """A motor by its kind."""
-    return {motor_kind(motor): numbers(motor)}

@@ -1,20 +1,118 @@
-"""The examination: what is measured at one z."""
+"""The examination of a gradient and a motion at one z; the gradient is compared with central differences."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from symphys.shooting import VariableBlock
 from symphys.transcription import Record, Transcription, first_non_finite, first_non_finite_derivative
 from symphys.types import Array
-from symphys.verification import gradient, refinement
+from symphys.verification import refinement
 from symphys.verification.balance import balance, jumps
 from symphys.verification.contacts import contacts, slides
 from symphys.verification.near_misses import near_misses, tunnelling
 from symphys.verification.sensitivity_growth import sensitivity_growth
 from symphys.verification.target_conflicts import held_bounds, target_conflicts
+
+Values = Callable[[Array], Array]
+
+DIFFERENCE_STEPS = (1e-4, 1e-5, 1e-6)
+"""Steps of the central differences, as shares of the scale; the best counts, and a wrong slope passes none."""
+EVERY_COMPONENT = 12
+"""Variables up to this size are differenced component by component, larger ones along as many random directions."""
+SIDE_CHECK_ERROR = 1e-4
+"""Relative error of central differences from which each side is examined by itself."""
+
+
+def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
+    """Compare the adjoint with central differences, per variable.
+
+    What is differentiated is the transcription's ``Probe``, whose gradient does not vanish at a solution.
+
+    Returns:
+        For each variable "error", |adjoint - difference| / scale; "scale", the norm of its slope; "step", the step of
+        the best difference as a share of the variable's scale; NaN where one is not finite. "felt": what a change by
+        the variable's scale changes, as a share of the value, of what the variable that is felt most changes, or of 1,
+        whichever is largest; 0 where nothing depends on it. "jump" is 0 where central differences agree best. Where
+        those of either side, without z itself, agree better, the value jumps at z, by as much as a change of the
+        variable by "jump" of its scale brings about. An impact at the very end of a step does that: the time grid
+        changes sides.
+    """
+    probe, blocks = transcription.probe, transcription.shooting.blocks
+    slope = probe.gradient(z)
+    rows = [_compare_block(probe.values, block, z, slope) for block in blocks]
+    effects = [float(np.linalg.norm(slope[block.start : block.stop] * block.scale)) for block in blocks]
+    size = max(abs(float(probe.values(z[None])[0])), *effects, 1.0)
+    return [row | {"felt": effect / size} for row, effect in zip(rows, effects, strict=True)]
+
+
+def _compare_block(value: Values, block: VariableBlock, z: Array, slope: Array) -> dict[str, Any]:
+    norm = float(np.linalg.norm(slope[block.start : block.stop])) or 1.0
+    directions = _directions(block, block.stop - block.start, z.size)
+    middle, at = _best(lambda steps: _mismatches(value, z, slope, directions, steps))
+    found = {"variable": block.name, "scale": float(np.linalg.norm(slope[block.start : block.stop]))}
+    found |= {"error": middle / norm, "step": at, "jump": 0.0}
+    if middle > SIDE_CHECK_ERROR * norm:
+        sides, near = _best(lambda steps: _mismatches_beside(value, z, slope, directions, steps))
+        if sides < middle:
+            jumps = 2 * near * _mismatches(value, z, slope, directions, (near,))
+            found |= {"error": sides / norm, "step": near, "jump": max_or_nan(jumps) / norm}
+    return found
+
+
+def _best(mismatches: Callable[[Sequence[float]], Array]) -> tuple[float, float]:
+    """Return (error, step): the least error over the steps, the worst over the directions; NaN if there is none."""
+    errors = [max_or_nan(row) for row in mismatches(DIFFERENCE_STEPS)]
+    known = [pair for pair in zip(errors, DIFFERENCE_STEPS, strict=True) if not np.isnan(pair[0])]
+    return min(known, default=(np.nan, np.nan))
+
+
+def max_or_nan(numbers: Array) -> float:
+    """Return the largest number; NaN if one is NaN."""
+    return float(np.max(numbers, initial=0.0))
+
+
+def _directions(block: VariableBlock, size: int, n: int) -> Array:
+    """Return unit steps (k, n) in the scale of each component, or random combinations of many."""
+    inside = np.eye(size)
+    if size > EVERY_COMPONENT:
+        inside = np.random.default_rng(1).standard_normal((EVERY_COMPONENT, size))
+        inside /= np.linalg.norm(inside, axis=1, keepdims=True)
+    whole = np.zeros((len(inside), n))
+    whole[:, block.start : block.stop] = inside * block.scale
+    return whole
+
+
+def _mismatches(value: Values, z: Array, slope: Array, directions: Array, steps: Sequence[float]) -> Array:
+    """Return the error of central differences for each step and direction (steps, k)."""
+    high, low = np.moveaxis(_beside(value, z, directions, steps, (1, -1)), -1, 0)
+    sizes, known = np.array(steps)[:, None], directions @ slope
+    found: Array = abs((high - low) / (2 * sizes) - known) / np.linalg.norm(directions, axis=1)
+    return found
+
+
+def _mismatches_beside(value: Values, z: Array, slope: Array, directions: Array, steps: Sequence[float]) -> Array:
+    """Return the larger error of both one-sided second-order derivatives, without z itself (steps, k)."""
+    points = _beside(value, z, directions, steps, (1, 2, 3, -1, -2, -3))
+    sizes, known, errors = np.array(steps)[:, None], directions @ slope, list[Array]()
+    for side, (one, two, three) in (
+        (1, np.moveaxis(points[..., :3], -1, 0)),
+        (-1, np.moveaxis(points[..., 3:], -1, 0)),
+    ):
+        errors.append(abs((8 * two - 5 * one - 3 * three) / (2 * side * sizes) - known))
+    larger: Array = np.maximum(*errors) / np.linalg.norm(directions, axis=1)
+    return larger
+
+
+def _beside(value: Values, z: Array, directions: Array, steps: Sequence[float], places: Sequence[int]) -> Array:
+    """Return values (steps, k, places) at multiples of each step from z along each direction, in one batch."""
+    offsets = np.multiply.outer(np.multiply.outer(np.array(steps), places), directions)
+    points = z + np.moveaxis(offsets, 2, 1)
+    return value(points.reshape(-1, z.size)).reshape(points.shape[:-1])
+
 
 Tell = Callable[[str], None]
 
@@ -47,7 +145,7 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     tell(SIMULATING)
     record = transcription.record(z)
     tell(COMPARING)
-    compared = gradient.compare_gradient(transcription, z)
+    compared = compare_gradient(transcription, z)
     finer = refinement.refine(transcription, z, tell)
     if not transcription.records_contacts:
         return {"gradient": compared, **finer, "bounds": held_bounds(transcription, z)}

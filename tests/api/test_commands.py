@@ -68,14 +68,14 @@ def test_check_says_what_cannot_be(problem: symphys.Problem, tmp_path: Path) -> 
 
 def test_a_gradient_that_is_wrong_is_found(problem: symphys.Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     """Derivatives that are not of this function."""
-    from symphys.verification import gradient
+    from symphys.verification import examination
 
-    right = gradient.compare_gradient
+    right = examination.compare_gradient
 
     def doubled(*given: Any) -> Any:
         return [{**row, "error": 1.0} for row in right(*given)]
 
-    monkeypatch.setattr(gradient, "compare_gradient", doubled)
+    monkeypatch.setattr(examination, "compare_gradient", doubled)
     found = symphys.check(problem)
     assert found.wrong and "disagrees" in str(found)
 

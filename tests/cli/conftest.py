@@ -40,7 +40,7 @@ def _without_lines_of_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lines that come every few seconds have tests of their own; a slow machine puts them between any others."""
     monkeypatch.setattr("symphys.cli.watching.observers.monotonic", lambda: 0.0)
     monkeypatch.setattr("symphys.cli.watching.heartbeat.LINE_INTERVAL", FOREVER)
-    monkeypatch.setattr("symphys.cli.run_tables.QUIET_TIME", FOREVER)
+    monkeypatch.setattr("symphys.cli.runs.QUIET_TIME", FOREVER)
 
 
 @pytest.fixture

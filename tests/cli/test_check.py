@@ -64,7 +64,7 @@ def test_check_tells_of_falls_and_scenarios(run: Run, throw: Path) -> None:
 
 def test_check_exits_1_where_the_gradient_is_wrong(run: Run, throw: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = [{"variable": "throw", "error": 0.5, "scale": 1.0}]
-    monkeypatch.setattr("symphys.verification.gradient.compare_gradient", lambda *given: wrong)
+    monkeypatch.setattr("symphys.verification.examination.compare_gradient", lambda *given: wrong)
     code, out, _ = run("check", throw)
     assert code == 1
     assert "disagrees" in out

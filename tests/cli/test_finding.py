@@ -12,8 +12,8 @@ import pytest
 from data.recorded_runs import record, recorded
 
 import symphys
-from symphys.cli import run_tables as shown
-from symphys.cli.run_tables import ReadingProgress
+from symphys.cli import runs as shown
+from symphys.cli.runs import ReadingProgress
 from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.table import Rows, read_rows
 

@@ -34,8 +34,7 @@ from tools.repeats import thorough
 
 import symphys
 import symphys.problems
-from symphys.cli.best import best
-from symphys.cli.ls import ls
+from symphys.cli.runs import best, ls
 from symphys.errors import SymphysError
 from symphys.importing import robot as model_source
 from symphys.importing.reading.child import main as read_in_this_process

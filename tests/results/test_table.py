@@ -19,7 +19,7 @@ import pytest
 from data.recorded_runs import record, recorded
 
 from symphys import files
-from symphys.cli.run_tables import lines, summary, usual_columns
+from symphys.cli.runs import lines, summary, usual_columns
 from symphys.results.file_names import CONFIG, RESULT
 from symphys.results.result import Result
 from symphys.results.table import Journal, best, columns, ordered, read_rows

@@ -27,7 +27,7 @@ from symphys.transcription.network_rollout import partition as split
 from symphys.transcription.recorded_rollout import record_rollout
 from symphys.types import Array
 from symphys.verification import examine
-from symphys.verification.gradient import compare_gradient
+from symphys.verification.examination import compare_gradient
 from symphys.verification.sensitivity_growth import sensitivity_growth
 
 pytestmark = pytest.mark.slow

@@ -11,7 +11,7 @@ from symphys.problems import find
 from symphys.shooting import VariableBlock
 from symphys.transcription import transcribe
 from symphys.verification import examine
-from symphys.verification.gradient import _compare_block, compare_gradient
+from symphys.verification.examination import _compare_block, compare_gradient
 from symphys.verification.refinement import order
 
 THROW = np.array([3.0, 0.1, 3.0, 0.0, -9.0, 0.5])

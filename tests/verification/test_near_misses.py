@@ -8,7 +8,7 @@ import pytest
 from symphys.findings.physics import RESIDUAL_LIMITS
 from symphys.transcription import Transcription
 from symphys.verification import survey
-from symphys.verification.gradient import compare_gradient
+from symphys.verification.examination import compare_gradient
 from symphys.verification.near_misses import near_misses
 from symphys.verification.refinement import UNSETTLED, settling
 

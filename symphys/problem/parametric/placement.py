@@ -18,7 +18,6 @@ from symphys.maths import rotation
 from symphys.model.joints.frames import WORLD
 from symphys.model.joints.start import Tree, drive, move, moved_to_start, spanning_tree, subtree, unmoved
 from symphys.model.state_layout import initial_state
-from symphys.problem.model import Variable
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.parts import CENTRE
 from symphys.problem.parametric.world import ParametricWorld
@@ -163,16 +162,6 @@ def lift(parametric: ParametricWorld, robot: Sequence[str], before: State, state
         state[f"{body}.position"] = state[f"{body}.position"] + (lowest[0] - lowest[1]) * up
 
 
-def check_anchors(parametric: ParametricWorld, variables: Sequence[Variable], faults: Faults) -> None:
-    """The subtree that a varied anchor moves must be determined: its joint closes no loop and does not give way."""
-    for index, variable in enumerate(variables):
-        for joint in anchored(parametric, (slot.name for slot in variable.slots)):
-            if joint.frequency or joint.second in around(joint, parametric.joints):
-                reason = "gives way" if joint.frequency else "is part of a loop"
-                text = f"{joint.anchor} cannot vary: the joint {reason}, so that what it carries is not determined"
-                faults.add(("variable", index, "sets"), text)
-
-
 def around(cut: ParametricJoint, joints: Sequence[ParametricJoint]) -> set[str | None]:
     """The bodies that joints connect to the first body of a joint without that joint; None: the world."""
     found: set[str | None] = {cut.first}
@@ -219,12 +208,17 @@ def components(value: Any) -> list[Expr]:
     return list(value) if isinstance(value, tuple) else [value[k] for k in range(value.shape[0])]
 
 
-def check_starts(parametric: ParametricWorld, varied: Iterable[tuple[Place, str]], faults: Faults) -> None:
-    """Check that a joint with a varied start closes no loop and is rigid, so that what it carries is determined.
+def check_carried(
+    parametric: ParametricWorld,
+    varied: Iterable[tuple[Place, str]],
+    faults: Faults,
+    keys: Sequence[str] = ("start", "start_rate"),
+) -> None:
+    """Check that joints of which these keys vary close no loop and are rigid, so that what they carry is determined.
 
     ``varied`` are the names of what varies, and where the file says so.
     """
-    joints = {f"{joint.name}.{key}": joint for joint in parametric.joints for key in ("start", "start_rate")}
+    joints = {f"{joint.name}.{key}": joint for joint in parametric.joints for key in keys}
     for place, name in varied:
         joint = joints.get(name)
         if joint is not None and (joint.frequency or joint.second in around(joint, parametric.joints)):

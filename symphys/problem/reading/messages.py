@@ -32,6 +32,11 @@ def listed(words: Sequence[str], last: str) -> str:
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
+def wanted(given: Sequence[str]) -> str:
+    """Return the beginning of the message for a table that gives none or several of keys that exclude each other."""
+    return f"has {' and '.join(given)}; give only" if given else "give"
+
+
 def read_value(text: str) -> object:
     """A TOML value that JSON has too, else the text itself."""
     try:

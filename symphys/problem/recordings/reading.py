@@ -119,15 +119,11 @@ def read_start_columns(
                 key, f'{text}; write "position", ["x", "y", "z"] or {{ columns = "x", unit = "mm" }}'
             ) from None
         if not isinstance(given, Mapping):
-            columns = next((as_columns(each) for each in table.measured if each.columns == columns.columns), columns)
+            same = next((each for each in table.measured if each.columns == columns.columns), columns)
+            columns = ColumnsTable(**{key: getattr(same, key) for key in ColumnsTable.model_fields})
         check_table(columns, units.get(quantity, ""), quantity, key)
         found.append(StartColumns(quantity, columns, known[quantity]))
     return found
-
-
-def as_columns(table: ColumnsTable) -> ColumnsTable:
-    """Its columns and units alone."""
-    return ColumnsTable(**{key: getattr(table, key) for key in ColumnsTable.model_fields})
 
 
 MAX_RECORDINGS = 100_000

@@ -11,12 +11,12 @@ import numpy as np
 from symphys.model.joints.frames import WORLD
 from symphys.model.joints.joint import UNWRAPPED
 from symphys.model.joints.start import moved_to_start, moved_to_zero, placed_frames, spanning_tree
+from symphys.model.state_layout import GIVEN
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.placement import follow
 from symphys.types import Array
 
 State = dict[str, Array]
-FIELDS = ("position", "orientation", "velocity", "angular_velocity")
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Starts:
                 state |= {name: np.array(value).ravel() for name, value in moved.items()}
             if joint.name in rates:
                 turn_on(joint, body, rates[joint.name], state)
-        return {f"{body}.{field}": state[f"{body}.{field}"] for body in group for field in FIELDS} | near
+        return {f"{body}.{field}": state[f"{body}.{field}"] for body in group for field in GIVEN} | near
 
     def coordinates(self, given: Mapping[str, Array]) -> dict[str, Array]:
         """Return what a recording sets of joints, by the names of variables: ``hinge.start`` [rad] or [m]."""

@@ -13,24 +13,23 @@ import numpy as np
 from symphys.expression import Formula, FormulaError, parse
 from symphys.model.heightfield import Heightfield
 from symphys.model.orientation import roll_pitch_yaw, unit_quaternion
-from symphys.model.shapes import SHAPES, UPRIGHT, Fixture, Plane, Shape, Sphere, Terrain
+from symphys.model.shapes import SHAPES, UPRIGHT, Fixture, Plane, Shape, Sphere, Static, Terrain
 from symphys.model.shapes.inertia import centring, off_centre
 from symphys.model.world import COMBINE
 from symphys.problem.limits import check_magnitudes
 from symphys.problem.parametric.parts import ParametricBody, ParametricStatic
 from symphys.problem.reading.faults import Faults, Place
-from symphys.problem.reading.messages import listed
+from symphys.problem.reading.messages import listed, wanted
 from symphys.problem.schema import Document
 from symphys.problem.schema.physics import (
     BlockTable,
     BodyTable,
-    GroundTable,
     MemberTable,
     PlaneTable,
     SurfaceTable,
     TerrainTable,
 )
-from symphys.problem.schema.shapes import EXAMPLES, PartTable, ShapeTable, SolidTable
+from symphys.problem.schema.shapes import EXAMPLES, ShapeTable, SolidTable
 from symphys.problem.schema.types import RollPitchYaw
 from symphys.suggest import quote
 from symphys.types import Array
@@ -54,15 +53,13 @@ def read_shape(place: Place, table: ShapeTable | None, faults: Faults) -> tuple[
     if table.spheres is not None:
         return tuple(Sphere(part.radius, three(part.centre)) for part in table.spheres)
     if table.parts is not None:
-        found = [read_part((*place, "parts", k), part, faults) for k, part in enumerate(table.parts)]
+        found = []
+        for k, part in enumerate(table.parts):
+            where = (*place, "parts", k)
+            orientation = read_orientation((*where, "orientation"), part.orientation, faults)
+            found.append(read_solid(where, part, part.centre, orientation, faults))
         return tuple(shape for shape in found if shape) if all(found) else ()
     return (solid(place, table, given[0], three([0, 0, 0]), UPRIGHT, faults),)
-
-
-def read_part(place: Place, table: PartTable, faults: Faults) -> Shape | None:
-    """Read a part of a compound; None after a fault."""
-    orientation = read_orientation((*place, "orientation"), table.orientation, faults)
-    return read_solid(place, table, table.centre, orientation, faults)
 
 
 def read_solid(
@@ -96,11 +93,6 @@ def solid(
     elif shape.optional_fault:
         faults.add((*place, kind, cls.optional_keys[0].name), shape.optional_fault)
     return shape
-
-
-def wanted(given: Sequence[str]) -> str:
-    """Return the message for a table without exactly one shape."""
-    return f"has {' and '.join(given)}; give only" if given else "give"
 
 
 def three(numbers: Sequence[float]) -> tuple[float, float, float]:
@@ -235,19 +227,16 @@ GRID_KEYS = ("spacing", "origin")
 
 def read_statics(document: Document, starts: Sequence[Sequence[float]], faults: Faults) -> tuple[ParametricStatic, ...]:
     """The ground, if there is one, then planes, blocks and terrain; ``starts``: where bodies are at first."""
-    ground = () if document.ground is None else (read_ground(document.ground),)
-    planes = tuple(read_plane(i, table, faults) for i, table in enumerate(document.plane))
-    blocks = tuple(read_block(i, table, faults) for i, table in enumerate(document.block))
-    terrain = tuple(read_terrain(i, table, starts, faults) for i, table in enumerate(document.terrain))
-    return (*ground, *planes, *blocks, *terrain)
+    found: list[tuple[MemberTable, Static]] = []
+    if document.ground is not None:
+        found.append((document.ground, Plane.ground(document.ground.height)))
+    found += [(table, read_plane(i, table, faults)) for i, table in enumerate(document.plane)]
+    found += [(table, read_block(i, table, faults)) for i, table in enumerate(document.block)]
+    found += [(table, read_terrain(i, table, starts, faults)) for i, table in enumerate(document.terrain)]
+    return tuple(ParametricStatic(static, states(table), table.group, touching(table)) for table, static in found)
 
 
-def read_ground(table: GroundTable) -> ParametricStatic:
-    """The horizontal plane called ground."""
-    return ParametricStatic(Plane.ground(table.height), states(table), table.group, touching(table))
-
-
-def read_plane(index: int, table: PlaneTable, faults: Faults) -> ParametricStatic:
+def read_plane(index: int, table: PlaneTable, faults: Faults) -> Plane:
     """Read a plane."""
     place = ("plane", index)
     length = hypot(*table.normal)  # squares of large numbers overflow
@@ -258,16 +247,15 @@ def read_plane(index: int, table: PlaneTable, faults: Faults) -> ParametricStati
     if (table.point is None) == (table.offset is None):
         faults.add((*place, "offset"), "give either a point of the plane or its offset along the normal")
     offset = table.offset if table.point is None else float(normal @ np.array(table.point))
-    plane = Plane(table.name, three(normal.tolist()), offset or 0.0)
-    return ParametricStatic(plane, states(table), table.group, touching(table))
+    return Plane(table.name, three(normal.tolist()), offset or 0.0)
 
 
-def read_block(index: int, table: BlockTable, faults: Faults) -> ParametricStatic:
+def read_block(index: int, table: BlockTable, faults: Faults) -> Fixture:
     """Read a static solid."""
     place = ("block", index)
     orientation = read_orientation((*place, "orientation"), table.orientation, faults)
     shape = read_solid((*place, "shape"), table.shape, table.position, orientation, faults)
-    return ParametricStatic(Fixture(table.name, shape or Sphere(1.0)), states(table), table.group, touching(table))
+    return Fixture(table.name, shape or Sphere(1.0))
 
 
 @dataclass(frozen=True)
@@ -286,9 +274,7 @@ def flat(x: Any, y: Any) -> Any:
     return 0 * x * y
 
 
-def read_terrain(
-    index: int, table: TerrainTable, starts: Sequence[Sequence[float]], faults: Faults
-) -> ParametricStatic:
+def read_terrain(index: int, table: TerrainTable, starts: Sequence[Sequence[float]], faults: Faults) -> Terrain:
     """Read a terrain; ``starts``: where bodies are at first, so that a formula can be tried there."""
     place = ("terrain", index)
     height: Callable[[Any, Any], Any] | None = None
@@ -302,7 +288,7 @@ def read_terrain(
         rows = tuple(tuple(row) for row in table.heights or ())
         (dx, dy), (x, y) = table.spacing, table.origin or (0.0, 0.0)
         height = Heightfield(rows, (dx, dy), (x, y))
-    return ParametricStatic(Terrain(table.name, height or flat), states(table), table.group, touching(table))
+    return Terrain(table.name, height or flat)
 
 
 def read_formula(

@@ -13,6 +13,9 @@ from symphys.problem.schema.physics import ContactTable, MemberTable, PairTable
 from symphys.problem.tables.bodies import states
 from symphys.suggest import hint, quote
 
+MEMBERS = ("body", "plane", "block", "terrain")
+"""Tables of bodies and static surfaces in lists."""
+
 
 def read_contact(table: ContactTable) -> Law:
     """The law where nothing else is stated."""
@@ -48,9 +51,7 @@ def read_pairs(
 def check_collides_with(names: Sequence[str], groups: Sequence[str], document: Document, faults: Faults) -> None:
     """Check that names in collides_with are those of other bodies, static surfaces or groups."""
     tables: list[tuple[Place, MemberTable, str]] = [
-        ((kind, index), table, table.name)
-        for kind in ("body", "plane", "block", "terrain")
-        for index, table in enumerate(getattr(document, kind))
+        ((kind, index), table, table.name) for kind in MEMBERS for index, table in enumerate(getattr(document, kind))
     ]
     if document.ground is not None:
         tables.append((("ground",), document.ground, "ground"))
@@ -150,7 +151,7 @@ def unused(parametric: ParametricWorld, pair: PairRule) -> str:
 
 def table_place(parametric: ParametricWorld, owner: str, faults: Faults) -> Place:
     """Return the place of the table that states a coefficient: of a surface, a pair or [contact]."""
-    for kind in ("body", "plane", "block", "terrain"):
+    for kind in MEMBERS:
         for index, table in enumerate(faults.data.get(kind, ())):
             if table["name"] == owner:
                 return kind, index

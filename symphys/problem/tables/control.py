@@ -19,6 +19,7 @@ from symphys.problem.limits import check_net
 from symphys.problem.model import FeedbackController, ForceLaw, Phase, Sensor, Variable, VariableSlot
 from symphys.problem.quantities import FORCE_NUMBER, Quantity, SlotError, read_slot
 from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.reading.messages import wanted
 from symphys.problem.schema.control import ControllerTable, ForceTable, NetTable, SensorTable
 from symphys.problem.tables.simulation import find_phase
 from symphys.suggest import hint, quote
@@ -147,8 +148,7 @@ class ControllerReader:
         given = [name for name in LAWS if getattr(self.table, name) is not None]
         if len(given) == 1:
             return given[0]
-        start = f"has {' and '.join(given)}; give only" if given else "give"
-        self.faults.add(self.place, f"{start} one of {', '.join(LAWS.values())}")
+        self.faults.add(self.place, f"{wanted(given)} one of {', '.join(LAWS.values())}")
         return None
 
     def law(self, kind: str, senses: int, outputs: int) -> ControlLaw | None:

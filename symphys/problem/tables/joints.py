@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from symphys.model.world import World
 from symphys.problem.parametric.joints import OWN, ParametricJoint
 from symphys.problem.parametric.parts import ParametricSite
 from symphys.problem.reading.faults import Faults, Place
+from symphys.problem.reading.messages import wanted
 from symphys.problem.schema.joints import CouplingTable, JointTable, MotorTable, SiteTable
 from symphys.problem.tables.bodies import read_orientation
 from symphys.suggest import hint, quote
@@ -279,9 +279,8 @@ class JointReader:
         given = [name for name in JOINTS if getattr(self.table, name) is not None]
         if len(given) == 1:
             return given[0]
-        start = f"has {' and '.join(given)}; give only" if given else "give"
         examples = ", ".join(f"{name} = {each.example}" for name, each in JOINTS.items())
-        self.faults.add(self.place, f"{start} one of {examples}")
+        self.faults.add(self.place, f"{wanted(given)} one of {examples}")
         return None
 
     def check_acting(self, kind: Kind) -> None:
@@ -304,12 +303,11 @@ class JointReader:
             return None
         given = [word for word in MOTORS if getattr(table, word) is not None]
         if len(given) != 1:
-            start = f"has {' and '.join(given)}; give only" if given else "give"
             examples = ", ".join(f"{word} = {motor.example}" for word, motor in MOTORS.items())
-            self.add("motor", f"{start} one of {examples}")
+            self.add("motor", f"{wanted(given)} one of {examples}")
             return None
-        numbers = dict(getattr(table, given[0]))
-        return MOTORS[given[0]](**{key: frozen(value) for key, value in numbers.items()})
+        numbers = dict(getattr(table, given[0])).items()
+        return MOTORS[given[0]](**{key: tuple(value) if isinstance(value, list) else value for key, value in numbers})
 
     def limits(self, kind: Kind) -> Limits:
         """Read the limits in rad or m."""
@@ -343,11 +341,6 @@ class JointReader:
             ):
                 self.add(key, f"{written:g} is beyond the limits of this joint")
         return values
-
-
-def frozen(value: Any) -> Any:
-    """Make tuples of lists."""
-    return tuple(value) if isinstance(value, list) else value
 
 
 def read_sites(tables: Sequence[SiteTable], bodies: Sequence[str], faults: Faults) -> tuple[ParametricSite, ...]:

@@ -59,12 +59,11 @@ def with_termination_cost(document: Document, costs: tuple[Cost, ...], faults: F
         if cost.name == key:
             faults.add(("cost", index, "name"), f'"{key}" is the name of the cost that [{key}] adds; choose another')
     left = Cost(key, parse(f"1 - {ALIVE}"), "always", table.cost, squares=True)
-    return (*map(until_termination, costs), *([left] if table.cost > 0 else []))
-
-
-def until_termination(cost: Cost) -> Cost:
-    """A running cost that stops at the termination."""
-    return replace(cost, formula=parse(f"({cost.formula.text}) * {ALIVE}")) if cost.at == "always" else cost
+    stopped = [
+        replace(cost, formula=parse(f"({cost.formula.text}) * {ALIVE}")) if cost.at == "always" else cost
+        for cost in costs
+    ]
+    return (*stopped, *([left] if table.cost > 0 else []))
 
 
 NO_PHASES: Mapping[str, Phase] = MappingProxyType({})
@@ -94,8 +93,7 @@ def read_objectives(
 
     ``phases`` by name; ``free``: whether a variable sets the duration.
     """
-    reader = ObjectiveReader(simulation, sample, units, faults, free)
-    reader.phases = dict(phases)
+    reader = ObjectiveReader(simulation, sample, units, phases, faults, free)
     costs = [reader.cost(index, table) for index, table in enumerate(document.cost)]
     targets = [reader.target(index, table) for index, table in enumerate(document.target)]
     constraints = [reader.constraint(index, table) for index, table in enumerate(document.constraint)]
@@ -105,7 +103,7 @@ def read_objectives(
         tuple(target for target in targets if target),
         tuple(constraint for constraint in constraints if constraint),
         tuple(output for output in outputs if output),
-        tuple(reader.phases.values()),
+        tuple(phases.values()),
     )
 
 
@@ -117,15 +115,13 @@ class ObjectiveReader:
         simulation: Simulation,
         sample: Mapping[str, Any],
         units: Mapping[str, str],
+        phases: Mapping[str, Phase],
         faults: Faults,
         free: bool,
     ) -> None:
         """Keep what every table needs."""
-        self.simulation = simulation
-        self.sample = sample
-        self.units = units
+        self.simulation, self.sample, self.units, self.phases = simulation, sample, units, phases
         self.faults, self.free = faults, free
-        self.phases: dict[str, Phase] = {}
 
     def moment(self, table: CostTable | ConstraintTable, place: Place) -> tuple[str | float, Phase | None]:
         """Return when a formula is evaluated, and the phase within which it always is."""
@@ -133,17 +129,13 @@ class ObjectiveReader:
             return self.instant(table.at, place), None
         if "at" in table.model_fields_set:
             self.faults.add((*place, "during"), "stands instead of at; leave one of them out")
-        return "always", self.phase(table.during, (*place, "during"))
-
-    def phase(self, name: str, place: Place) -> Phase | None:
-        """The phase of that name; notes where there is none."""
-        return find_phase(name, self.phases, place, self.faults)
+        return "always", find_phase(table.during, self.phases, (*place, "during"), self.faults)
 
     def instant(self, at: str | float, place: Place) -> str | float:
         """The end, or a time; that of a step, whatever the duration. "end of" a phase is a time as well."""
         named = re.fullmatch(OF_PHASE, at) if isinstance(at, str) else None
         if named:
-            phase = self.phase(named[2], (*place, "at"))
+            phase = find_phase(named[2], self.phases, (*place, "at"), self.faults)
             tick = 0 if phase is None else phase.ticks(self.simulation.steps)[named[1] == "end"]
             return "end" if tick == self.simulation.steps else tick * self.simulation.dt
         check_moment(at, self.simulation, (*place, "at"), self.faults)

@@ -20,7 +20,7 @@ from symphys.problem.model import (
     VariableSlot,
 )
 from symphys.problem.parametric.joints import ParametricJoint
-from symphys.problem.parametric.placement import check_starts
+from symphys.problem.parametric.placement import check_carried
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, SlotError, limits, read_slot
 from symphys.problem.reading.faults import Faults, Place
@@ -65,13 +65,8 @@ class ScenarioReader:
         faults: Faults,
     ) -> None:
         """Prepare to read the tables."""
-        self.known, self.parametric, self.simulation, self.taken, self.faults = (
-            known,
-            parametric,
-            simulation,
-            taken,
-            faults,
-        )
+        self.known, self.parametric, self.simulation = known, parametric, simulation
+        self.taken, self.faults = taken, faults
         self.quantities: list[RandomizedQuantity] = []
         self.poses: list[RandomizedPose] = []
         self.discretisations: list[Discretisation] = []
@@ -104,7 +99,7 @@ class ScenarioReader:
             self.faults.add((*place, "factor"), "give either factor or shift")
             return
         self.take((*place, "sets"), slots, table.name)
-        check_starts(self.parametric, [((*place, "sets"), slot.name) for slot in slots], self.faults)
+        check_carried(self.parametric, [((*place, "sets"), slot.name) for slot in slots], self.faults)
         shift = np.array([0.0] if table.shift is None else table.shift)
         if shift.size not in (1, *sizes):
             self.faults.add((*place, "shift"), f"must be a number, or {max(sizes)} of them; it has {shift.size}")
@@ -157,9 +152,8 @@ class ScenarioReader:
             self.faults.add((*place, "robot"), f"{robot} hangs on the world; only what moves freely has a pose")
             return
         slots = [
-            VariableSlot(f"{body}.{field}", tuple(range(4 if field == "orientation" else 3)))
-            for body in whole
-            for field in GIVEN
+            VariableSlot(name, tuple(range(self.known[name].nominal.size)))
+            for name in (f"{body}.{field}" for body in whole for field in GIVEN)
         ]
         self.take((*place, "robot"), slots, table.name)
         tilt, bend = table.tilt + np.deg2rad(table.tilt_deg), table.joints + np.deg2rad(table.joints_deg)

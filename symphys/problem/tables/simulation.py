@@ -15,9 +15,8 @@ from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity, unknown
 from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.schema import Document
-from symphys.problem.schema.mpc import MpcTable, PlantTable
+from symphys.problem.schema.mpc import MpcTable
 from symphys.problem.schema.objectives import PhaseTable
-from symphys.problem.schema.physics import SimulationTable
 from symphys.suggest import hint, quote
 
 MAX_STEPS = 1_000_000
@@ -25,13 +24,6 @@ STEP_RATIO_TOLERANCE = 1e-9
 """Relative slack for a whole number of steps."""
 CLOSED_LOOP_DURATIONS = 5
 """Durations of the problem that the closed loop lasts, unless the file says otherwise."""
-
-
-def read_simulation(table: SimulationTable, faults: Faults) -> Simulation:
-    """The simulation; notes a step that does not fit."""
-    assert table.duration is not None, "recordings or the file say it"
-    check_steps(table.duration, table.dt, faults)
-    return Simulation(**{**table.model_dump(), "smoothing": tuple(table.smoothing)})
 
 
 def check_steps(duration: float, dt: float, faults: Faults, place: Place = ("simulation", "dt")) -> None:
@@ -174,13 +166,19 @@ def read_phases(
 
 
 def read_time(document: Document, faults: Faults) -> tuple[Simulation, RecedingHorizon | None]:
-    """Read the time step of the problem and of its controller's horizon."""
-    simulation = read_simulation(document.simulation, faults)
+    """Read the time step of the problem and of its controller's horizon; note a step that does not fit."""
+    table = document.simulation
+    assert table.duration is not None, "recordings or the file say it"
+    check_steps(table.duration, table.dt, faults)
+    simulation = Simulation(**{**table.model_dump(), "smoothing": tuple(table.smoothing)})
     return simulation, read_mpc(document.mpc, simulation, faults)
 
 
 def read_mpc(table: MpcTable | None, simulation: Simulation, faults: Faults) -> RecedingHorizon | None:
-    """The receding horizon; None without the table. Notes a horizon that is no whole number of steps."""
+    """Read the receding horizon; None without the table. Note a horizon that is no whole number of steps.
+
+    What the plant sets in the file is validated when the plant is made.
+    """
     if table is None:
         return None
     horizon = simulation.duration if table.horizon is None else table.horizon
@@ -188,6 +186,7 @@ def read_mpc(table: MpcTable | None, simulation: Simulation, faults: Faults) -> 
     check_steps(horizon, dt, faults, ("mpc", "horizon" if table.dt is None else "dt"))
     if 1 / table.rate > horizon:
         faults.add(("mpc", "rate"), f"ticks are {1 / table.rate:g} s apart, and a plan ends after {horizon:g} s")
+    plant_dt = simulation.dt / 2 if table.plant.dt is None else table.plant.dt
     return RecedingHorizon(
         rate=table.rate,
         horizon=horizon,
@@ -198,14 +197,8 @@ def read_mpc(table: MpcTable | None, simulation: Simulation, faults: Faults) -> 
         smoothing=simulation.smoothing[-1] if table.smoothing is None else table.smoothing,
         feedback=table.feedback,
         duration=CLOSED_LOOP_DURATIONS * simulation.duration if table.duration is None else table.duration,
-        plant=read_plant(table.plant, simulation),
+        plant=PlantSettings(**{**table.plant.model_dump(), "dt": plant_dt, "set": dict(dotted(table.plant.set))}),
     )
-
-
-def read_plant(table: PlantTable, simulation: Simulation) -> PlantSettings:
-    """The plant; what it sets in the file is validated when it is made."""
-    dt = simulation.dt / 2 if table.dt is None else table.dt
-    return PlantSettings(**{**table.model_dump(), "dt": dt, "set": dict(dotted(table.set))})
 
 
 def dotted(tables: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, object]]:

@@ -1,4 +1,4 @@
-"""Tables of runs: options of the commands that print them, and rows as text, CSV or JSON."""
+"""``symphys ls``, ``best`` and ``diff``: runs as tables of text, CSV or JSON, the best ones, and what two differ in."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from symphys import files
-from symphys.cli.arguments import UsageFault
+from symphys.cli.arguments import REPORTS, UsageFault
 
 if TYPE_CHECKING:
     from symphys.results.table import Rows
     from symphys.results.table.columns import Row
+
 
 F = TypeVar("F", bound=Callable[..., Any])
 SHOWN = ("run", "verdict", "objective", "worst", "OUTPUTS", "equivalents", "solve_seconds", "why")
@@ -187,3 +189,106 @@ class ReadingProgress:
         """Clear the line."""
         if self.shown:
             click.echo(f"\r{' ' * 60}\r", nl=False, err=True)
+
+
+@click.command()
+@click.argument("folder", metavar="[DIR]", type=click.Path(path_type=Path), default=REPORTS)
+@where_option
+@click.option("--sort", metavar="KEY", help="Sort by a column; -KEY: the largest first. Several with commas.")
+@click.option("--limit", type=click.IntRange(1), metavar="N", help="Print at most so many runs.")
+@format_options
+def ls(
+    folder: Path,
+    conditions: tuple[str, ...],
+    sort: str | None,
+    limit: int | None,
+    names: str | None,
+    as_csv: bool,
+    as_json: bool,
+) -> None:
+    """List all runs below DIR, which is `reports` if it is left out.
+
+    A run whose files cannot be read is listed with the file and the reason.
+    """
+    from symphys.results.table import chosen, ordered, read_rows
+
+    with ReadingProgress() as tell:
+        found = read_rows(folder, tell)
+    rows = chosen(found.rows, conditions)
+    if sort:
+        rows = ordered(rows, sort)
+    print_rows(rows[:limit], found, read_columns(names, found), as_csv, as_json)
+    if not (as_csv or as_json):
+        left_out = f" ({limit:,} shown)" if limit and limit < len(rows) else ""
+        click.echo(f"\n{summary(rows)}{left_out}")
+
+
+@click.command()
+@click.argument("folder", metavar="[DIR]", type=click.Path(path_type=Path), default=REPORTS)
+@where_option
+@click.option("--overall", is_flag=True, help="One run, the best of all cases.")
+@click.option(
+    "--by",
+    metavar="KEY",
+    default="objective",
+    show_default=True,
+    help="Of runs with equal verdicts the one with the least of this column is best; -KEY: with the most.",
+)
+@format_options
+def best(
+    folder: Path,
+    conditions: tuple[str, ...],
+    overall: bool,
+    by: str,
+    names: str | None,
+    as_csv: bool,
+    as_json: bool,
+) -> None:
+    """List the best run of each case below DIR, which is `reports` if it is left out.
+
+    A case is a problem with its settings. A run is better by its verdict, then by the objective, then by its cost in
+    rollouts.
+    """
+    from symphys.results.table import best as best_of
+    from symphys.results.table import chosen, columns, read_rows
+    from symphys.results.table.choosing import sorting
+
+    with ReadingProgress() as tell:
+        found = read_rows(folder, tell)
+    rows = best_of(chosen(found.rows, conditions), by, overall)
+    shown = read_columns(names, found)
+    if not (shown or as_csv or as_json):
+        asked, _ = sorting(by, columns(found.rows))
+        usual = usual_columns(rows)
+        shown = usual if asked in usual else [*usual[:2], asked, *usual[2:]]
+    print_rows(rows, found, shown, as_csv, as_json)
+    if not rows and not (as_csv or as_json):
+        click.echo(f"no run below {folder} has a result")
+
+
+@click.command()
+@click.argument("first", metavar="RUN", type=click.Path(path_type=Path))
+@click.argument("second", metavar="RUN", type=click.Path(path_type=Path))
+def diff(first: Path, second: Path) -> None:
+    """List the differences between two run folders.
+
+    Settings, options, the problem's text, what was found, versions and machines. Times are left out.
+    """
+    from symphys.results.table.difference import TEXT, differences
+
+    found = differences(first, second)
+    if not found:
+        click.echo("no difference: the same was asked for, and the same was found")
+    part = ""
+    for each in found:
+        if each.part != part:
+            part = each.part
+            click.echo(click.style(part, bold=True))
+        line = text(str(each))
+        click.echo(coloured(line) if part == TEXT else f"  {line}")
+
+
+def coloured(line: str) -> str:
+    """Colour a line of a unified diff."""
+    colour = {"+": "green", "-": "red"}.get(line[:1]) if sys.stdout.isatty() else None
+    return click.style(line, fg=colour) if colour else line
