@@ -10,6 +10,18 @@ from symphys.findings.examination import Examination
 from symphys.findings.levels import FAIR, GOOD, Judged
 from symphys.findings.numerics import GROWTH, refined_finding
 
+SOLVED = "solved"
+"""Everything is met, or the point is stationary where there is nothing to meet; nothing speaks against it."""
+DOUBTED = "doubted"
+"""The same, but of a motion that is not to be relied on."""
+BEST_FOUND = "best_found"
+"""There is nothing to meet, and the solver ended before it converged."""
+NOT_SOLVED = "not_solved"
+"""Something is missed, or there is no result."""
+INTERRUPTED = "interrupted"
+ACCEPTED = (SOLVED, BEST_FOUND)
+"""What a run was asked for, it did."""
+
 
 @dataclass(frozen=True)
 class Ending:
@@ -66,20 +78,6 @@ def ending(status: str) -> Ending:
     """Return the ending of a status; an unknown one is worded as it stands."""
     text = status.replace("_", " ")
     return ENDINGS.get(status) or Ending(text or "no status", text, faulty=not status)
-
-
-SOLVED = "solved"
-"""Everything is met, or the point is stationary where there is nothing to meet; nothing speaks against it."""
-DOUBTED = "doubted"
-"""The same, but of a motion that is not to be relied on."""
-BEST_FOUND = "best_found"
-"""There is nothing to meet, and the solver ended before it converged."""
-NOT_SOLVED = "not_solved"
-"""Something is missed, or there is no result."""
-INTERRUPTED = "interrupted"
-
-ACCEPTED = (SOLVED, BEST_FOUND)
-"""What a run was asked for, it did."""
 
 
 @dataclass(frozen=True)

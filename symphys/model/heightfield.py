@@ -24,6 +24,18 @@ from symphys.types import Array, Expr
 MAX_SLOPE_RATIO = 3.0
 """Largest slope at a height, as a multiple of the smaller of the slopes to its neighbours."""
 SIDES = (-1, 1)
+PIECES = (1, -4, 6, -4)
+"""A cubic B-spline on the knots -2, -1, 0, 1, 2 is the sum of these times max(t - knot, 0)^3 / 6, up to t = 2."""
+VALUE, SLOPE = (1 / 6, 4 / 6, 1 / 6), (-1 / 2, 0, 1 / 2)
+"""Values and slopes of a cubic B-spline at the heights before, at and after its middle."""
+ROUNDING_TOLERANCE = 1e-12
+"""Smallest change of a slope that is made, as a share of the largest height."""
+GRID_REFINEMENT = 4
+"""Number of parts of a spacing at whose ends a surface is compared with triangles."""
+MAX_COMPARED = 1_000_000
+"""Largest number of places at which it is compared, roughly."""
+Term = tuple[list[Expr], Array, list[Expr]]
+"""Functions of y, coefficients (rows, columns) [m], functions of x: a part of the surface is the sum of products."""
 
 
 @dataclass(frozen=True)
@@ -95,18 +107,6 @@ def off_triangles(fine: Array, corners: Array, finer: int) -> float:
     return most
 
 
-PIECES = (1, -4, 6, -4)
-"""A cubic B-spline on the knots -2, -1, 0, 1, 2 is the sum of these times max(t - knot, 0)^3 / 6, up to t = 2."""
-VALUE, SLOPE = (1 / 6, 4 / 6, 1 / 6), (-1 / 2, 0, 1 / 2)
-"""Values and slopes of a cubic B-spline at the heights before, at and after its middle."""
-ROUNDING_TOLERANCE = 1e-12
-"""Smallest change of a slope that is made, as a share of the largest height."""
-GRID_REFINEMENT = 4
-"""Number of parts of a spacing at whose ends a surface is compared with triangles."""
-MAX_COMPARED = 1_000_000
-"""Largest number of places at which it is compared, roughly."""
-
-
 @dataclass(frozen=True)
 class Basis:
     """Functions of a place along one side of the grid, on the grid's scale, where heights are 1 apart.
@@ -120,10 +120,6 @@ class Basis:
     splines: list[Expr]
     values: list[Expr]
     slopes: list[Expr]
-
-
-Term = tuple[list[Expr], Array, list[Expr]]
-"""Functions of y, coefficients (rows, columns) [m], functions of x: a part of the surface is the sum of products."""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ ORIENTATION = "orientation"
 OF_BODIES = {"position": 3, ORIENTATION: 4, "velocity": 3, "angular_velocity": 3}
 OF_BALLS = {ORIENTATION: 4, "angular_velocity": 3}
 RATES = {ORIENTATION: "angular_velocity", "angle": "rate"}
+SPEEDS = {"velocity", "rate", *RATES.values()}
+"""Fields of quantities that are rates."""
 
 
 def guessable(world: World) -> dict[str, int]:
@@ -124,10 +126,6 @@ def turned_by_share() -> ca.Function:
     """(p, q, share) -> the orientation on the way from p to q."""
     p, q, share = ca.SX.sym("p", 4), ca.SX.sym("q", 4), ca.SX.sym("share")
     return ca.Function("turned", [p, q, share], [rotation.turn(p, share * rotation.between(p, q))])
-
-
-SPEEDS = {"velocity", "rate", *RATES.values()}
-"""Fields of quantities that are rates."""
 
 
 def recorded_guess(world: World, times: Array, recorded: Mapping[str, Array], pace: float = 1.0) -> GuessedMotion:

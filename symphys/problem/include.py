@@ -27,6 +27,24 @@ from symphys.problem.tables.bodies import read_orientation
 from symphys.problems import parts
 from symphys.suggest import hint, quote
 
+LABELLED = ("cost", "target", "constraint", "scenario")
+"""Tables whose names nothing refers to."""
+OTHER_TEXTS = ("at", "during", "file", "interpolation", "height", "activation", "output", "weights")
+"""Keys whose texts name nothing of the file."""
+RECORDED = ("recording", "recorded", "identify")
+OF_THE_PROBLEM = ("simulation", "phase", "termination", "fall", "objective", "solver", "solvers", "sweep", *RECORDED)
+INCLUDING_KEYS = ("include", "included")
+DESCRIPTIVE_KEYS = ("title", "description")
+"""What an included file says about itself alone."""
+MODELS = (".xml", ".mjcf", ".urdf")
+"""Ends of the names of other programs' models."""
+PACKAGE = "package://"
+"""Before the path of a file in an installed package."""
+MODEL_KEYS = {"keyframe", "self_collision", "base"}
+"""Keys about them."""
+LISTS = [name for name, field in Document.model_fields.items() if get_origin(field.annotation) is list]
+Model = TypeVar("Model", bound=SchemaTable)
+
 
 @dataclass(frozen=True)
 class IncludedFile:
@@ -114,12 +132,6 @@ def overlay(merged: MergedFiles, source: IncludedFile, key: str, table: Mapping[
             faults.add_at(origin, f"differs from what {other} gives; leave one of them out, or make them equal")
 
 
-LABELLED = ("cost", "target", "constraint", "scenario")
-"""Tables whose names nothing refers to."""
-OTHER_TEXTS = ("at", "during", "file", "interpolation", "height", "activation", "output", "weights")
-"""Keys whose texts name nothing of the file."""
-
-
 def prefixed(data: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     """The tables of a file with ``prefix`` before every name and group, and wherever a text mentions one."""
     lists = {key: value for key, value in data.items() if isinstance(value, list)}
@@ -153,21 +165,6 @@ def own_names(lists: Mapping[str, list[Any]]) -> set[str]:
     ]
     given = [table.get(key) for table in tables for key in ("name", "group")]
     return {name for name in given if isinstance(name, str) and name}
-
-
-RECORDED = ("recording", "recorded", "identify")
-OF_THE_PROBLEM = ("simulation", "phase", "termination", "fall", "objective", "solver", "solvers", "sweep", *RECORDED)
-INCLUDING_KEYS = ("include", "included")
-DESCRIPTIVE_KEYS = ("title", "description")
-"""What an included file says about itself alone."""
-MODELS = (".xml", ".mjcf", ".urdf")
-"""Ends of the names of other programs' models."""
-PACKAGE = "package://"
-"""Before the path of a file in an installed package."""
-MODEL_KEYS = {"keyframe", "self_collision", "base"}
-"""Keys about them."""
-LISTS = [name for name, field in Document.model_fields.items() if get_origin(field.annotation) is list]
-Model = TypeVar("Model", bound=SchemaTable)
 
 
 def with_included(path: Path, text: str, data: dict[str, Any]) -> MergedFiles:

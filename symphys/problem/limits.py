@@ -36,6 +36,14 @@ MASS_RANGE = (1e-100, 1e100)
 """[kg]"""
 MOMENT_RANGE = (1e-140, 1e140)
 """[kg m^2], of the principal moments of inertia."""
+BYTES_OF_LOOP, BYTES_OF_RECORD, BYTES_OF_NUMBER, BYTES_OF_WEIGHT = 500, 128, 300, 40
+"""Bytes: of a state in a loop of steps; of a state and step; of a number in a variable; of a weight of a net."""
+CGROUP_LIMITS = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"))
+"""Where Linux states what a group of processes may use: version 2, version 1."""
+GIB = 2.0**30
+MAX_LISTED = 3
+MAX_POINTS = 2000
+"""Points of contact of a world: all are looked at in every step."""
 
 
 def check_magnitudes(place: tuple[str, int], table: BodyTable, body: ParametricBody, faults: Faults) -> None:
@@ -80,13 +88,6 @@ def within(values: float | Sequence[float] | NDArray[np.float64], limits: tuple[
 def spelled(limits: tuple[float, float]) -> str:
     """``from 1e-100 to 1e+100``."""
     return f"from {limits[0]:g} to {limits[1]:g}"
-
-
-BYTES_OF_LOOP, BYTES_OF_RECORD, BYTES_OF_NUMBER, BYTES_OF_WEIGHT = 500, 128, 300, 40
-"""Bytes: of a state in a loop of steps; of a state and step; of a number in a variable; of a weight of a net."""
-CGROUP_LIMITS = (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"))
-"""Where Linux states what a group of processes may use: version 2, version 1."""
-GIB = 2.0**30
 
 
 def available() -> float:
@@ -139,11 +140,6 @@ def check_rollout(world: World, simulation: Simulation, variables: Sequence[Vari
 def shown(size: float) -> str:
     """``1.5 GiB``."""
     return f"{size / GIB:.3g} GiB"
-
-
-MAX_LISTED = 3
-MAX_POINTS = 2000
-"""Points of contact of a world: all are looked at in every step."""
 
 
 def check_pair_limit(world: ParametricWorld, faults: Faults) -> None:

@@ -49,6 +49,25 @@ DELAY_NUMBER = Number("s", scale=0.01)
 DURATION_NUMBER = Number("s", least=0.0, exceeds=True)
 CLOCK_NUMBERS: Mapping[str, Number] = {"offset": Number("s", scale=0.01), "scale": Number("", least=0.0)}
 """Numbers of the clock of a recording."""
+OTHER_UNITS = {
+    "reaction_force": "N",
+    "reaction_torque": "N m",
+    "lag": "s",
+    "delay": "s",
+    "duration": "s",
+    "gravity": "m/s^2",
+}
+"""By the last part of a name, of what is neither a sensor (``SENSOR_KINDS``) nor declared."""
+SIZES = {each.name: Number("m") for shape in SHAPES.values() for each in (*shape.size_keys, *shape.optional_keys)}
+DECLARED = {**COEFFICIENTS, **INERTIAL, **SIZES, **Plane.numbers, **START_NUMBERS, **INPUT_NUMBERS}
+"""What is declared of numbers of bodies, of static surfaces and of laws of contact."""
+JOINT_UNITS = {
+    **dict.fromkeys(("motor", "lower", "upper", "spring"), "{torque}"),
+    "anchor": "m",
+    "start": "{angle}",
+    "start_rate": "{angle}/s",
+}
+"""Units of what belongs to joints and is no number of theirs."""
 
 
 class SlotError(ValueError):
@@ -199,27 +218,6 @@ def limits(slot: VariableSlot, known: Mapping[str, Quantity]) -> tuple[Array, Ar
     if key == EDGE and quantity.kind == "parameter":
         high = np.full(1, MAX_EDGE_SHARE * known[f"{owner}.size"].nominal.min() / 2)
     return low, high
-
-
-OTHER_UNITS = {
-    "reaction_force": "N",
-    "reaction_torque": "N m",
-    "lag": "s",
-    "delay": "s",
-    "duration": "s",
-    "gravity": "m/s^2",
-}
-"""By the last part of a name, of what is neither a sensor (``SENSOR_KINDS``) nor declared."""
-SIZES = {each.name: Number("m") for shape in SHAPES.values() for each in (*shape.size_keys, *shape.optional_keys)}
-DECLARED = {**COEFFICIENTS, **INERTIAL, **SIZES, **Plane.numbers, **START_NUMBERS, **INPUT_NUMBERS}
-"""What is declared of numbers of bodies, of static surfaces and of laws of contact."""
-JOINT_UNITS = {
-    **dict.fromkeys(("motor", "lower", "upper", "spring"), "{torque}"),
-    "anchor": "m",
-    "start": "{angle}",
-    "start_rate": "{angle}/s",
-}
-"""Units of what belongs to joints and is no number of theirs."""
 
 
 def quantity_unit(name: str, world: World) -> str | None:

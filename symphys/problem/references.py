@@ -30,6 +30,7 @@ MIN_ROWS, MAX_ROWS = 2, 1000
 """Each row is looked at in every evaluation of a formula."""
 MAX_BYTES = 10**7
 """[bytes] Largest memory of the arrays of an NPZ file: a thousand rows of a thousand columns."""
+DELAY = "delay"
 
 
 class SeriesError(ValueError):
@@ -107,9 +108,6 @@ def number(cell: str, where: str) -> float:
     if abs(value) > MAX_NUMBER:
         raise SeriesError(f"{where}: {quote(cell.strip())} {TOO_LARGE}")
     return value
-
-
-DELAY = "delay"
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,8 @@ from symphys.types import Array, Expr
 
 MAX_STRUCTURES = 8
 """How many structures of worlds are kept at once."""
+MAX_OVERLAP = 1e-3
+"""Deepest overlap at the start [m]; more would be pushed out in the first steps, which is never meant."""
 
 
 class StartFunctions:
@@ -144,10 +146,6 @@ class StartValues:
 def parameter(value: Array) -> float | tuple[float, ...]:
     """A parameter's value as worlds take it."""
     return float(value[0]) if value.size == 1 else tuple(value.tolist())
-
-
-MAX_OVERLAP = 1e-3
-"""Deepest overlap at the start [m]; more would be pushed out in the first steps, which is never meant."""
 
 
 def at_guess(

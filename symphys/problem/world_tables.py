@@ -25,21 +25,6 @@ from symphys.model.world import Law, Side, World
 from symphys.problem.parametric.parts import LAW
 from symphys.types import Array
 
-
-def numbers(thing: Any) -> dict[str, float]:
-    """The fields of a motor or a spring that are not None."""
-    return {key: floats(value) for key, value in vars(thing).items() if value is not None}
-
-
-def floats(value: Any) -> Any:
-    """Plain numbers, in lists as deep as they were given; SymphysError for symbols."""
-    if isinstance(value, list | tuple):
-        return [floats(each) for each in value]
-    if isinstance(value, ca.SX | ca.MX) and not value.is_constant():
-        raise SymphysError(f"{value} is no number: give one, and let a variable of the problem set it")
-    return np.asarray(value, float).tolist()
-
-
 MAX_FORMULA_LENGTH = 20_000
 """Characters; beyond that an expression repeats so much that a grid of heights serves better."""
 OPERATION_FORMATS: dict[int, str] = {
@@ -63,6 +48,26 @@ OPERATION_FORMATS: dict[int, str] = {
     for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "sqrt", "exp", "log", "sign")
 }
 """By casadi's operations, with places for their arguments."""
+Start = Mapping[str, Any]
+"""States by name, such as ``ball.position``; what is missing is zero, and upright."""
+INERTIA_TOLERANCE = 1e-13
+"""Inertias whose difference is below this share of the trace are the same."""
+ZERO_TOLERANCE = 1e-9
+"""Coordinates below this are 0 [rad] or [m]."""
+
+
+def numbers(thing: Any) -> dict[str, float]:
+    """The fields of a motor or a spring that are not None."""
+    return {key: floats(value) for key, value in vars(thing).items() if value is not None}
+
+
+def floats(value: Any) -> Any:
+    """Plain numbers, in lists as deep as they were given; SymphysError for symbols."""
+    if isinstance(value, list | tuple):
+        return [floats(each) for each in value]
+    if isinstance(value, ca.SX | ca.MX) and not value.is_constant():
+        raise SymphysError(f"{value} is no number: give one, and let a variable of the problem set it")
+    return np.asarray(value, float).tolist()
 
 
 def formula_text(height: Callable[[Any, Any], Any]) -> str:
@@ -91,12 +96,6 @@ def formula_text(height: Callable[[Any, Any], Any]) -> str:
             if len(values[out[0]]) > MAX_FORMULA_LENGTH:
                 raise SymphysError(f"its formula is longer than {MAX_FORMULA_LENGTH} characters")
     return text
-
-
-Start = Mapping[str, Any]
-"""States by name, such as ``ball.position``; what is missing is zero, and upright."""
-INERTIA_TOLERANCE = 1e-13
-"""Inertias whose difference is below this share of the trace are the same."""
 
 
 def world_tables(world: World, start: Start) -> dict[str, Any]:
@@ -258,10 +257,6 @@ def candidate_pairs(world: World) -> Iterator[tuple[str, str]]:
 def side_name(world: World, side: Side) -> str:
     """The body, or what stands still, on a side of a pair."""
     return world.statics[side.shape].name if side.body is None else world.bodies[side.body].name
-
-
-ZERO_TOLERANCE = 1e-9
-"""Coordinates below this are 0 [rad] or [m]."""
 
 
 def joint_tables(world: World, start: Mapping[str, Any]) -> tuple[list[dict[str, Any]], Mapping[str, Any]]:

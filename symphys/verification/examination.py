@@ -25,6 +25,20 @@ EVERY_COMPONENT = 12
 """Variables up to this size are differenced component by component, larger ones along as many random directions."""
 SIDE_CHECK_ERROR = 1e-4
 """Relative error of central differences from which each side is examined by itself."""
+Tell = Callable[[str], None]
+SIMULATING = "simulating"
+COMPARING = "comparing the gradient with differences"
+SWEEPING = "sweeping the sensitivity back through time"
+NEAR = "looking for near misses"
+CONFLICTS = "looking for targets and bounds that stand in the way"
+SMOOTHING = "smoothing, and adding up energy and momentum"
+PARTS = {
+    **{SIMULATING: 5.0, COMPARING: 20.0},
+    **dict.fromkeys(refinement.TOLD.values(), 18.0),
+    **{SWEEPING: 4.0, NEAR: 2.0, CONFLICTS: 3.0, SMOOTHING: 4.0},
+}
+"""The parts of an examination that take time, in their order, and about how much of it each takes; measured with the
+shipped problems, beside some 8 for building the problem."""
 
 
 def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
@@ -112,23 +126,6 @@ def _beside(value: Values, z: Array, directions: Array, steps: Sequence[float], 
     offsets = np.multiply.outer(np.multiply.outer(np.array(steps), places), directions)
     points = z + np.moveaxis(offsets, 2, 1)
     return value(points.reshape(-1, z.size)).reshape(points.shape[:-1])
-
-
-Tell = Callable[[str], None]
-
-SIMULATING = "simulating"
-COMPARING = "comparing the gradient with differences"
-SWEEPING = "sweeping the sensitivity back through time"
-NEAR = "looking for near misses"
-CONFLICTS = "looking for targets and bounds that stand in the way"
-SMOOTHING = "smoothing, and adding up energy and momentum"
-PARTS = {
-    **{SIMULATING: 5.0, COMPARING: 20.0},
-    **dict.fromkeys(refinement.TOLD.values(), 18.0),
-    **{SWEEPING: 4.0, NEAR: 2.0, CONFLICTS: 3.0, SMOOTHING: 4.0},
-}
-"""The parts of an examination that take time, in their order, and about how much of it each takes; measured with the
-shipped problems, beside some 8 for building the problem."""
 
 
 @np.errstate(invalid="ignore", over="ignore")  # numbers that are not finite are reported as such

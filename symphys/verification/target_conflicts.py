@@ -27,6 +27,24 @@ BOUND_TOLERANCE = 1e-9
 """A component lies at a bound within this share of 1 + the bound."""
 MIN_GAIN_SHARE = 1e-6
 """Gain of a change by the scale, as a share of 1 + |merit|, below which a bound does not count as active."""
+MAX_COMPONENTS = 16
+"""Components of targets up to which contradictions are searched."""
+MORE_SAMPLES = 2
+"""Points beside z in addition to one for each component."""
+NEAREST, FURTHEST = 1e-2, 0.5
+"""Range of distances of the points from z, in units of the variables' scales."""
+DEPENDENT = 1e-6
+"""Changes with a combination below this share of their size are linearly dependent."""
+NO_CHANGE = 1e-9
+"""A component that changes by less, relative to 1 + its size, does not change."""
+OPPOSED = 1e-2
+"""Gradients cancel where their sum is below this share of the sum of their lengths."""
+BALANCED = 0.05
+"""The gradients of targets and of all else cancel where their sum is below this share of the sum of their lengths."""
+NEARER = 0.5
+"""A step towards targets that can be met leaves less than this share of what is missed; a linear one leaves 0.25."""
+MIN_SHARE = 0.05
+"""Targets with less than this share of the largest part are not named."""
 
 
 def held_bounds(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
@@ -73,26 +91,6 @@ def _rows(block: VariableBlock, side: str, gains: Array, least: float) -> list[d
             found = {"variable": block.name, "component": i, "components": components, "side": side, "bound": bound}
             rows.append(found | {"knots": int(held.sum()), "of": knots, "gain": float(gain[held, i].sum())})
     return rows
-
-
-MAX_COMPONENTS = 16
-"""Components of targets up to which contradictions are searched."""
-MORE_SAMPLES = 2
-"""Points beside z in addition to one for each component."""
-NEAREST, FURTHEST = 1e-2, 0.5
-"""Range of distances of the points from z, in units of the variables' scales."""
-DEPENDENT = 1e-6
-"""Changes with a combination below this share of their size are linearly dependent."""
-NO_CHANGE = 1e-9
-"""A component that changes by less, relative to 1 + its size, does not change."""
-OPPOSED = 1e-2
-"""Gradients cancel where their sum is below this share of the sum of their lengths."""
-BALANCED = 0.05
-"""The gradients of targets and of all else cancel where their sum is below this share of the sum of their lengths."""
-NEARER = 0.5
-"""A step towards targets that can be met leaves less than this share of what is missed; a linear one leaves 0.25."""
-MIN_SHARE = 0.05
-"""Targets with less than this share of the largest part are not named."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,10 @@ from symphys.model.shapes import UPRIGHT
 from symphys.suggest import hint, quote
 from symphys.types import Array
 
+ORIGIN = (0.0, 0.0, 0.0)
+REST = {"position": ORIGIN, "orientation": UPRIGHT, "velocity": ORIGIN, "angular_velocity": ORIGIN}
+"""Where bodies begin that do not say so."""
+
 
 @dataclass(frozen=True)
 class PlacedJoint:
@@ -136,11 +140,6 @@ def _three(key: str, given: object) -> Array:
 def _refused(name: str, text: str) -> SymphysError:
     """The error about a joint."""
     return SymphysError(f"joint {quote(name)}: {text}")
-
-
-ORIGIN = (0.0, 0.0, 0.0)
-REST = {"position": ORIGIN, "orientation": UPRIGHT, "velocity": ORIGIN, "angular_velocity": ORIGIN}
-"""Where bodies begin that do not say so."""
 
 
 def jointed(bodies: tuple[Body, ...], joints: Sequence[JointSpec]) -> tuple[tuple[Body, ...], tuple[Joint, ...]]:

@@ -26,6 +26,24 @@ from symphys.model.shapes import Shape, Sphere, Static, Surface
 from symphys.model.shapes.inertia import MOMENT_ROUNDING, Tensor, inertia_of, specific
 from symphys.model.world import Law
 
+Numbers = float | tuple[float, ...]
+Value = Callable[[str], Any]
+"""A parameter's value by name: a scalar, or a tuple of them."""
+LAW = tuple(each.name for each in fields(Law) if "value" in each.metadata)
+"""The coefficients of a contact law, all of which a [[pair]] table may state."""
+COEFFICIENTS = numbers_of(Law)
+"""Those that are parameters where stated."""
+DISTRIBUTION = ("second_moments", "correlations")
+"""Parameters of a body that follow from mass, shape and inertia unless they are set."""
+CENTRE = "centre_of_mass"
+INERTIAL: Mapping[str, Number] = {
+    "mass": Number("kg", least=0.0, exceeds=True),
+    "second_moments": Number("kg m^2", least=0.0, floored=True),
+    "correlations": Number("", least=-1.0, most=1.0, scale=0.1),
+    CENTRE: Number("m", scale=0.01),
+}
+"""Parameters of every body with mass."""
+
 
 def distribution(tensor: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Second moments (3,) [kg m^2] and correlations (3,) [-] of an inertia as ``Body`` has it, body frame."""
@@ -55,26 +73,6 @@ def inertia(moments: Sequence[Scalar], correlations: Sequence[Scalar]) -> Any:
     x, y, z = (ca.sqrt(each) for each in moments)
     pxy, pxz, pyz = -xy * x * y, -xz * x * z, -yz * y * z
     return (b + c, pxy, pxz), (pxy, a + c, pyz), (pxz, pyz, a + b)
-
-
-Numbers = float | tuple[float, ...]
-Value = Callable[[str], Any]
-"""A parameter's value by name: a scalar, or a tuple of them."""
-
-LAW = tuple(each.name for each in fields(Law) if "value" in each.metadata)
-"""The coefficients of a contact law, all of which a [[pair]] table may state."""
-COEFFICIENTS = numbers_of(Law)
-"""Those that are parameters where stated."""
-DISTRIBUTION = ("second_moments", "correlations")
-"""Parameters of a body that follow from mass, shape and inertia unless they are set."""
-CENTRE = "centre_of_mass"
-INERTIAL: Mapping[str, Number] = {
-    "mass": Number("kg", least=0.0, exceeds=True),
-    "second_moments": Number("kg m^2", least=0.0, floored=True),
-    "correlations": Number("", least=-1.0, most=1.0, scale=0.1),
-    CENTRE: Number("m", scale=0.01),
-}
-"""Parameters of every body with mass."""
 
 
 def stated(states: Mapping[str, Any]) -> dict[str, Numbers]:

@@ -25,6 +25,7 @@ from symphys.problem.reading.faults import Faults, Place
 from symphys.types import Array, Expr
 
 State = Mapping[str, Expr]
+PLACING = ("anchor", CENTRE)
 
 
 def forward_kinematics(
@@ -82,9 +83,6 @@ def follow(body: str, base: str, before: State, after: State) -> dict[str, Expr]
         f"{body}.velocity": after[f"{base}.velocity"] + ca.cross(spin, away) + rotation.rotate(turn, slide),
         f"{body}.angular_velocity": spin + rotation.rotate(turn, own),
     }
-
-
-PLACING = ("anchor", CENTRE)
 
 
 def placing(names: Iterable[str]) -> list[str]:

@@ -13,6 +13,13 @@ from symphys import files
 from symphys.problem.reading.faults import Faults, Place
 from symphys.suggest import hint, quote
 
+Finding = Mapping[str, Any]
+REMOVED: dict[tuple[str, str], str] = {
+    ("joint", "centre"): "leave it out: angles of joints count whole turns; where a formula needs one between -pi and "
+    "pi, wrap_to_pi(knee.angle) gives it",
+}
+"""Keys that there were, by table and name, and what is there instead."""
+
 
 def shown(value: object) -> str:
     """A value as its author would recognise it."""
@@ -47,9 +54,6 @@ def read_value(text: str) -> object:
     return table["value"] if table.keys() == {"value"} else text
 
 
-Finding = Mapping[str, Any]
-
-
 def size(value: object) -> str:
     """``has 2`` or ``has none``."""
     count = len(value) if isinstance(value, list | str | dict) else 0
@@ -78,13 +82,6 @@ MESSAGES: dict[str, Callable[[Finding], str]] = {
     "too_short": lambda e: f"must have {e['ctx']['min_length']} or more entries, {size(e['input'])}",
     "too_long": lambda e: f"must have at most {e['ctx']['max_length']} entries, {size(e['input'])}",
 }
-
-
-REMOVED: dict[tuple[str, str], str] = {
-    ("joint", "centre"): "leave it out: angles of joints count whole turns; where a formula needs one between -pi and "
-    "pi, wrap_to_pi(knee.angle) gives it",
-}
-"""Keys that there were, by table and name, and what is there instead."""
 
 
 def report(error: ValidationError, model: type[BaseModel], faults: Faults, prefix: Place = ()) -> None:

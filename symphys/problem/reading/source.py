@@ -21,6 +21,15 @@ LONG_KEY = re.compile(rf"(?<![\w-])(?:[\"']?[\w-]++[\"']?[ \t]*\.[ \t]*){{{MAX_K
 EXAMPLE = (
     'a problem file is TOML text such as: [simulation] with duration and dt, then [[body]] with name = "ball", ...'
 )
+MAX_NUMBER = 1e150
+"""Largest absolute value of a number; its square is finite."""
+TOO_LARGE = f"is too large to be computed with; numbers are from {-MAX_NUMBER:g} to {MAX_NUMBER:g}"
+UNCHECKED_TABLES = ("solver", "recording")
+"""Tables that are not checked: their numbers go to libraries, or have a range of their own."""
+UNCHECKED_KEYS = ("axis", "axes", "normal", "mass", "density", "inertia", "noise")
+"""Keys that are not checked: directions, whose length does not matter, and numbers with a range of their own."""
+MAX_FAULTS = 3
+"""Largest number of faults of one table that are named."""
 
 
 def refuse(path: Path, message: str) -> ProblemError:
@@ -79,17 +88,6 @@ def parse_toml(path: Path, text: str) -> dict[str, Any]:
     except (ValueError, OverflowError, MemoryError) as error:
         reason = str(error).split(";")[0]  # what follows is advice to programmers
         raise refuse(path, f"this is not valid TOML: {reason}") from None
-
-
-MAX_NUMBER = 1e150
-"""Largest absolute value of a number; its square is finite."""
-TOO_LARGE = f"is too large to be computed with; numbers are from {-MAX_NUMBER:g} to {MAX_NUMBER:g}"
-UNCHECKED_TABLES = ("solver", "recording")
-"""Tables that are not checked: their numbers go to libraries, or have a range of their own."""
-UNCHECKED_KEYS = ("axis", "axes", "normal", "mass", "density", "inertia", "noise")
-"""Keys that are not checked: directions, whose length does not matter, and numbers with a range of their own."""
-MAX_FAULTS = 3
-"""Largest number of faults of one table that are named."""
 
 
 def check_range(data: Mapping[str, Any], faults: Faults) -> None:

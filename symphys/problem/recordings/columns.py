@@ -19,6 +19,16 @@ from symphys.archives import ArchiveError, read_arrays
 from symphys.suggest import hint, quote
 from symphys.types import Array
 
+CHUNK_BYTES = 1 << 23
+"""Bytes."""
+MAX_LINE_BYTES = 1 << 20
+"""Bytes; a longer one is no line of a table."""
+DELIMITERS = ",;\t"
+MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
+"""Cells that are a missing number, in small letters."""
+MAX_BYTES = 2**29
+"""[bytes] Largest memory of the arrays of one recording: some 67 million numbers."""
+
 
 class RecordingFault(ValueError):
     """Numbers that are no recording.
@@ -89,15 +99,6 @@ class RecordedColumns:
         """(n, m): columns and arrays beside each other, a copy."""
         self.require(names, key)
         return np.column_stack([self.values[name] for name in names])
-
-
-CHUNK_BYTES = 1 << 23
-"""Bytes."""
-MAX_LINE_BYTES = 1 << 20
-"""Bytes; a longer one is no line of a table."""
-DELIMITERS = ",;\t"
-MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
-"""Cells that are a missing number, in small letters."""
 
 
 @dataclass(frozen=True)
@@ -272,10 +273,6 @@ def number(cell: str, where: str) -> float:
             "files", f"{where}: {quote(text)} is not finite; leave the cell empty where one is missing"
         )
     return value
-
-
-MAX_BYTES = 2**29
-"""[bytes] Largest memory of the arrays of one recording: some 67 million numbers."""
 
 
 def read_npz(stream: BinaryIO, label: str, wanted: set[str], rows: str | None) -> tuple[RecordedColumns, Array | None]:

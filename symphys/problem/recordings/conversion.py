@@ -26,6 +26,26 @@ MAX_STEPS = 1e15
 """Steps: more are not told apart."""
 TIME_TOLERANCE = 1e-9
 """Relative, of the end of the simulation."""
+Key = tuple[str | int, ...]
+PLACED = "position"
+"""The field of quantities that a frame turns and shifts; points of space."""
+TURNED = frozenset({*INPUT_FIELDS, *(kind.key for kind in SENSOR_KINDS if kind.axes == "world")} - {PLACED})
+"""Fields of vectors in world coordinates, which a frame turns."""
+ORIENTATION = "orientation"
+MAX_MEASUREMENT = 1e30
+"""In the unit of the engine: larger numbers mark what is missing in some programs, and have no finite squares."""
+LENGTH = "m"
+"""The unit of lengths."""
+MAX_LENGTH_ERROR = 1e-2
+"""By how much the length of a quaternion may differ from 1."""
+MAX_LENGTH_RATIO = 30.0
+"""Lengths that exceed what the world has by this factor are in another unit."""
+MAX_RATIO_ERROR = 3.0
+"""How far a ratio of lengths may be off 100 or 1000. That to an upper bound is less than the factor of the unit."""
+START_SHARE = 0.05
+"""Share of the recording in which its first sample is compared with the start of the simulation."""
+MIN_LENGTH = 1e-3
+"""[m] of the start; what is smaller has no ratio."""
 
 
 def time_column(table: RecordingTable) -> str | None:
@@ -124,20 +144,6 @@ def steps_apart(time: Array, dt: float) -> float:
     return float(np.median(np.diff(time))) / dt
 
 
-Key = tuple[str | int, ...]
-PLACED = "position"
-"""The field of quantities that a frame turns and shifts; points of space."""
-TURNED = frozenset({*INPUT_FIELDS, *(kind.key for kind in SENSOR_KINDS if kind.axes == "world")} - {PLACED})
-"""Fields of vectors in world coordinates, which a frame turns."""
-ORIENTATION = "orientation"
-MAX_MEASUREMENT = 1e30
-"""In the unit of the engine: larger numbers mark what is missing in some programs, and have no finite squares."""
-LENGTH = "m"
-"""The unit of lengths."""
-MAX_LENGTH_ERROR = 1e-2
-"""By how much the length of a quaternion may differ from 1."""
-
-
 @dataclass(frozen=True, eq=False)
 class MeasurementFrame:
     """The frame of the measurement system in the world: origin (3,) [m] and unit quaternion (4,) of its axes."""
@@ -228,16 +234,6 @@ def check_table(table: ColumnsTable, unit: str, quantity: str, key: Key) -> None
     if quantity.endswith(f".{ORIENTATION}") and (table.unit is not None or table.factor != 1 or table.offset):
         which = "unit" if table.unit is not None else "factor" if table.factor != 1 else "offset"
         raise RecordingFault((*key, which), "a unit quaternion has none; leave this out")
-
-
-MAX_LENGTH_RATIO = 30.0
-"""Lengths that exceed what the world has by this factor are in another unit."""
-MAX_RATIO_ERROR = 3.0
-"""How far a ratio of lengths may be off 100 or 1000. That to an upper bound is less than the factor of the unit."""
-START_SHARE = 0.05
-"""Share of the recording in which its first sample is compared with the start of the simulation."""
-MIN_LENGTH = 1e-3
-"""[m] of the start; what is smaller has no ratio."""
 
 
 def longest(parametric: ParametricWorld, initial: Mapping[str, Array], duration: float) -> float:

@@ -20,6 +20,13 @@ from symphys.suggest import hint, quote
 
 HEADING = "\n[[recorded]]\n"
 PLACES = re.compile(r'^path = ".*"\n(?=sha256 = "[0-9a-f]{64}"$)', re.MULTILINE)
+ARRAYS = (".npz",)
+TEXTS = (".csv", ".tsv", ".txt", ".dat")
+WILDCARD = re.compile(r"[*?\[]")
+MAX_FILES = 10_000
+"""Of one pattern."""
+MAX_KEPT_BYTES, MAX_KEPT_BYTES_TOGETHER = 100_000, 200_000
+"""Bytes of a CSV file that is kept in the text of the problem, and of all of them: each run folder has that text."""
 
 
 def plain_text(content: bytes) -> str | None:
@@ -44,15 +51,6 @@ def recorded_appendix(files: Iterable[RecordedFile]) -> str:
 def without_places(text: str) -> str:
     """A problem's text without the places of recorded files: digests say what is in them."""
     return PLACES.sub("", text) if HEADING in text else text
-
-
-ARRAYS = (".npz",)
-TEXTS = (".csv", ".tsv", ".txt", ".dat")
-WILDCARD = re.compile(r"[*?\[]")
-MAX_FILES = 10_000
-"""Of one pattern."""
-MAX_KEPT_BYTES, MAX_KEPT_BYTES_TOGETHER = 100_000, 200_000
-"""Bytes of a CSV file that is kept in the text of the problem, and of all of them: each run folder has that text."""
 
 
 class FileFinder:

@@ -47,6 +47,13 @@ from symphys.problem.tables.bodies import read_orientation
 from symphys.suggest import hint, quote
 from symphys.types import Array
 
+MAX_RECORDINGS = 100_000
+"""Recordings of one table."""
+MIN_NOISE = 1e-30
+"""Of a noise: squares of what is divided by it are numbers."""
+MAX_STEPS = 100_000
+"""Of a duration that comes from recordings: times in milliseconds, or since 1970, are not simulated by mistake."""
+
 
 @dataclass(frozen=True)
 class StartColumns:
@@ -126,10 +133,6 @@ def read_start_columns(
     return found
 
 
-MAX_RECORDINGS = 100_000
-"""Recordings of one table."""
-
-
 def pieces(columns: RecordedColumns, starts: Array | None, split: str | None) -> list[tuple[int, int]]:
     """The first row of each recording and that after its last one.
 
@@ -201,10 +204,6 @@ def held_back(wanted: bool | float | Sequence[int | str], names: Sequence[Sequen
         for k in own:
             chosen[k] = True
     return chosen
-
-
-MIN_NOISE = 1e-30
-"""Of a noise: squares of what is divided by it are numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -473,10 +472,6 @@ def read_recordings(
         except RecordingFault as fault:
             faults.add(("recording", index, *fault.key), str(fault))
     return tuple(found)
-
-
-MAX_STEPS = 100_000
-"""Of a duration that comes from recordings: times in milliseconds, or since 1970, are not simulated by mistake."""
 
 
 @dataclass(frozen=True, eq=False)

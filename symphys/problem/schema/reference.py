@@ -18,6 +18,24 @@ from symphys.problem.schema import Document
 from symphys.problem.schema.physics import MemberTable, SurfaceTable
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
+UNIT = re.compile(r" ?\[((?:m|s|kg|rad|Hz|N|degrees|1/s)(?:[ /^][\w /^]*)?)\]")
+"""A unit in a description: [m], [N m s/rad]."""
+DEFAULT = re.compile(r"(?:^|[;:.,] )[Dd]efault:? ([^.;]+)(?=[.;]|$)")
+"""A default in words, in the description of an optional key."""
+COMPONENTS = {2: "[a, b]", 3: "[x, y, z]", 4: "[w, x, y, z]"}
+HEAD = """# Reference of problem files
+
+Every table and key of a problem file. `symphys schema --markdown` prints this page, and `symphys schema` prints the
+same as a JSON Schema, with which editors complete and check files. [Problem files](problem_files.md) explains the
+tables by examples.
+
+A `[table]` occurs once, a `[[table]]` any number of times, and a heading with a point is a table within another. Units
+are SI, z points up, and coordinates are those of the world unless the key says otherwise. A *name* consists of letters,
+digits and `_`, with a letter first. A *text* is any string; a *formula* is a text in the language of
+[formulas](formulas.md). Where no default is given, a key that is not needed is left out.
+"""
+SHARED = "These keys belong to `[[body]]`, `[ground]`, `[[plane]]`, `[[block]]` and `[[terrain]]`."
+Schema = Mapping[str, Any]
 
 
 def json_schema(solvers: Mapping[str, type[Any]] | None = None) -> dict[str, Any]:
@@ -63,27 +81,8 @@ def infinite(value: Any) -> bool:
     return isinstance(value, float) and isinf(value)
 
 
-UNIT = re.compile(r" ?\[((?:m|s|kg|rad|Hz|N|degrees|1/s)(?:[ /^][\w /^]*)?)\]")
-"""A unit in a description: [m], [N m s/rad]."""
-DEFAULT = re.compile(r"(?:^|[;:.,] )[Dd]efault:? ([^.;]+)(?=[.;]|$)")
-"""A default in words, in the description of an optional key."""
-COMPONENTS = {2: "[a, b]", 3: "[x, y, z]", 4: "[w, x, y, z]"}
-HEAD = """# Reference of problem files
-
-Every table and key of a problem file. `symphys schema --markdown` prints this page, and `symphys schema` prints the
-same as a JSON Schema, with which editors complete and check files. [Problem files](problem_files.md) explains the
-tables by examples.
-
-A `[table]` occurs once, a `[[table]]` any number of times, and a heading with a point is a table within another. Units
-are SI, z points up, and coordinates are those of the world unless the key says otherwise. A *name* consists of letters,
-digits and `_`, with a letter first. A *text* is any string; a *formula* is a text in the language of
-[formulas](formulas.md). Where no default is given, a key that is not needed is left out.
-"""
 SURFACE = plain(MemberTable.model_json_schema())
 """The keys that bodies and static surfaces share, some of them with pairs."""
-SHARED = "These keys belong to `[[body]]`, `[ground]`, `[[plane]]`, `[[block]]` and `[[terrain]]`."
-
-Schema = Mapping[str, Any]
 
 
 def reference_page(solvers: Mapping[str, type[Any]]) -> str:

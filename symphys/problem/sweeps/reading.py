@@ -37,6 +37,14 @@ TABLE_FORMS = "a list of values, or a table { from = 0.2, to = 2, count = 10 }"
 HEADER = re.compile(r"\s*\[\[?\s*(?P<name>[A-Za-z_\"'][^\]]*?)\s*\]\]?\s*(?:#.*)?")
 OWN_HEADER = re.compile(r"([\"']?)sweep\1(?:\s*\..*)?", re.DOTALL)
 BLANK = re.compile(r"\s*(?:#.*)?")
+NO_SWEEP = "none"
+"""What ``--sweep`` takes to leave the [sweep] table of a file out."""
+OPTION_FORMS = "KEY=FROM:TO:COUNT, KEY=FROM:TO:COUNT:log, KEY=FROM:TO for samples, or KEY=A,B,C"
+OPTION_EXAMPLE = "ball.mass=0.2:2:10"
+NUMBER = r"[-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+RANGE = re.compile(rf"\s*{NUMBER}\s*:.*", re.DOTALL)
+SHORT_KINDS: dict[str, Kind] = {"lhs": "latin hypercube", "latin-hypercube": "latin hypercube"}
+CLOSING_BRACKETS = {"[": "]", "{": "}"}
 
 
 def read_sweep(table: object, file: str) -> Sweep:
@@ -126,16 +134,6 @@ def without_sweep(path: Path, text: str, data: Mapping[str, Any]) -> str:
     except ProblemError:
         pass
     return tomli_w.dumps(data)
-
-
-NO_SWEEP = "none"
-"""What ``--sweep`` takes to leave the [sweep] table of a file out."""
-OPTION_FORMS = "KEY=FROM:TO:COUNT, KEY=FROM:TO:COUNT:log, KEY=FROM:TO for samples, or KEY=A,B,C"
-OPTION_EXAMPLE = "ball.mass=0.2:2:10"
-NUMBER = r"[-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-RANGE = re.compile(rf"\s*{NUMBER}\s*:.*", re.DOTALL)
-SHORT_KINDS: dict[str, Kind] = {"lhs": "latin hypercube", "latin-hypercube": "latin hypercube"}
-CLOSING_BRACKETS = {"[": "]", "{": "}"}
 
 
 def read_axes(texts: Sequence[str]) -> tuple[tuple[Axis, ...], bool]:

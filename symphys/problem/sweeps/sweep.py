@@ -18,6 +18,8 @@ DIGITS = 6
 """Of the distance between the ends of an axis, to which its values are rounded: they are parts of folder names."""
 MAX_WHOLE = 1e15
 """Whole numbers up to this are written without a point."""
+Kind = Literal["grid", "latin hypercube", "sobol"]
+KINDS: tuple[Kind, ...] = ("grid", "latin hypercube", "sobol")
 
 
 class SweepError(SymphysError):
@@ -121,10 +123,6 @@ def sign(value: object) -> str:
 def product(axes: Sequence[Levels]) -> int:
     """The number of points of a grid."""
     return math.prod(len(axis.values) for axis in axes)
-
-
-Kind = Literal["grid", "latin hypercube", "sobol"]
-KINDS: tuple[Kind, ...] = ("grid", "latin hypercube", "sobol")
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,10 @@ from symphys.types import Array
 
 KINDS = tuple(SHAPES)
 COMPOUND = "{ parts = [{ box = { size = [1, 2, 3] }, centre = [0.5, 0, 0] }, ...] }"
+INERTIA_TOLERANCE = 1e-9
+"""Relative slack for symmetry and the triangle inequality, which flat and thin bodies meet with equality."""
+HEIGHT_NAMES = ("x", "y")
+GRID_KEYS = ("spacing", "origin")
 
 
 def read_shape(place: Place, table: ShapeTable | None, faults: Faults) -> tuple[Shape, ...]:
@@ -110,10 +114,6 @@ def read_orientation(place: Place, given: Any, faults: Faults) -> Array:
     except ValueError as fault:
         faults.add(place, str(fault))
         return np.array(UPRIGHT)
-
-
-INERTIA_TOLERANCE = 1e-9
-"""Relative slack for symmetry and the triangle inequality, which flat and thin bodies meet with equality."""
 
 
 def inertia_fault(value: float | Sequence[float] | Sequence[Sequence[float]]) -> str:
@@ -219,10 +219,6 @@ def frozen(inertia: object) -> object:
     if isinstance(inertia, list):
         return tuple(frozen(item) for item in inertia)
     return float(inertia) if isinstance(inertia, int | float) else None
-
-
-HEIGHT_NAMES = ("x", "y")
-GRID_KEYS = ("spacing", "origin")
 
 
 def read_statics(document: Document, starts: Sequence[Sequence[float]], faults: Faults) -> tuple[ParametricStatic, ...]:

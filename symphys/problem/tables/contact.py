@@ -15,6 +15,9 @@ from symphys.suggest import hint, quote
 
 MEMBERS = ("body", "plane", "block", "terrain")
 """Tables of bodies and static surfaces in lists."""
+Statement = tuple[object, ...]
+Rivals = dict[Statement, list[tuple[int, str]]]
+"""[[pair]] tables by what they say: (index, the surface that it names)."""
 
 
 def read_contact(table: ContactTable) -> Law:
@@ -85,11 +88,6 @@ def check_ranks(parametric: ParametricWorld, faults: Faults) -> None:
                     f'between = ["{name}", "{other}"], which goes before both'
                 )
                 faults.add((*place, "between"), text)
-
-
-Statement = tuple[object, ...]
-Rivals = dict[Statement, list[tuple[int, str]]]
-"""[[pair]] tables by what they say: (index, the surface that it names)."""
 
 
 def statement(pair: PairRule) -> Statement:

@@ -30,6 +30,10 @@ LAWS = {
     "net": "net = { hidden = [32, 32] }",
     "function": "function = {}",
 }
+UNKNOWN_AHEAD = tuple(f".{kind.key}" for kind in SENSOR_KINDS if not kind.ahead)
+"""Ends of the names of what is not known half a step ahead."""
+CONSTANT_KINDS = ("parameter", "weight")
+"""Kinds of variables that have one value over the whole motion, which a law may name."""
 
 
 def read_sensors(tables: Sequence[SensorTable], sample: Mapping[str, Any], faults: Faults) -> tuple[Sensor, ...]:
@@ -253,12 +257,6 @@ def read_weights(faults: Faults, place: Place, name: str, net: Net) -> Array:
     else:
         return array.astype(float)
     return np.zeros(count)
-
-
-UNKNOWN_AHEAD = tuple(f".{kind.key}" for kind in SENSOR_KINDS if not kind.ahead)
-"""Ends of the names of what is not known half a step ahead."""
-CONSTANT_KINDS = ("parameter", "weight")
-"""Kinds of variables that have one value over the whole motion, which a law may name."""
 
 
 def force_quantities(tables: Sequence[ForceTable]) -> dict[str, Quantity]:

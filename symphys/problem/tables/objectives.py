@@ -21,6 +21,8 @@ from symphys.problem.schema.objectives import ConstraintTable, CostTable, Output
 from symphys.problem.tables.simulation import check_moment, find_phase
 from symphys.types import Array
 
+NO_PHASES: Mapping[str, Phase] = MappingProxyType({})
+
 
 def read_termination(
     document: Document, sample: Mapping[str, Any], inputs: Collection[str], faults: Faults
@@ -64,9 +66,6 @@ def with_termination_cost(document: Document, costs: tuple[Cost, ...], faults: F
         for cost in costs
     ]
     return (*stopped, *([left] if table.cost > 0 else []))
-
-
-NO_PHASES: Mapping[str, Phase] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
