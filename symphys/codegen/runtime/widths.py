@@ -1,6 +1,7 @@
-"""The libraries of one program, which differ in the lanes of a block: which one computes a call, and when it is made.
+"""The two libraries of one program, of one lane and of all: which one computes a call, and when it is made.
 
-One rollout in a block of 8 lanes wastes 7 of them, so few rows have libraries of their own. All give the same bits.
+One rollout in a block of 8 lanes wastes 7 of them, so calls of one row have a library of their own. Both give the same
+bits.
 """
 
 from __future__ import annotations
@@ -25,8 +26,6 @@ from symphys.codegen.toolchain.processes import Background
 if TYPE_CHECKING:
     from symphys.codegen.emit.source import SourceFile
 
-NARROW = (1, 2)
-"""Lanes of the libraries for calls of few rows."""
 COMPILE_TIME = 2.0, 1e-4
 """Estimate of the time of compiling: [s], and [s] for each operation of the kernel."""
 
@@ -55,8 +54,8 @@ Choice = tuple[LoadedWidth, int]
 
 
 def suited(rows: int, full: int) -> int:
-    """Return the lanes that suit a call of ``rows`` best; ``full``: of a vector register."""
-    return next((lanes for lanes in NARROW if rows <= lanes < full), full)
+    """Return the lanes that suit a call: one for one row, otherwise ``full``, those of a vector register."""
+    return 1 if rows == 1 else full
 
 
 class Widths:
@@ -146,8 +145,7 @@ class Widths:
         if self._libraries is not None and lanes not in self._sought:
             self._seek(lanes, self._libraries)
         widths = self._widths
-        there = sorted(widths)
-        width = widths[next((each for each in there if each >= min(rows, self.full)), there[-1])]
+        width = widths.get(lanes) or next(iter(widths.values()))
         missing = 0 if self._libraries is None or width.lanes == lanes else lanes
         choices[rows] = width, missing
         return width, missing

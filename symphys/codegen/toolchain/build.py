@@ -75,7 +75,7 @@ class BlockWidth:
     Attributes:
         lanes: rollouts in one block.
         single: whether in single precision.
-        several: whether calls of few rows have libraries of fewer lanes.
+        several: whether calls of one row have a library of one lane.
     """
 
     lanes: int
@@ -116,7 +116,7 @@ def compiled(
     libraries = KeptLibraries(kept, width, cache)
     lanes = suited(rows, width.lanes) if rows is not None and width.several else width.lanes
     if lanes != width.lanes:
-        parts = sources(own if lanes == 1 and own else planned, lanes, width.single, narrow=True)
+        parts = sources(own or planned, lanes, width.single, narrow=True)
     waits = wait or operations < MIN_LONG_OPERATIONS or lanes != width.lanes or bool(os.environ.get("SYMPHYS_WAIT"))
     if not waits and libraries.find(lanes) is None:
         with suppress(KernelUnavailable):
