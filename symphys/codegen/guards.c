@@ -227,25 +227,12 @@ static void take_in(const program *p, left_out *x, const char *needed, word soon
   x->forward = x->backward = 0;
 }
 
-/* Which guards are on. The last of the first calls run where their own guard is on, or listed: the lists read them. */
-static void look(const program *p, left_out *x, char *needed, V *m, word k) {
-  const word *late = p->late.places, *parent = p->parents.places;
-  phase first = {p->late.count ? late[0] : p->first, p->body.entries};
-  run(&first, m, 0, k);
-  for (word i = 0; i < p->guards.count; i++) needed[i] = parent[i] < 0 && any(m + p->guards.places[i]);
-  for (word i = 0; i < p->late.count; i++, late += 2)
-    if (needed[late[1]] || x->on[late[1]]) {
-      const word *t = p->body.entries + p->calls.places[7 * late[0]];
-      CALL(t, m, 0, k);
-    }
-  for (word i = 0; i < p->guards.count; i++)
-    if (parent[i] >= 0 && needed[parent[i]]) needed[i] = (char)any(m + p->guards.places[i]);
-}
-
 static void step_left(const program *p, V *m, word k, int gradient) {
+  const phase first = {p->first, p->body.entries};
   left_out *x = left_of(p, m);
   char *needed = gradient ? x->seen + k * p->guards.count : x->needed;
-  look(p, x, needed, m, k);
+  run(&first, m, 0, k);
+  for (word i = 0; i < p->guards.count; i++) needed[i] = (char)any(m + p->guards.places[i]);
   take_in(p, x, needed, 0);
   if (!x->forward) note(p, x, 0);
   x->forward = 1;

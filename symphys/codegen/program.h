@@ -14,6 +14,6 @@ typedef struct {
   word discounted[3], kept[2];                               /* (offset, size, stride), (offset, stride) */
   ranges written;                                        /* by each step: (offset, size, stride) */
   word first;                                            /* calls of the body up to the last guard */
-  ranges guards, groups, calls, reads, writes, chains, sections, copies, late, parents; /* see emit/guarding.py */
+  ranges guards, groups, calls, reads, writes, chains, sections, copies; /* see emit/guarding.py */
 } program;
 typedef struct { const double *rows; word stride; } source; /* stride 0: one row for all lanes */

@@ -29,7 +29,6 @@ TABLES = ("body", "again", "back_body")
 LOOKAHEAD = 16
 """Entries of lookahead, the same as in ``guards.c``."""
 WIDTHS = {"guards": 1, "groups": 1, "calls": 7, "reads": 2, "writes": 2, "chains": 2, "sections": 5, "copies": 5}
-WIDTHS |= {"late": 2, "parents": 1}
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Guarding:
     """Guards and sections of a program's body.
 
     Attributes:
-        first: calls of the body up to the last that computes a guard.
+        first: calls of the body up to the last that computes a guard; none of them has one.
         rows: what the driver reads, by names of ``WIDTHS``, in rows of these widths:
 
             - guards: offset of the word;
@@ -48,9 +47,7 @@ class Guarding:
             - writes: chain, offset;
             - chains: offset and stride where each begins;
             - sections: first call, the one after the last; chain of its word, offset in it, 0; or -1, offset, stride;
-            - copies: offset; chain of the source, offset in it, 0; or -1, offset, stride; size;
-            - late: of the first calls those that have a guard themselves, which are the last of them; its number;
-            - parents: of each guard that such a call computes the number of this call's guard; of others -1.
+            - copies: offset; chain of the source, offset in it, 0; or -1, offset, stride; size.
         arena: words of 8 bytes that the driver needs for itself.
     """
 
@@ -85,9 +82,13 @@ def guarding_of(program: Program, tables: Mapping[str, Table]) -> Guarding | Non
     if not any(call.guard or call.section for call in body):
         return None
     guards = list(dict.fromkeys(call.guard.offset for call in body if call.guard is not None))
+    computes = program.phases[1].outputs
+    first = 1 + int(computes.call[np.isin(computes.offset, np.array(guards, np.int64))].max(initial=NONE))
+    if (early := next((call for call in body[:first] if call.guard is not None), None)) is not None:
+        raise ProgramError(f"{early.function.name()}: it has a guard, and comes before all guards are computed")
     rows = _Rows(program, body, guards)
     rows.lay(tables)
-    return rows.guarding()
+    return rows.guarding(first)
 
 
 class _Rows:
@@ -161,8 +162,8 @@ class _Rows:
             end = next((j for j in range(k, len(self._body)) if self._body[j].section != call.section), len(self._body))
             self._sections.append((k, end, *self._chains.source(call.section)))
 
-    def guarding(self) -> Guarding:
-        """Return all rows."""
+    def guarding(self, first: int) -> Guarding:
+        """Return all rows; ``first``: calls up to the last that computes a guard."""
         word = {offset: g for g, offset in enumerate(self._guards)}
         groups: list[list[int]] = [[] for _ in range(len(word) + 1)]
         for k, call in enumerate(self._body):
@@ -177,9 +178,6 @@ class _Rows:
             "sections": self._sections,
             "copies": self._copies,
         }
-        computes = self._program.phases[1].outputs
-        first = 1 + int(computes.call[np.isin(computes.offset, np.array(self._guards, np.int64))].max(initial=NONE))
-        listed |= self._late(first, word)
         rows = {name: np.array(each, np.int64).ravel() for name, each in listed.items()}
         self._gather_chains(rows, word)
         calls, sections = len(self._body), len(self._sections)
@@ -207,22 +205,6 @@ class _Rows:
         for name, column in (("reads", 1), ("writes", 0), ("sections", 2), ("copies", 1)):
             each = rows[name].reshape(-1, WIDTHS[name])[:, column]
             each[each != NONE] = number[each[each != NONE]]
-
-    def _late(self, first: int, word: Mapping[int, int]) -> dict[str, list[tuple[int, ...]]]:
-        """Return the rows of those calls of the first that have a guard, and of the guards that they compute."""
-        late, parents = list[tuple[int, ...]](), list[tuple[int, ...]]([(NONE,)] * len(self._guards))
-        for k, call in enumerate(self._body[:first]):
-            if call.guard is None:
-                if late:
-                    raise ProgramError(f"{call.function.name()}: it comes after calls with guards that compute others")
-                continue
-            parent = word[call.guard.offset]
-            late.append((k, parent))
-            for place in call.outputs:
-                if place.offset not in word or place.size != 1:
-                    raise ProgramError(f"{call.function.name()}: with a guard it computes more than guards")
-                parents[word[place.offset]] = (parent,)
-        return {"late": late, "parents": parents}
 
 
 class _Chains:

@@ -265,15 +265,15 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
             plane, b, near = shapes[1], None, ca.SX(1)
             assert isinstance(plane, Plane)
             if not measured(shapes, (a, b)):
-                near = guard(_near_plane(a, (plane.normal, plane.offset), radii[0], reach, settings))
+                near = _near_plane(a, (plane.normal, plane.offset), radii[0], reach, settings)
         else:
             b = bodies[second.body]
-            near = guard(_near_pair(a, b, radii[0] + radii[1], reach, settings))
+            near = _near_pair(a, b, radii[0] + radii[1], reach, settings)
         if measured(shapes, (a, b)):
             words = near_points(shapes, (a, b), near, reach, settings.smoothing)
             found[first, second] = [guard(word) for (word,) in words]
         else:
-            found[first, second] = [near] * count
+            found[first, second] = [guard(near)] * count
     lists = {sides: iter(words) for sides, words in found.items()}
     return tuple(next(lists[pair.first, pair.second]) for pair in world.pairs)
 

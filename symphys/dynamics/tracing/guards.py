@@ -8,7 +8,7 @@ of that kind, or are used by such calls only, can be left out.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from typing import Any, NamedTuple
@@ -77,17 +77,9 @@ def with_guards(
     """
     search = _GuardSearch(calls)
     first, found = search.dependencies(guards), dict[int, Guard]()
-    own, implied, taken = search.implied(guards), dict[int, list[int]](), set(first)
-    for word in sorted(guards, key=lambda each: len(own[each.number])):
-        implied_calls = {k for number in own[word.number] for k in implied[number]}
-        taken -= search.writers(own[word.number])
-        left = search.skippable(Part(word), taken, implied_calls, [found[k] for k in implied_calls])
-        implied[word.number] = list(left)
-        found |= left
-        taken |= left.keys()
-    free = [k for k in range(len(calls)) if k in first and k not in found]
-    held = [k for k in range(len(calls)) if k in first and k in found]
-    order = [*free, *held, *(k for k in range(len(calls)) if k not in first)]
+    for word in guards:
+        found |= search.skippable(Part(word), first | found.keys())
+    order = sorted(range(len(calls)), key=lambda k: k not in first)
     apart: dict[int, Guard] = {}
     for vector, entry in sections:
         left = search.skippable(Part(vector, entry), apart.keys())
@@ -113,52 +105,17 @@ class _GuardSearch:
             for vector in call.inputs:
                 self._readers.setdefault(vector.number, []).append(k)
 
-    def implied(self, guards: Sequence[TracedVector]) -> dict[int, list[int]]:
-        """Return for each guard the other guards that are 0 wherever it is."""
-        numbers = {word.number for word in guards}
-        found: dict[int, list[int]] = {}
-        for word in guards:
-            results = self._simplified(word, 0, numbers)
-            zero = (
-                vector.number
-                for k, each in results.items()
-                for vector, (_, known) in zip(self._calls[k].outputs, each, strict=True)
-                if known & 1 and vector.number in numbers
-            )
-            found[word.number] = [number for number in zero if number != word.number]
-        return found
-
-    def writers(self, numbers: Sequence[int]) -> set[int]:
-        """Return the calls that write vectors."""
-        return {self._writer[number] for number in numbers}
-
-    def skippable(
-        self,
-        word: Part,
-        without: Collection[int],
-        implied_calls: Collection[int] = (),
-        substitutes: Iterable[Guard] = (),
-    ) -> dict[int, Guard]:
-        """Return the calls that are without effect where ``word`` is 0, but for those ``without``.
-
-        ``implied_calls`` are among these: calls that guards of their own skip then; ``substitutes`` are these guards,
-        which name what replaces their results.
-        """
+    def skippable(self, word: Part, without: Collection[int]) -> dict[int, Guard]:
+        """Return the calls that are without effect where ``word`` is 0, but for those ``without``."""
         assert word.vector is not None
         found = self._simplified(word.vector, word.start)
         left, substitute_vectors = dict[int, Guard](), {word.vector.number}
-        substitute_vectors |= {
-            part.vector.number
-            for guard in substitutes
-            for part in guard.otherwise
-            if part is not None and part.vector is not None
-        }
         looked_at = set(found)
         waiting = [-k for k in found]
         heapify(waiting)
         while waiting:
             k = -heappop(waiting)
-            otherwise = None if k in without else self._otherwise(k, found, left, implied_calls, substitute_vectors)
+            otherwise = None if k in without else self._otherwise(k, found, left, substitute_vectors)
             if otherwise is None:
                 continue
             left[k] = Guard(word, otherwise)
@@ -211,19 +168,18 @@ class _GuardSearch:
         k: int,
         found: Mapping[int, Sequence[Simplified]],
         left: Collection[int],
-        implied_calls: Collection[int],
         substitute_vectors: Collection[int],
     ) -> tuple[Part | None, ...] | None:
         """Return the substitutes of the results of a call; None if a needed result must be computed.
 
-        ``left`` and ``implied_calls`` are skipped calls, ``substitute_vectors`` what replaces their results.
+        ``left`` are skipped calls, ``substitute_vectors`` what replaces their results.
         """
         parts: list[Part | None] = []
         call, results = self._calls[k], found.get(k)
         for i, vector in enumerate(call.outputs):
             needed, read = bool(vector.name) or vector.number in substitute_vectors, False
             for reader in () if needed else self._readers.get(vector.number, ()):
-                if reader not in left and reader not in implied_calls:
+                if reader not in left:
                     read = True
                     if not self._ignores(reader, vector.number, found):
                         needed = True
@@ -248,15 +204,12 @@ class _GuardSearch:
             self._ignored[key] = _IgnoredArguments(call.function, self._zeros[k])
         return all(self._ignored[key][i] for i, vector in enumerate(call.inputs) if vector.number == number)
 
-    def _simplified(self, word: TracedVector, start: int, until: Collection[int] = ()) -> dict[int, list[Simplified]]:
-        """Return for each call with known arguments what is known of its results, in order.
-
-        Where there are numbers in ``until``, only calls that give vectors with such numbers are followed.
-        """
+    def _simplified(self, word: TracedVector, start: int) -> dict[int, list[Simplified]]:
+        """Return for each call with known arguments what is known of its results, in order."""
         known: dict[int, Known] = {word.number: 1 << start}
         found: dict[int, list[Simplified]] = {}
         self._zeros = {}
-        waiting = [k for k in self._readers.get(word.number, ()) if not until or self._gives(k, until)]
+        waiting = list(self._readers.get(word.number, ()))
         heapify(waiting)
         while waiting:
             k = heappop(waiting)
@@ -269,12 +222,8 @@ class _GuardSearch:
                 if zero:
                     known[vector.number] = zero
                     for reader in self._readers.get(vector.number, ()):
-                        if not until or self._gives(reader, until):
-                            heappush(waiting, reader)
+                        heappush(waiting, reader)
         return found
-
-    def _gives(self, k: int, numbers: Collection[int]) -> bool:
-        return any(vector.number in numbers for vector in self._calls[k].outputs)
 
     def _results(self, call: TracedCall, zeros: Pattern) -> list[Simplified]:
         """Return what is known of each result; nothing if it is needed anyway, or few of many arguments are known."""

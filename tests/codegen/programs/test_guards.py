@@ -109,6 +109,10 @@ def test_a_guard_that_the_driver_cannot_follow_is_refused() -> None:
         calls = (program.body[0], replace(program.body[1], **change), *program.body[2:])
         with pytest.raises(ProgramError, match=why):
             guarding_of(replace(program, body=calls), tables)
+    moved = program.body[1].outputs[0]
+    calls = (*program.body[:2], replace(program.body[2], guard=moved), *program.body[3:])
+    with pytest.raises(ProgramError, match="move: it has a guard, and comes before all guards are computed"):
+        guarding_of(replace(program, body=calls), tables)
 
 
 @few("lanes", [1, 4], 1)
