@@ -71,13 +71,14 @@ class Transcription:
 
     def _simulated(self, z: Array, smoothing: float) -> list[Array]:
         """Return the results of ``recorder`` for z; the last ones are cached for judging and recording."""
-        key = np.asarray(z, np.float64).tobytes(), smoothing
-        if self._last.get("key") != key:
-            self._last.update(key=key, found=[np.array(part) for part in self._recorder(z, smoothing)])
-        return list(self._last["found"])
+        key, last = (np.asarray(z, np.float64).tobytes(), smoothing), self._last.get("found")
+        if last is None or last[0] != key:
+            last = key, [np.array(part) for part in self._recorder(z, smoothing)]
+            self._last["found"] = last
+        return list(last[1])
 
     @cached_property
-    def _last(self) -> dict[str, Any]:
+    def _last(self) -> dict[str, tuple[Any, list[Array]]]:
         return {}
 
     def motion(self, z: Array, x: Array, u: Array) -> Trajectory:

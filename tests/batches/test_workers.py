@@ -153,7 +153,7 @@ from symphys.batches import Observer, run_batch
 from symphys.transcription import transcribe
 import symphys.runs
 execution = sys.modules["symphys.runs.execute"]
-execution.CHECKPOINT_INTERVAL = execution.SHARE = 0
+execution.CHECKPOINT_INTERVAL = execution.MIN_CHECKPOINT_SPACING = 0
 
 class Killer(Observer):
     def advanced(self, job, row):
