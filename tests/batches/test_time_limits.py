@@ -40,7 +40,8 @@ from symphys.solvers.core.driver import Driver
 from symphys.transcription import transcribe as honest
 
 MARK = Path(__file__).with_name("hangs")
-sys.modules["symphys.runs.execute"].MIN_CHECKPOINT_SPACING = 0  # a checkpoint of each iteration, however long that takes
+# a checkpoint of each iteration, however long that takes
+sys.modules["symphys.runs.execute"].MIN_CHECKPOINT_SPACING = 0
 
 def hang(*_):
     # a call of compiled code that keeps the interpreter's lock, as casadi's do
