@@ -144,7 +144,7 @@ def make_solver(
     refusal: Callable[[ShootingProblem], str] = refuse_none,
     rate: Callable[[O_inv, int], Rate] = rate_by_rollout,
     constraints: bool = False,
-    prepare: Callable[[], None] = nothing,
+    prepare: Callable[[], object] = nothing,
     threaded: bool = False,
     scenarios: bool | None = False,
     feedback: MakeGains = without_feedback,

@@ -166,6 +166,6 @@ class Solver(Generic[O_inv]):
     summary: str
     Options: type[O_inv]
     solve: Solve[O_inv]
-    prepare: Callable[[], None] = nothing
+    prepare: Callable[[], object] = nothing
     threaded: bool = False
     scenarios: bool | None = False

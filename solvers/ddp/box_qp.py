@@ -21,21 +21,12 @@ GRADIENT_TOLERANCE = 1e-10
 """Projected gradient, relative to the first one, that counts as zero."""
 
 
-def factored(*arguments: Any, **how: Any) -> Any:
-    """Call LAPACK's ``dpotrf``; scipy is imported for problems with several decisions at once."""
-    return _lapack().dpotrf(*arguments, **how)
-
-
-def solved(*arguments: Any, **how: Any) -> Any:
-    """Call LAPACK's ``dpotrs``."""
-    return _lapack().dpotrs(*arguments, **how)
-
-
 @cache
-def _lapack() -> Any:
-    from scipy.linalg import lapack
+def lapack() -> Any:
+    """Import and return LAPACK's functions, which problems with one decision a step do not need."""
+    from scipy.linalg import lapack as functions
 
-    return lapack
+    return functions
 
 
 class BoxSolution(NamedTuple):
@@ -75,14 +66,14 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
             free = now
             if not free.any():
                 return BoxSolution(x, free, None)
-            factor, failed = factored(hessian[free][:, free], lower=1)
+            factor, failed = lapack().dpotrf(hessian[free][:, free], lower=1)
             if failed:
                 return None
         if np.abs(slope[free]).max() <= GRADIENT_TOLERANCE * size:
             break
         # Newton step in the free entries, then an Armijo search along its projection.
         ahead = np.zeros(len(x))
-        ahead[free] = -solved(factor, slope[free], lower=1)[0]
+        ahead[free] = -lapack().dpotrs(factor, slope[free], lower=1)[0]
         found = _projected(hessian, gradient, (lower, upper), x, slope, ahead)
         if found is None:
             break
@@ -92,10 +83,10 @@ def solve_box_qp(hessian: Array, gradient: Array, lower: Array, upper: Array, st
 
 def _within(hessian: Array, gradient: Array, lower: Array, upper: Array) -> BoxSolution | None:
     """Return the unconstrained minimum, where it exists and lies within the bounds."""
-    factor, failed = factored(hessian, lower=1)
+    factor, failed = lapack().dpotrf(hessian, lower=1)
     if failed:
         return None
-    step = -solved(factor, gradient, lower=1)[0]
+    step = -lapack().dpotrs(factor, gradient, lower=1)[0]
     inside = np.all(step >= lower) and np.all(step <= upper)
     return BoxSolution(step, np.ones(len(step), np.bool_), factor) if inside else None
 

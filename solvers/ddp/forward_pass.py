@@ -40,7 +40,7 @@ def forward_pass(
     if len(statics):
         z[:, statics] = np.clip(motion.z[statics] + lengths[:, None] * policy.statics, lower[statics], upper[statics])
     x, u, new, merit = follow_policy(problem, affine(motion, policy, knots), motion.z, z, lengths, motion.smoothing)
-    if knots.steps.aligned is not None:
+    if knots.steps.aligned:
         z[:, knots.new] = new
     else:
         chosen = knots.new < len(motion.z)
@@ -51,7 +51,7 @@ def forward_pass(
 def affine(motion: StagedMotion, policy: Policy, knots: PaddedKnots) -> AffinePolicy:
     """Return the policy as arrays."""
     lower, upper = knots.bounds
-    if knots.steps.aligned is not None and not len(policy.statics):
+    if knots.steps.aligned and not len(policy.statics):
         about = motion.x[:-1], np.zeros(knots.old.shape), motion.z[knots.new]
         return AffinePolicy(*about, *policy.aligned, knots.weights, knots.keep, lower, upper)
     z, (count, o), s = np.append(motion.z, 0.0), knots.old.shape, len(policy.statics)

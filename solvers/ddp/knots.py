@@ -37,14 +37,9 @@ class KnotSteps(list[KnotStep]):
     """The knots of all steps."""
 
     @cached_property
-    def aligned(self) -> AlignedKnots | None:
-        """Return all knots as arrays if each acts in one step and all steps have equally many; else None."""
-        widths = {len(each.new) for each in self}
-        if any(len(each.old) for each in self) or len(widths) != 1 or widths == {0}:
-            return None
-        weights = np.array([each.weights for each in self])
-        plain = weights.shape[1] == weights.shape[2] and bool((weights == np.eye(weights.shape[1])).all())
-        return AlignedKnots(np.array([each.new for each in self]), weights, plain)
+    def aligned(self) -> bool:
+        """Whether each knot acts in one step, and all steps have equally many."""
+        return not self.padded.old.size and bool(self.padded.new.size and (self.padded.new >= 0).all())
 
     @cached_property
     def padded(self) -> KnotArrays:
@@ -75,21 +70,6 @@ class KnotArrays:
     new: Ints
     weights: Array
     keep: Array
-
-
-@dataclass(frozen=True)
-class AlignedKnots:
-    """Knots that act in one step each, w in each step.
-
-    Attributes:
-        new: (N, w) entries of z.
-        weights: (N, m, w): u = weights @ z[new].
-        plain: whether the inputs are the knots.
-    """
-
-    new: Ints
-    weights: Array
-    plain: bool
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symphys.shooting import CompiledRecursion
-from symphys.solvers.ddp.box_qp import factored, solve_box_qp, solved
+from symphys.solvers.ddp.box_qp import lapack, solve_box_qp
 from symphys.types import Array
 
 
@@ -111,21 +111,6 @@ def _taken(
             found.append(None)
             continue
         rest = len(total) - len(damping)
-        if len(damping) == 1:  # the same with numbers in place of matrices of one row
-            push, stiff, by_state = float(total[rest]), float(whole[rest, rest]), whole[rest, :rest]
-            curvature = stiff + float(damping[0])
-            if not curvature > 0:
-                return None
-            wanted, low, high = -push / curvature, float(lower[0]), float(upper[0])
-            free = low <= wanted <= high
-            step = wanted if free else min(max(wanted, low), high)
-            back = by_state / -curvature if free else np.zeros_like(by_state)
-            first, second = first + push * step, second + step * (stiff * step) / 2
-            slope = total[:rest] + (stiff * step + push) * back + step * by_state
-            curve = whole[:rest, :rest] + (by_state - damping * back)[:, None] * back
-            curve = 0.5 * (curve + curve.T)
-            found.append(Feedback(np.array([step]), back[None]))
-            continue
         # Minimise Q over the decisions within bounds; feedback of those at no bound.
         by_decisions, hessian, cross = total[rest:], whole[rest:, rest:], whole[rest:, :rest]
         made = _decided(hessian, damping, by_decisions, cross, lower, upper)
@@ -147,10 +132,10 @@ def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: 
     """Return the optimal decisions within bounds, and the gains of those that are at no bound."""
     damped = hessian.copy()
     damped.ravel()[:: len(slope) + 1] += damping
-    factor, fault = factored(damped, lower=1, clean=0)
+    factor, fault = lapack().dpotrf(damped, lower=1, clean=0)
     if fault:
         return None
-    both = solved(factor, np.concatenate([slope[:, None], cross], axis=1), lower=1)[0]
+    both = lapack().dpotrs(factor, np.concatenate([slope[:, None], cross], axis=1), lower=1)[0]
     ahead = -both[:, 0]
     if (ahead >= lower).all() and (ahead <= upper).all():
         return Feedback(ahead, -both[:, 1:])
@@ -159,5 +144,5 @@ def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: 
         return None
     back = np.zeros_like(cross)
     if found.factor is not None:
-        back[found.free] = -solved(found.factor, cross[found.free], lower=1)[0]
+        back[found.free] = -lapack().dpotrs(found.factor, cross[found.free], lower=1)[0]
     return Feedback(found.step, back)

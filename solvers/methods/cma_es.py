@@ -506,17 +506,12 @@ class CmaEs(Method[CmaState]):
         return PycmaStrategy(self.evaluator, start, options.sigma, options.population, options.options, stream)
 
 
-def prepare() -> None:
-    """Import pycma."""
-    load()
-
-
 CMA = make_solver(
     "cma",
     "CMA-ES by pycma, without derivatives",
     CmaOptions,
     stage_of(CmaEs),
     rate=lambda options, seed: rate_by_validation(options.batch(seed)),
-    prepare=prepare,
+    prepare=load,
     scenarios=None,
 )

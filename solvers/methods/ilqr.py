@@ -21,6 +21,7 @@ from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Counts, Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.ddp.backward_pass import Policy
+from symphys.solvers.ddp.box_qp import lapack
 from symphys.solvers.ddp.forward_pass import MotionBatch
 from symphys.solvers.ddp.gains import gains_about
 from symphys.solvers.ddp.iteration import STEP_LENGTHS, BestMotion, LocalExpansion
@@ -258,6 +259,7 @@ ILQR = make_solver(
     IlqrOptions,
     stage_of(Ilqr),
     refusal=refusal,
+    prepare=lapack,
     constraints=True,
     feedback=gains_about,
 )

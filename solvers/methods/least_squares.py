@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -209,17 +210,24 @@ class DenseModel(LocalModel[Array, Point | StopReason]):
         return point
 
 
+@cache
+def library() -> Any:
+    """Import and return scipy's linear algebra, which other solvers do not need."""
+    from scipy import linalg
+
+    return linalg
+
+
 def damped_step(jacobian: Array, r: Array, damping: float) -> Array:
     """Return (n,) -(J'J + lambda I)^-1 J'r, or -J'(JJ' + lambda I)^-1 r: whichever matrix is smaller."""
     tall = jacobian.shape[0] >= jacobian.shape[1]
     square = jacobian.T @ jacobian if tall else jacobian @ jacobian.T
     floor = 4 * len(square) * float(np.finfo(float).eps) * float(np.trace(square))
-    from scipy.linalg import cho_factor, cho_solve  # late: other solvers need none of it
-
-    factor = cho_factor(square + max(damping, floor) * np.eye(len(square)))
+    linear = library()
+    factor = linear.cho_factor(square + max(damping, floor) * np.eye(len(square)))
     if tall:
-        return np.asarray(-cho_solve(factor, jacobian.T @ r))
-    return np.asarray(-jacobian.T @ cho_solve(factor, r))
+        return np.asarray(-linear.cho_solve(factor, jacobian.T @ r))
+    return np.asarray(-jacobian.T @ linear.cho_solve(factor, r))
 
 
 def cosine(evaluator: CountingEvaluator, state: LeastSquaresState) -> float:
@@ -242,5 +250,6 @@ LEAST_SQUARES = make_solver(
     LeastSquaresOptions,
     stage_of(LevenbergMarquardt),
     refusal=refusal,
+    prepare=library,
     threaded=True,
 )

@@ -103,10 +103,9 @@ class Planner:
             for key in ("guess", "lower", "upper", "scale")
         )
         self._knots, self._z = PaddedKnots.of(knot_steps(self.stages), lower, upper), guess
-        aligned = self._knots.steps.aligned
-        assert aligned is not None, "each control has a knot a step"
-        self._aligned, self.weights = aligned, aligned.weights[0]
-        self.lower, self.upper, self.scale = (each[aligned.new[0]] for each in (lower, upper, self._scale))
+        assert self._knots.steps.aligned, "each control has a knot a step"
+        self._new, self.weights = self._knots.new, self._knots.weights[0]
+        self.lower, self.upper, self.scale = (each[self._new[0]] for each in (lower, upper, self._scale))
         Z = guess[None]
         self.start: Array = self.stages.start(Z)[0]
         self.p: Array = self.stages.parameters(Z)[0]
@@ -118,7 +117,7 @@ class Planner:
     def first(self, x: Array, time: float) -> RecedingPlan:
         """Return a plan from the guess, after the iterations before the first tick."""
         self.damping = self.horizon.damping
-        guess = self._z[self._aligned.new]
+        guess = self._z[self._new]
         gains = np.zeros((*guess.shape, self.tangent.size))
         policy = PlanPolicy(np.tile(x, (len(guess), 1)), guess, np.zeros_like(guess), gains)
         return self._improved(policy, x, time, self.horizon.first_iterations)
@@ -142,7 +141,7 @@ class Planner:
         states, inputs, new, merit = follow_policy(
             self.stages, about, self._z, z, lengths, self.horizon.smoothing, shares
         )
-        z[:, self._aligned.new] = new
+        z[:, self._new] = new
         return states, new, self._costs(MotionBatch(z, states, inputs, merit))
 
     def _improved(self, policy: PlanPolicy, x: Array, time: float, iterations: int) -> RecedingPlan:
@@ -168,7 +167,7 @@ class Planner:
             best, back = about.search(policy, self._costs), policy.aligned[1]
             if best.value < plan.cost:
                 self.damping = max(self.horizon.damping, self.damping * DAMPING_SHRINK)
-                decisions = best.motion.z[self._aligned.new]
+                decisions = best.motion.z[self._new]
                 return RecedingPlan(plan.time, plan.dt, best.motion.x, decisions, back, best.value, True)
             plan = replace(plan, back=back)
         self.damping = min(self.damping * DAMPING_GROWTH, MAX_DAMPING)
@@ -178,8 +177,8 @@ class Planner:
         """Return the motion of a plan."""
         self.stages.begin(plan.x[0], plan.time)
         z = self._z.copy()
-        z[self._aligned.new] = plan.v
-        u = plan.v if self._aligned.plain else plan.v @ self.weights.T
+        z[self._new] = plan.v
+        u = plan.v @ self.weights.T
         return StagedMotion(z, plan.x, u, self.horizon.smoothing, gapless=True)
 
     def _costs(self, motions: MotionBatch) -> Array:

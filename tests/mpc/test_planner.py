@@ -195,7 +195,7 @@ def test_an_input_that_a_force_law_adds_to_may_stand_beside_a_state() -> None:
     for made in (whole, part):
         found = made.first(made.start, 0.0)
         z = np.zeros(40)
-        z[made._aligned.new] = found.v
+        z[made._new] = found.v
         made.stages.begin(made.start, 0.0)
         rolled = made.stages.roll_out(z, 0.0)
         batch = MotionBatch(z[None], rolled.x[None], rolled.u[None])

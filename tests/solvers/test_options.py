@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
+from tools.repeats import few
 from worlds.toys import quadratic, rosenbrock, solve
 
 from symphys.errors import ProblemError, SymphysError
@@ -160,6 +161,24 @@ def test_pycma_is_loaded_by_prepare_and_not_before() -> None:
     code = f"import sys; from symphys.solvers import solver; print({tell}); solver('cma').prepare(); print({tell})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "True"]
+
+
+LOADING = """
+import sys, symphys
+from symphys.solvers import solver
+from symphys.transcription import transcribe
+shooting, chosen = transcribe(symphys.load("ball_throw"), backend="casadi").shooting, solver(sys.argv[1])
+chosen.prepare()
+before = set(sys.modules)
+chosen.solve(shooting, shooting.start(0), chosen.Options(), 0)
+print(*(name for name in set(sys.modules) - before if name.partition(".")[0] in ("cma", "scipy")))
+"""
+
+
+@few("name", ["least_squares", "cma"], 1)
+def test_libraries_are_loaded_before_the_clock_of_a_solve_starts(name: str) -> None:
+    done = subprocess.run([sys.executable, "-c", LOADING, name], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
 
 
 @every_solver
