@@ -42,7 +42,7 @@ class OtherShape(ArchiveError):
 
 
 class ArrayHeader(NamedTuple):
-    """What an array says of itself.
+    """The type and shape of an array, from its header.
 
     Attributes:
         shape: of the array.
@@ -106,7 +106,7 @@ def _member_header(archive: zipfile.ZipFile, member: str, name: str) -> ArrayHea
 
 
 def _header(stream: IO[bytes]) -> ArrayHeader:
-    """What stands before the entries of an array."""
+    """Read the header of an array."""
     try:
         version = npy.read_magic(stream)
         read = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[version]

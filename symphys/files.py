@@ -157,7 +157,7 @@ def write_npz(path: Path, arrays: Mapping[str, Any], at_once: bool = True) -> No
 
 @lru_cache(maxsize=4096)
 def npy_header(kind: str, shape: tuple[int, ...]) -> bytes:
-    """What an array begins with in numpy's format; making it takes longer than writing a small array."""
+    """Return the .npy header of an array; cached, since making it takes longer than writing a small array."""
     from numpy.lib import format as npy
 
     if "O" in kind or "V" in kind:
@@ -176,7 +176,7 @@ def remove(path: Path) -> None:
 
 
 def modified(path: Path) -> int | None:
-    """When a file was written [ns], by the clock of that time; None if there is none."""
+    """Return the modification time of a file [ns]; None if there is none."""
     try:
         return path.stat().st_mtime_ns
     except OSError:

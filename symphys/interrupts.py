@@ -16,7 +16,7 @@ class Interrupts:
     """Counts Ctrl-C while ``listening``; ``interrupts()`` returns whether there was one."""
 
     def __init__(self) -> None:
-        """Nothing has happened yet."""
+        """Start without a request to stop."""
         self.requested = False
 
     def __call__(self) -> bool:

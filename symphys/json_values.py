@@ -90,7 +90,7 @@ def one_line(value: object) -> str:
 
 @lru_cache(maxsize=4096)
 def _line(text: str) -> str:
-    """The same of a short text: thousands of results have the same names in them."""
+    """Return ``one_line`` of a short text, cached: thousands of results have the same names in them."""
     return one_line(text)
 
 

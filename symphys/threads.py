@@ -48,7 +48,7 @@ class OpenBlas(NamedTuple):
 
 
 def libraries() -> list[OpenBlas]:
-    """Those that the packages bring along; they are loaded now, and used once a package is imported."""
+    """Load the OpenBLAS libraries that the packages bring along, before the packages themselves are imported."""
     found = []
     for name in PACKAGES:
         found_in = find_spec(name)

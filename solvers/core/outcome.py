@@ -10,7 +10,7 @@ from symphys.types import Array
 
 
 class Status(Enum):
-    """How a solve ended, by the solver's own tests; whether the problem is solved is judged afterwards."""
+    """Termination status by the solver's own tests; the verdict on the problem is a separate judgement."""
 
     MET = "met"
     CONVERGED = "converged"

@@ -140,7 +140,7 @@ class RecordedResiduals(Protocol):
     own: FitParameters
     """(K, o)"""
     quantities: tuple[str, ...]
-    """What was measured, by name."""
+    """The measured values, by name."""
     units: tuple[str, ...]
     """Of the quantities; empty texts where there is none."""
     noise_known: Bools

@@ -541,7 +541,7 @@ class CompiledStep:
 
     @cached_property
     def _nominal(self) -> Array:
-        """The other inputs (N, i), those of the guess."""
+        """Return the inputs (N, i) that no knot sets, as the guess has them."""
         return np.asarray(self.start().inputs[0])
 
     @cached_property

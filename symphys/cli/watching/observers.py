@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import RLock
@@ -33,7 +34,7 @@ MANY_RUNS = 100
 """Number of runs from which only those that fail have lines of their own."""
 
 
-class BatchLines(Observer):
+class BatchLines(Observer, ABC):
     """Base of the observers that show the progress of a batch and a line for each run that ends."""
 
     def __init__(self, runs: int) -> None:
@@ -42,9 +43,9 @@ class BatchLines(Observer):
         self.many = runs >= MANY_RUNS
         self.lock = RLock()
 
+    @abstractmethod
     def echo(self, line: str, folded: bool = False) -> None:
         """Write a line that stays; ``folded``: at the width of a terminal."""
-        raise NotImplementedError
 
     def ended(self, job: Job, result: Result, skipped: bool) -> None:
         """Write how the run ended; for many runs, only failures."""

@@ -233,7 +233,7 @@ def _free(path: Path) -> bool:
 
 
 def _safe(path: Path) -> bool:
-    """Whether nobody else has written this file, or may."""
+    """Whether only the user or root can have written this file."""
     status = path.lstat()
     return stat.S_ISREG(status.st_mode) and _own(status) and not _others_write(status)
 

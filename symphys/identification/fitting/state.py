@@ -25,7 +25,7 @@ NUMBERS: dict[str, Callable[[Any], Any]] = {
 
 
 class FitStatus(Enum):
-    """How a fit ended."""
+    """Termination status of a fit."""
 
     CONVERGED = "converged"
     STALLED = "stalled"

@@ -7,6 +7,7 @@ have a table for each kind, with a key for each field whose metadata say what ``
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import Field, dataclass, field, fields
 from math import inf, isfinite
@@ -31,7 +32,7 @@ DIRECTION = table_key("direction", f"about or along which the second body moves:
 
 
 @dataclass(frozen=True)
-class JointSpec:
+class JointSpec(ABC):
     """The data that all joints share.
 
     Attributes:
@@ -61,9 +62,9 @@ class JointSpec:
     collide: bool = field(default=False, kw_only=True)
 
     @property
+    @abstractmethod
     def kind(self) -> Kind:
         """Return the kind of joint."""
-        raise NotImplementedError
 
     @property
     def frame_axes(self) -> Array:

@@ -55,7 +55,7 @@ class FunctionTable(SchemaTable):
 
 
 class DrivingTable(SchemaTable):
-    """What is driven, and what is sensed."""
+    """Outputs and inputs of a controller: the quantities that it drives, and the sensors that it reads."""
 
     name: Identifier = Field(
         description='variables set its numbers: "name.weights", "name.gains", "name.frequency", ...'
@@ -82,7 +82,7 @@ def kinds_of_controllers() -> type[SchemaTable]:
 
 
 class ControllerTable(kinds_of_controllers()):  # type: ignore[misc]
-    """What drives inputs, step after step. Where several drive the same input, their outputs add up."""
+    """A controller that sets inputs at every step; the outputs of several that drive one input add up."""
 
     net: NetTable | None = Field(default=None, description="{ hidden = [32, 32] }")
     function: FunctionTable | None = Field(default=None, description="{ weights = [0, 0] }, and a function from Python")

@@ -90,7 +90,7 @@ class SiteTable(SchemaTable):
 
 
 class JointTable(kinds_of_joints()):  # type: ignore[misc]
-    """What holds two bodies together, or a body to the world; coordinates are 0 as the bodies lie in the file.
+    """A joint between two bodies, or a body and the world; coordinates are 0 as the bodies lie in the file.
 
     With ``start`` they begin elsewhere. Angles count whole turns: a hinge that has gone round twice is at 12.57 rad.
     The table of one kind says how.

@@ -14,7 +14,7 @@ Latency = NonNegative | Literal["measured", "cpu"]
 
 
 class PlantTable(SchemaTable):
-    """What `symphys mpc` simulates in place of the real robot. What is left out is as in the file."""
+    """The plant that `symphys mpc` simulates in place of the real robot; keys left out are as in the file."""
 
     dt: Positive | None = Field(
         default=None,

@@ -65,7 +65,7 @@ class VariableTable(SchemaTable):
 
 
 class GuessTable(SchemaTable):
-    """Where the motion is guessed to pass, for solvers whose variables are states too (multiple_shooting).
+    """A guess of the states along the motion, for solvers whose variables are states too (multiple_shooting).
 
     What is named moves on straight lines between the times at which it is named, and stays before and after. Its rates
     are the slopes of these lines where they are not named themselves. Everything else moves as the guess of the
@@ -150,7 +150,7 @@ class OutputTable(SchemaTable):
 
 
 class TerminationTable(SchemaTable):
-    """When a motion is over before its time: from then on nothing moves, and running costs stop."""
+    """A condition that ends a motion early: from then on nothing moves, and running costs stop."""
 
     margin: str = Field(
         description="formula of a number of the state; the motion ends where it falls below 0. Formulas know `alive`, "
@@ -160,7 +160,7 @@ class TerminationTable(SchemaTable):
 
 
 class ObjectiveTable(SchemaTable):
-    """When to be content."""
+    """The goal of the objective, and when a solve stops."""
 
     goal: Finite | None = Field(default=None, description="the objective should come down to this")
     stop: Stop | None = Field(

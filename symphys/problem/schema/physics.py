@@ -33,7 +33,7 @@ DEFAULT = Scheme()
 
 
 class SimulationTable(SchemaTable):
-    """How time passes."""
+    """Duration, time step and settings of the integration."""
 
     duration: Positive | None = Field(
         default=None,
@@ -85,7 +85,7 @@ class SimulationTable(SchemaTable):
 
 
 class WorldTable(SchemaTable):
-    """What acts everywhere."""
+    """Gravity, which acts on every body."""
 
     gravity: Vector = Field(
         default=list(GRAVITY), description="acceleration of free bodies [m/s^2], for instance [0, 0, -9.81]"
@@ -98,7 +98,7 @@ REST = [each for each in fields(Law) if "combine" not in each.metadata]
 
 
 class SurfaceTable(table_of("StatedTable", STATED, optional=True)):  # type: ignore[misc]
-    """What one surface brings into its contacts.
+    """Contact properties of one surface.
 
     Friction and restitution of a contact are the product of what its two surfaces state, torsion and rolling their
     sum; if neither surface states it, the one in [contact] holds; a [[pair]] table overrides all.
@@ -183,7 +183,7 @@ class ContactTable(table_of("LawTable", fields(Law))):  # type: ignore[misc]
 
 
 class PairTable(table_of("PairLawTable", REST, base=SurfaceTable, optional=True)):  # type: ignore[misc]
-    """What holds between two surfaces, whatever they state."""
+    """Contact properties of a pair of surfaces, in place of their own."""
 
     between: Annotated[list[str], Field(min_length=2, max_length=2)] = Field(
         description="two names of surfaces or groups; a table with two surfaces' names beats one with a group, and "

@@ -80,7 +80,7 @@ Noise = Annotated[
 
 
 class ColumnsTable(SchemaTable):
-    """Which columns give a quantity, and in which units."""
+    """The columns of a quantity, and their units."""
 
     columns: Texts = Field(description='names of columns, or one array (n, components) of an NPZ file: "orientation"')
     unit: Unit | None = Field(default=None, description="of the columns; default: that of the engine, SI and rad")
@@ -142,7 +142,7 @@ Inputs = Annotated[
 
 
 class FrameTable(SchemaTable):
-    """Where the origin and the axes of the measurement system lie in the world."""
+    """Origin and axes of the measurement system in the world."""
 
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="of its origin [m]")
     orientation: Orientation = Field(
@@ -225,7 +225,7 @@ class RecordedFileTable(SchemaTable):
 
 
 class IdentifyTable(SchemaTable):
-    """How parameters are identified from recordings."""
+    """Settings of the identification of parameters from recordings."""
 
     loss: Literal["squares", "huber"] = Field(
         default="squares", description='of residuals over their noise; "huber" grows linearly beyond threshold'

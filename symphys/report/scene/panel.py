@@ -86,7 +86,7 @@ def take_in(box: Array, low: Array, high: Array, room: float) -> tuple[Array, Ar
 
 
 def arrange(panels: list[ViewPanel]) -> tuple[bool, float]:
-    """Whether the panels stand above each other, and the scale [in/m]: the arrangement that shows more."""
+    """Return the arrangement with the larger scale: whether the panels are stacked, and the scale [in/m]."""
     spans = np.array([panel.span for panel in panels])
     width = style.WIDTH - LEFT - RIGHT
     stacked = min(width / spans[:, 0].max(), (4.6 if len(panels) == 1 else 6.2) / spans[:, 1].sum())
