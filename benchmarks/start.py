@@ -1,15 +1,15 @@
-"""How long does a user wait for the first gradient, and what does the Python interface add to a kernel?
+"""How long does a user wait for the first iteration, and what does the Python interface add to a kernel?
 
-Each start is a process of its own, with a cache of kernels that is empty at the first start. Modules are bytecode, as
-in an installed package: a start before the first one writes it. Seconds are those of processors, of Python and of
-compilers, so that other work on the machine counts little; ``wall`` is the clock's, and ``kernel`` is the clock's until
-the kernel is there that is compiled beside a first start.
+Each start is a process of its own, with a cache of kernels that is empty at the cold start and filled at the warm one.
+It ends with the first iteration after the guess. Modules are bytecode, as in an installed package: a start before the
+first one writes it. Python's own start (20 ms) is left out.
 """
 
 from __future__ import annotations
 
 import statistics
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -17,90 +17,86 @@ from typing import Any
 
 from bench import Row, all_turns, in_process, peak, spent
 
-NAMES = ("ball_throw", "cart_pole", "hopper_gait", "push_box", "table_robot", "quadruped_walk")
 STEPS, ROBOTS = 100, 128
 COLUMNS = {
-    "problem": "a shipped problem, or the table robot with a net",
-    "start": "the first one compiles, the second one finds its kernels",
-    "import": "seconds of processors",
-    "load": "seconds of processors",
-    "build and compile": "seconds of processors",
-    "first value": "seconds of processors",
-    "first gradient": "seconds of processors",
-    "all": "sum of these",
-    "wall": "seconds of the clock until the first gradient",
-    "kernel": "seconds of the clock until the kernel is compiled",
-    "memory": "most memory of the process [MiB]",
-    "cache": "of kernels after the start [MiB]",
+    "problem": "a shipped one",
+    "solver": "the first that the problem names, or that is chosen for it",
+    "cold": "seconds of the clock from import to the end of the first iteration, nothing cached",
+    "cold_spent": "seconds of processors until then, compilers included",
+    "warm": "seconds of the clock with all machine code in the cache",
+    "read": "of these, for import and reading",
+    "warm_spent": "seconds of processors until then",
+    "memory": "most memory of the warm process [MiB]",
+    "cold_memory": "most memory of the cold process [MiB]",
+    "cache": "of kernels after both starts [MiB]",
+    "fault": "why a start did not get to an iteration",
     "call": "what is compared with what it calls",
     "inner_ms": "milliseconds of the inner call",
     "ratio": "median ratio of the outer call to the inner one",
 }
-PHASES = tuple(COLUMNS)[2:7]
 
 
-def rows(quick: bool = False, problems: tuple[str, ...] = NAMES, repeats: int = 15) -> Iterator[Row]:
+def rows(
+    quick: bool = False, problems: tuple[str, ...] = (), every: int = 0, limit: float = 300.0, repeats: int = 15
+) -> Iterator[Row]:
     """Yield two starts of each problem, then what calls through the interface take.
 
     Args:
         quick: the ball throw alone.
-        problems: names of shipped problems, or "table_robot".
+        problems: names or files; all shipped ones if there are none.
+        every: 1 takes all solvers that a problem names, not the first alone.
+        limit: seconds after which a start is given up.
         repeats: turns of the calls.
     """
+    from symphys.problems import catalogue
+
     with TemporaryDirectory() as bytecode:
-        if not quick:
-            list(starts("ball_throw", bytecode))  # writes the bytecode
-        for name in problems[:1] if quick else problems:
-            for which, found in zip(("first", "second"), starts(name, bytecode), strict=True):
-                whole = sum(found[phase] for phase in PHASES)
-                rest = {key: found[key] for key in ("wall", "kernel", "memory", "cache")}
-                phases = {phase: found[phase] for phase in PHASES}
-                yield {"problem": name, "start": which, **phases, "all": whole, **rest}
+        for name in ["ball_throw"] if quick else problems or catalogue():
+            named = in_process(solvers, name, env={"PYTHONPYCACHEPREFIX": bytecode})
+            for solver in named if every else named[:1]:
+                yield starts(name, solver, bytecode, limit)
     yield from interface(2 if quick else ROBOTS, 5 if quick else STEPS, 1 if quick else repeats)
 
 
-def starts(name: str, bytecode: str) -> Iterator[dict[str, Any]]:
-    """Yield a first start and a second one, with the size of the cache after each [MiB]."""
+def solvers(name: str) -> list[str]:
+    """Return the solvers that a problem names, or those that are chosen for it."""
+    import symphys
+    from symphys.runs.choice import chosen
+
+    problem = symphys.load(name)
+    return list(problem.solvers or ()) or [each.solver for each in chosen(problem)]
+
+
+def starts(name: str, solver: str, bytecode: str, limit: float) -> Row:
+    """Return a cold start and a warm one, with the size of the cache."""
+    row: Row = {"problem": name, "solver": solver}
     with TemporaryDirectory() as folder:
         own = {"SYMPHYS_CACHE": folder, "PYTHONPYCACHEPREFIX": bytecode, "PYTHONDONTWRITEBYTECODE": ""}
-        for _ in range(2):
-            found = dict(in_process(start, name, env=own))
-            kept = sum(path.stat().st_size for path in Path(folder).iterdir()) / 2**20
-            yield found | {"cache": kept}
+        try:
+            cold, warm = (dict(in_process(start, name, solver, env=own, timeout=limit)) for _ in range(2))
+        except Exception as error:  # a table of all problems does not end with one
+            return row | {"fault": " ".join(str(error).split())[-200:]}
+        kept = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file()) / 2**20
+    row |= {"cold": cold["wall"], "cold_spent": cold["spent"], "warm": warm["wall"], "read": warm["read"]}
+    return row | {"warm_spent": warm["spent"], "memory": warm["memory"], "cold_memory": cold["memory"], "cache": kept}
 
 
-def start(name: str) -> dict[str, Any]:
-    """Measure each phase of a start in this process."""
-    found: dict[str, Any] = {}
+def start(name: str, solver: str) -> dict[str, Any]:
+    """Measure a start in this process."""
     began = perf_counter()
-
-    def timed(phase: str, call: Callable[[], Any]) -> Any:
-        before = spent()
-        result = call()
-        found[phase] = spent() - before
-        return result
-
-    symphys = timed("import", lambda: __import__("symphys"))
-    problem = timed("load", lambda: loaded(name))
-    rollout = timed("build and compile", lambda: symphys.compile(problem))
-    timed("first value", lambda: rollout.value(rollout.z()))
-    timed("first gradient", lambda: rollout.gradient(rollout.z()))
-    found["wall"] = perf_counter() - began
-    found["memory"] = peak()
-    rollout.finish()
-    found["kernel"] = perf_counter() - began
-    return found
-
-
-def loaded(name: str) -> Any:
-    """Load the problem."""
     import symphys
 
-    if name != "table_robot":
-        return symphys.load(name)
-    from measured_worlds import table_problem
+    problem = symphys.load(name)
+    read, found = perf_counter() - began, dict[str, Any]()
 
-    return table_problem([], STEPS)
+    def progress(row: Any) -> None:
+        found.update(wall=perf_counter() - began, read=read, spent=spent(), memory=peak())
+        if row.iteration:
+            raise KeyboardInterrupt
+
+    with suppress(KeyboardInterrupt):
+        symphys.solve(problem, solver, progress=progress)
+    return found
 
 
 def interface(robots: int, steps: int, repeats: int) -> Iterator[Row]:

@@ -1,5 +1,8 @@
 /* Jacobians: values of LANES points at once, then blocks of LANES rows of each point by adjoints. */
 #include <string.h>
+#ifndef CALL
+#define CALL(t, m, b, k) FUNCTIONS[(t)[0]](m, b, (t) + 2, k)
+#endif
 
 typedef struct { const char *taken; const word *rows; word left; const word *words; } block;
 /* taken: a byte for each adjoint; rows: LANES numbers, -1 for none; words: (first, count) of what is to be zeroed, which
@@ -31,7 +34,7 @@ static int any(const V *m, word w) {
 static void run(const word *t, const word *end, V *m) {
   while (t < end)
     if (t[0] >= 0) {
-      FUNCTIONS[t[0]](m, 0, t + 2, 0);
+      CALL(t, m, (V *)0, 0);
       t += t[1];
     } else if (any(m, t[3])) t += t[1];
     else {
@@ -69,7 +72,7 @@ static word listed(const slopes *p, const V *m, word l, item *items, char *at) {
 static void pull(const item *items, word count, const char *taken, V *s, V *b) {
   for (const item *x = items; x < items + count; x++) {
     if (!taken[x->pull]) continue;
-    if (x->entry) FUNCTIONS[x->entry[0]](s, b, x->entry + 2, 0);
+    if (x->entry) CALL(x->entry, s, b, 0);
     else
       for (word w = 0; w < x->size; w++) {
         if (x->to >= 0) b[x->to + w] += b[x->from + w];

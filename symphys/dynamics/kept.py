@@ -18,10 +18,13 @@ MAX_KEPT = 6
 KEPT: dict[Hashable, Any] = {}
 
 
-def structure(world: World, parameters: Sequence[Any]) -> Hashable:
-    """Equal for worlds that are equal as functions of these symbols (SX) and of their phases, numbers included."""
+def structure(world: World, parameters: Sequence[Any], *more: Any) -> Hashable:
+    """Return what is equal for worlds that are equal as functions of these symbols (SX) and of their phases.
+
+    Numbers are part of it. ``more``: trees that are compared as worlds are.
+    """
     leaves: list[Any] = []
-    shape = flatten(world, leaves)
+    shape = flatten((world, *more), leaves)
     column = ca.vertcat(ca.SX(0, 1), *(ca.vec(ca.densify(leaf)) for leaf in leaves))
     symbols = [*parameters, *(symbol for _, symbol in world.scheduled)]
     return shape, ca.Function("world", [ca.vertcat(ca.SX(0, 1), *symbols)], [column]).serialize()

@@ -28,6 +28,7 @@ from symphys.runs.job import Job
 from symphys.runs.record import Judgement, checkpoint_rows, failure, interruption, judged, make_result, trace_row, used
 from symphys.shooting import ShootingProblem
 from symphys.solvers import OUTCOME, Keep, Monitor, Outcome, Status, plain_outcome, revived_outcome, solver
+from symphys.trajectory import NotFinite
 from symphys.transcription import Transcription, guessed
 from symphys.types import Array
 
@@ -199,9 +200,6 @@ def solve(
     for note in job.guess.notes:
         log(f"guess from {job.guess.folder}: {note}")
     start = shooting.start(job.config.seed)
-    at_once = found.result is not None  # without an earlier result nothing counts before the new one is written
-    claim.check()
-    files.write_npz(job.folder.path / GUESS, transcription.simulate(start).arrays(), at_once)
     if solved is None:
         single = transcription.backend.precision == "single"
         outcome, spent = solve_alone(job, shooting, start, monitor, log, keep, found.checkpoint, single)
@@ -212,12 +210,25 @@ def solve(
         log("solved side by side with other seeds: the seconds are those of all")
         outcome, spent = solved, solved.trace[-1].seconds if solved.trace else 0.0
     spent += spent_before(found)
+    at_once = found.result is not None  # without an earlier result nothing counts before the new one is written
+    claim.check()
+    keep_guess(job, transcription, start, log, at_once)
     judgement = judge(transcription, outcome, job.examine, tell)
     price = transcription.prices(used(outcome.counts))
     claim.check()
     write(job, transcription, outcome, judgement, price, at_once)
     seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
     return make_result(job, transcription, outcome, judgement, price, seconds)
+
+
+def keep_guess(job: Job, transcription: Transcription, start: Array, log: Callable[[str], None], at_once: bool) -> None:
+    """Write the motion of the guess; where its exact rollout is not finite, say so in the log."""
+    try:
+        motion = transcription.simulate(start)
+    except NotFinite as error:
+        log(f"the motion of the guess is not kept: {error}")
+    else:
+        files.write_npz(job.folder.path / GUESS, motion.arrays(), at_once)
 
 
 def solve_alone(

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
 
-from symphys.dynamics.kept import kept
+from symphys.codegen.toolchain.identity import identity_of
+from symphys.codegen.toolchain.warm_start import kept_function
+from symphys.dynamics.kept import kept, structure
 from symphys.dynamics.observation import half_step_function
 from symphys.expression import Formula
 from symphys.maths.verbatim import verbatim
@@ -229,6 +231,7 @@ class Rollout:
     x0: Expr
     given: Expr
     p: Expr
+    _built: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def controls(self) -> int:
@@ -242,16 +245,24 @@ class Rollout:
     @cached_property
     def step(self) -> ca.Function:
         """One step (x, u, p, smoothing) -> x_next, built on demand since one expression takes a while."""
-        from symphys.dynamics.functions import step_function
 
-        return self.remembering(self.built(step_function))
+        def make() -> ca.Function:
+            from symphys.dynamics.functions import step_function
+
+            return self.built(step_function)
+
+        return self.remembering(self._kept("step", make))
 
     @cached_property
     def report(self) -> ca.Function:
         """The step with all reported quantities; see ``report_function``."""
-        from symphys.dynamics.functions import report_function
 
-        return self.remembering(self.built(report_function))
+        def make() -> ca.Function:
+            from symphys.dynamics.functions import report_function
+
+            return self.built(report_function)
+
+        return self.remembering(self._kept("report", make))
 
     @property
     def _shares(self) -> bool:
@@ -259,10 +270,20 @@ class Rollout:
         return bool(self.problem.varied) and not self.problem.free_duration and not self.world.scheduled
 
     def built(self, make: Callable[..., T], *more: Hashable) -> T:
-        """Build a function of the world; problems of a sweep with equal worlds share it."""
+        """Build a function of the world, once for all programs of this rollout and of sweeps with equal worlds."""
+        key = (make, more)
+        if key not in self._built:
+            scheme = self.parameters.scheme(self.problem.simulation)
+            arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
+            self._built[key] = kept(make, *arguments, *more) if self._shares else make(*arguments, *more)
+        found: T = self._built[key]
+        return found
+
+    def _kept(self, name: str, make: Callable[[], ca.Function]) -> ca.Function:
+        """Return a function of the world alone, from the cache of kernels where an equal world has been there."""
         scheme = self.parameters.scheme(self.problem.simulation)
-        arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
-        return kept(make, *arguments, *more) if self._shares else make(*arguments, *more)
+        same = structure(self.world, self.parameters.symbols, scheme)
+        return kept_function(make, identity_of(name, same, self.inputs))
 
     def remembering(self, step: ca.Function) -> ca.Function:
         """Extend a function (x, u, p, smoothing) -> (x_next, ...) to states with memory."""

@@ -274,7 +274,6 @@ def test_a_failure_leaves_nothing_of_an_earlier_success(make_job: MakeJob) -> No
         "problem.toml",
         "config.json",
         "result.json",
-        "guess.npz",
         "log.txt",
     }
 

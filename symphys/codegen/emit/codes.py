@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from symphys.codegen.emit.pieces import Cut, Form, pieces_of
-from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.source import DRIVER, SourceFile, head_of, resource
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.graph.graph import Graph
@@ -44,10 +43,10 @@ class Codes:
     constants: list[float]
 
 
-def codes_of(plan: Plan) -> Codes:
+def codes_of(functions: Sequence[tuple[Graph, Form]]) -> Codes:
     """Return the codes of a plan's functions; KernelUnavailable where a function is too large for them."""
     words, starts, numbers = array("I"), list[int](), dict[str, int]()
-    for graph, form in plan.functions:
+    for graph, form in functions:
         starts.append(len(words))
         _Encoder(pieces_of(graph, form, fuses=True), form, numbers).encode(words)
     if len(numbers) >> WORD_BITS:
@@ -55,13 +54,13 @@ def codes_of(plan: Plan) -> Codes:
     return Codes(words, starts, [float.fromhex(value) for value in numbers])
 
 
-def interpreter(lanes: int, single: bool) -> SourceFile:
-    """Return the C file: it depends on nothing of a program."""
+def interpreter(lanes: int, single: bool, driver: Sequence[str] = (*DRIVER, "phases.c")) -> SourceFile:
+    """Return the C file: it depends on nothing of a program. ``driver``: files of what calls the functions."""
     cases = "".join(f"{name}_op: {{ {_case(name)} NEXT; }}\n" for name in FORMS)
     labels = ", ".join([*(f"&&{name}" for name in OWN_CODES), *(f"&&{name}_op" for name in FORMS)])
     text = resource("interpreter.c").replace("OPERATIONS", labels).replace("CASES", cases)
     start = f"{head_of(lanes, single)}#include <string.h>\n#define WORD_BITS {WORD_BITS}\n"
-    return SourceFile(start + text + "".join(map(resource, (*DRIVER, "phases.c"))), straight=True)
+    return SourceFile(start + text + "".join(map(resource, driver)), straight=True)
 
 
 def _case(name: str) -> str:
@@ -90,8 +89,14 @@ class _Encoder:
         if places + PLACES >= 1 << (32 - WORD_BITS) or max(sizes, default=0) >= 1 << WORD_BITS:
             raise KernelUnavailable("a function is too large to be interpreted")
         start = len(words)
-        in_adjoints = [i >= form.primal for i in range(self.arguments)] + [form.backward] * len(graph.results)
-        words.extend((places, 1, 0, 0, *map(int, in_adjoints)))
+        read = [0] * self.arguments
+        for x in graph.needed() if form.shared else ():
+            if graph.nodes[x].op == "input":
+                argument, word = graph.nodes[x].at
+                read[argument] = max(read[argument], word + 1)
+        shared = [2 + count if form.shared else 0 for count in read[: form.primal]]
+        adjoints = [1] * (self.arguments - form.primal) + [int(form.backward)] * len(graph.results)
+        words.extend((places, 1, 0, 0, *shared, *adjoints))
         ends = self._ends(graph)
         for piece in pieces:
             for x in piece.nodes:
@@ -118,9 +123,10 @@ class _Encoder:
                 if graph.sizes[a]:
                     words.extend((NUMBERS["fill"], (PLACES + a) << WORD_BITS, zero, graph.sizes[a]))
         words.append(NUMBERS["end"])
-        if self.kept > MAX_REGISTERS:
+        kept = self.kept + sum(read[: form.primal])
+        if kept > MAX_REGISTERS:
             raise KernelUnavailable("a function keeps too many values to be interpreted")
-        words[start + 1] = max(self.kept, 1)
+        words[start + 1] = max(kept, 1)
 
     def _ends(self, graph: Graph) -> dict[int, int]:
         """Return for each value the last value that depends on it."""

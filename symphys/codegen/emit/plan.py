@@ -230,7 +230,7 @@ def _put_on_tape(
     sizes = np.zeros(len(body.kinds), np.int64)
     for number in np.unique(body.kind[pulled]).tolist():
         kind = body.kinds[number]
-        if pair := functions.taped(functions.forward(kind.function), kind.graph):
+        if pair := functions.taped(kind.function, kind.graph):
             body.taped[number], sizes[number] = pair, pair.size
     own = sizes[body.kind[pulled]]
     if 2 * program.size + int(own.sum()) > room:

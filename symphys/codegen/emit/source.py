@@ -26,13 +26,13 @@ class SourceFile:
         text: C.
         narrow: whether it is for fewer lanes than a vector register has.
         straight: whether functions are straight lines of values, each computed once.
-        gathers: whether vectors are put together from many places.
+        broadcasts: whether functions read numbers into all lanes of a vector.
     """
 
     text: str
     narrow: bool = False
     straight: bool = False
-    gathers: bool = False
+    broadcasts: bool = False
 
 
 def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[SourceFile]:

@@ -13,6 +13,7 @@ from symphys.codegen.emit.guarding import WIDTHS
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Place, Program
+from symphys.types import Ints
 
 if TYPE_CHECKING:
     from symphys.codegen.emit.codes import Codes
@@ -87,6 +88,15 @@ class LinkedCodes:
         words[starts + 2], words[starts + 3] = address & 0xFFFFFFFF, address >> 32
         self._addresses = words.ctypes.data + 4 * starts
         self._kept = raw, words
+
+    def linked(self, entries: Ints) -> Ints:
+        """Return entries of calls one after the other with addresses in place of the numbers of functions."""
+        found, at = entries.copy(), 0
+        while at < len(found):
+            if found[at] >= 0:
+                found[at] = self._addresses[found[at]]
+            at += int(found[at + 1])
+        return found
 
     @property
     def pointer(self) -> Any:

@@ -89,6 +89,8 @@ class Widths:
         self._sought, self._spent = {first[0]}, dict[int, float]()
         self._lock = threading.Lock()
         self._compiling: Background | None = None
+        self._begin: Callable[[], None] | None = None
+        self._called = False
         self._note = ""
         self._add(*first)
 
@@ -105,7 +107,8 @@ class Widths:
     def compile(self, parts: Sequence[SourceFile], texts: str, cache: Cache, load: Callable[[Path], Loaded]) -> None:
         """Compile the library of all lanes in the background, and change over to it once it is there.
 
-        See ``Background``; ``load`` loads it.
+        It begins with the second call: what is called once costs less than its library. See ``Background``; ``load``
+        loads it.
         """
 
         def done(path: Path) -> None:
@@ -116,10 +119,24 @@ class Widths:
         def failed(why: str) -> None:
             self._note = f"an interpreter evaluates, which is slower: {why}"
 
-        self._compiling = Background(parts, texts, cache, done, failed)
+        def begin() -> None:
+            try:
+                self._compiling = Background(parts, texts, cache, done, failed)
+            except KernelUnavailable as error:
+                failed(str(error))
+
+        self._begin = begin
+
+    def _compile_now(self) -> None:
+        """Begin to compile the library of all lanes, if that was put off."""
+        with self._lock:
+            begin, self._begin = self._begin, None
+        if begin is not None:
+            begin()
 
     def finish(self) -> None:
         """Wait for the library that is being compiled, if there is one."""
+        self._compile_now()
         if self._compiling is not None:
             self._compiling.finish()
 
@@ -152,7 +169,9 @@ class Widths:
 
     def _timed(self, width: LoadedWidth, missing: int, parts: Sequence[BatchData], threads: int) -> None:
         """Compute parts, and build a better library once calls without it have taken as long as compiling does."""
-        began = perf_counter()
+        if self._begin is not None and self._called:
+            self._compile_now()
+        self._called, began = True, perf_counter()
         width.pool.run([partial(width.loaded.evaluate, part) for part in parts], threads)
         if missing and self._libraries is not None:
             self._spent[missing] = self._spent.get(missing, 0.0) + perf_counter() - began

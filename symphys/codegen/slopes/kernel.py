@@ -4,28 +4,34 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symphys.codegen.emit.codes import codes_of, interpreter
 from symphys.codegen.emit.source import MAX_FILES, SourceFile, listed, resource, spread
 from symphys.codegen.emit.writer import write
-from symphys.codegen.errors import ProgramError
+from symphys.codegen.errors import KernelUnavailable, ProgramError
+from symphys.codegen.program.collection import uncollected
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import BuildReport
-from symphys.codegen.runtime.library import loaded
+from symphys.codegen.runtime.library import LinkedCodes, loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.slopes.kept import KeptSlopes
 from symphys.codegen.slopes.plan import SlopePlan, slope_plan
-from symphys.codegen.toolchain.build import Built, kept_library, shared_library, texts_of
+from symphys.codegen.toolchain.build import Built, kept_library, shared_library, texts_of, waits
 from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.compiler import processor, processors
+from symphys.codegen.toolchain.processes import Background
 from symphys.codegen.toolchain.warm_start import ProgramSource, found, keep
-from symphys.types import Array
+from symphys.types import Array, Ints
 
 WORD = ctypes.c_int64
 POINTER = ctypes.c_void_p
@@ -67,22 +73,101 @@ class _Points(ctypes.Structure):
     )
 
 
-class SlopeKernel:
-    """The Jacobian of one output of a program by its z. A point's numbers do not depend on the other points."""
+class LoadedSlopes:
+    """A library of Jacobians with the tables that it walks.
 
-    def __init__(
-        self, program: Program, output: str, planned: SlopePlan, library: Any, report: BuildReport, threads: int | None
-    ) -> None:
-        """Use ``compile_slopes``."""
-        self.program, self.output, self.report = program, output, report
-        self.threads = processors() if threads is None else threads
+    Attributes:
+        data: the driver's.
+        words: of its memory.
+    """
+
+    def __init__(self, path: Path, kept: KeptSlopes, output: str, lanes: int, codes: LinkedCodes | None = None) -> None:
+        """Load the library; KernelUnavailable if the system refuses. ``codes``: for an interpreter."""
+        library = loaded(path)
         self._evaluate = library.jacobians
         self._evaluate.argtypes, self._evaluate.restype = (POINTER, POINTER, POINTER), None
-        self._kept: list[Any] = []
-        self._data = self._slopes(planned, report.lanes)
-        listed = (ITEM_BYTES * self._data.items + self._data.cell_count) // (8 * report.lanes) + 1
-        words = program.size + planned.tape + self._data.kept + planned.adjoints + listed
-        self._pool = MemoryPool(words, report.lanes, np.float64)
+        self._kept: list[Any] = [codes]
+        self._codes = codes
+        self.data = self._slopes(kept.program, kept.plan, kept.program.outputs[output].size, lanes)
+        listed = (ITEM_BYTES * self.data.items + self.data.cell_count) // (8 * lanes) + 1
+        self.words = kept.program.size + kept.plan.tape + self.data.kept + kept.plan.adjoints + listed
+
+    def evaluate(self, points: _Points, memory: Any) -> None:
+        """Compute Jacobians in this memory."""
+        self._evaluate(ctypes.byref(self.data), ctypes.byref(points), memory.ctypes.data)
+
+    def _slopes(self, program: Program, planned: SlopePlan, height: int, lanes: int) -> _Slopes:
+        blocks = (_Block * max(len(planned.blocks), 1))()
+        for block, plan in zip(blocks, planned.blocks, strict=False):
+            numbers = [*plan.rows, *[-1] * (lanes - len(plan.rows))]
+            block.taken, block.rows = self._put(plan.taken), self._words(numbers)
+            block.left, block.words = len(plan.left), self._words(plan.left)
+        self._kept.append(blocks)
+        z, parameters, back = program.z, program.parameters, planned.backward
+        return _Slopes(
+            *(program.size, planned.tape, planned.adjoints, height, z.size, planned.result),
+            *(z.offset, z.size, parameters.offset, parameters.size),
+            self._words(planned.seeds),
+            len(planned.forward),
+            self._entries(planned.forward),
+            len(back.calls) - 1,
+            len(back.calls) + len(back.copies) + len(back.uses),
+            self._entries(back.entries),
+            *map(self._words, (back.calls, back.copies, back.uses, back.cells)),
+            len(back.cells),
+            len(planned.blocks),
+            ctypes.addressof(blocks),
+            int(planned.read[:, 1].sum()),
+            len(planned.read),
+            self._words(planned.read),
+        )
+
+    def _entries(self, entries: Ints) -> int:
+        return self._words(entries if self._codes is None else self._codes.linked(entries))
+
+    def _words(self, values: ArrayLike) -> int:
+        words = np.ascontiguousarray(values, np.int64).ravel()
+        return self._put(words if words.size else np.zeros(1, np.int64))
+
+    def _put(self, values: NDArray[Any]) -> int:
+        self._kept.append(values)
+        return int(values.ctypes.data)
+
+
+class SlopeKernel:
+    """The Jacobian of one output of a program by its z. A point's numbers do not depend on the other points.
+
+    Attributes:
+        program, output: of what.
+        report: on how it was built.
+        threads: that share a batch.
+        library: what evaluates; that of an interpreter until the kernel is compiled.
+    """
+
+    def __init__(
+        self, program: Program, output: str, library: LoadedSlopes, report: BuildReport, threads: int | None
+    ) -> None:
+        """Use ``compile_slopes``."""
+        self.program, self.output, self.report, self.library = program, output, report, library
+        self.threads = processors() if threads is None else threads
+        self._pool = MemoryPool(library.words, report.lanes, np.float64)
+        self._compiling: Background | None = None
+
+    def compile(self, parts: Sequence[SourceFile], kept: KeptSlopes, cache: Cache) -> None:
+        """Compile the library in the background, and change over to it once it is there; see ``Background``."""
+
+        def done(path: Path) -> None:
+            self.library = LoadedSlopes(path, kept, self.output, self.report.lanes)
+
+        def failed(why: str) -> None:
+            self.report = replace(self.report, note=f"an interpreter evaluates slopes, which is slower: {why}")
+
+        self._compiling = Background(parts, kept.texts, cache, done, failed)
+
+    def finish(self) -> None:
+        """Wait for the library that is being compiled, if there is one."""
+        if self._compiling is not None:
+            self._compiling.finish()
 
     def jacobians(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None = None) -> Array:
         """(B, n) and (B, p), or (p,) for all points -> (B, outputs, columns): by the first of z; None: by all."""
@@ -110,57 +195,30 @@ class SlopeKernel:
         self._check("parameters", given, (1, 2), self.program.parameters.size)
         if given.ndim == 2 and len(given) != len(z):
             raise ProgramError(f"the batch sizes {len(z)} of Z and {len(given)} of parameters differ")
-        return z, given, np.empty((len(z), self._data.height, self._data.width if columns is None else columns))
+        return (
+            z,
+            given,
+            np.empty((len(z), self.library.data.height, self.library.data.width if columns is None else columns)),
+        )
 
     def _run(self, z: Array, given: Array, found: Array, first: int, last: int, memory: Any) -> None:
         shared = given.ndim == 1
         row = given if shared else given[first:]
         addresses = z[first:].ctypes.data, row.ctypes.data, int(shared), found.shape[2], found[first:].ctypes.data
         batch = _Points(last - first, *addresses)
-        self._evaluate(ctypes.byref(self._data), ctypes.byref(batch), memory.ctypes.data)
+        self.library.evaluate(batch, memory)
 
     def _check(self, name: str, values: Array, dimensions: tuple[int, ...], size: int) -> None:
         if values.ndim not in dimensions or values.shape[-1] != size:
             raise ProgramError(f"{name} has the shape {values.shape}; wanted is (batch, {size})")
 
-    def _slopes(self, planned: SlopePlan, lanes: int) -> _Slopes:
-        blocks = (_Block * max(len(planned.blocks), 1))()
-        for block, plan in zip(blocks, planned.blocks, strict=False):
-            numbers = [*plan.rows, *[-1] * (lanes - len(plan.rows))]
-            block.taken, block.rows = self._put(plan.taken), self._words(numbers)
-            block.left, block.words = len(plan.left), self._words(plan.left)
-        self._kept.append(blocks)
-        program, back = self.program, planned.backward
-        z, parameters, height = program.z, program.parameters, program.outputs[self.output].size
-        return _Slopes(
-            *(program.size, planned.tape, planned.adjoints, height, z.size, planned.result),
-            *(z.offset, z.size, parameters.offset, parameters.size),
-            self._words(planned.seeds),
-            len(planned.forward),
-            self._words(planned.forward),
-            len(back.calls) - 1,
-            len(back.calls) + len(back.copies) + len(back.uses),
-            self._words(back.entries),
-            *map(self._words, (back.calls, back.copies, back.uses, back.cells)),
-            len(back.cells),
-            len(planned.blocks),
-            ctypes.addressof(blocks),
-            int(planned.read[:, 1].sum()),
-            len(planned.read),
-            self._words(planned.read),
-        )
-
-    def _words(self, values: ArrayLike) -> int:
-        words = np.ascontiguousarray(values, np.int64).ravel()
-        return self._put(words if words.size else np.zeros(1, np.int64))
-
-    def _put(self, values: NDArray[Any]) -> int:
-        self._kept.append(values)
-        return int(values.ctypes.data)
-
 
 def compile_slopes(
-    program: Program | ProgramSource, output: str, cache: Cache | None = None, threads: int | None = None
+    program: Program | ProgramSource,
+    output: str,
+    cache: Cache | None = None,
+    threads: int | None = None,
+    wait: bool = True,
 ) -> SlopeKernel:
     """Build the Jacobian of an output of a program by z, in double precision, or take it from the cache.
 
@@ -169,6 +227,7 @@ def compile_slopes(
         output: which of its outputs.
         cache: where kernels are kept; None: the user's.
         threads: how many blocks of points are computed at once; None: one for each processor.
+        wait: for the compiler; else see ``build.compiled``.
 
     Raises:
         KernelUnavailable: with one line that says why; the caller falls back.
@@ -179,23 +238,34 @@ def compile_slopes(
     kept = None if key is None else found(key, lambda path: KeptSlopes.read(path, source.make), cache)
     built = None if kept is None else kept_library(kept.texts, cache)
     if kept is not None and built is not None:
-        return _kernel(kept, built, loaded(built.path), output, lanes, started, threads)
+        return _kernel(kept, built, LoadedSlopes(built.path, kept, output, lanes), output, lanes, started, threads)
+    # plan the Jacobian, and keep the plan
     whole = source.make()
-    planned = slope_plan(whole, output, lanes)
-    if whole.zeroed or whole.constants:
-        raise ProgramError("slopes are of programs without constants")
-    parts = _sources(planned, lanes)
+    with uncollected():
+        planned = slope_plan(whole, output, lanes)
+        if whole.zeroed or whole.constants:
+            raise ProgramError("slopes are of programs without constants")
+        parts = _sources(planned, lanes)
     operations = sum(len(graph.nodes) for graph, _ in planned.functions)
     kept = KeptSlopes(whole, planned, texts_of(parts), len(planned.functions), operations)
-    with shared_library(parts, cache, kept.texts) as built:
-        library = loaded(built.path)
     if key is not None:
         keep(key, kept.write, cache)
+    # begin with an interpreter where the compiler takes long
+    if not waits(operations, wait) and kept_library(kept.texts, cache) is None:
+        with suppress(KernelUnavailable):
+            codes = LinkedCodes(codes_of(planned.functions), lanes, np.float64)
+            with shared_library([interpreter(lanes, False, ("slopes.c",))], cache) as built:
+                library = LoadedSlopes(built.path, kept, output, lanes, codes)
+            kernel = _kernel(kept, replace(built, cached=False), library, output, lanes, started, threads)
+            kernel.compile(parts, kept, cache)
+            return kernel
+    with shared_library(parts, cache, kept.texts) as built:
+        library = LoadedSlopes(built.path, kept, output, lanes)
     return _kernel(kept, built, library, output, lanes, started, threads)
 
 
 def _kernel(
-    kept: KeptSlopes, built: Built, library: Any, output: str, lanes: int, started: float, threads: int | None
+    kept: KeptSlopes, built: Built, library: LoadedSlopes, output: str, lanes: int, started: float, threads: int | None
 ) -> SlopeKernel:
     """Make the kernel of a library and its plan."""
     program, planned = kept.program, kept.plan
@@ -211,7 +281,7 @@ def _kernel(
         seconds=time.perf_counter() - started,
         note=built.note,
     )
-    return SlopeKernel(program, output, planned, library, report, threads)
+    return SlopeKernel(program, output, library, report, threads)
 
 
 def _sources(planned: SlopePlan, lanes: int) -> list[SourceFile]:
@@ -223,5 +293,5 @@ def _sources(planned: SlopePlan, lanes: int) -> list[SourceFile]:
         mine = [i for i, (_, form) in enumerate(planned.functions) if form.backward == backward]
         work = [len(planned.functions[i][0].nodes) for i in mine]
         for group in spread([texts[i] for i in mine], work, MAX_FILES):
-            found.append(SourceFile("\n".join([head, *group]), straight=True))
+            found.append(SourceFile("\n".join([head, *group]), straight=True, broadcasts=True))
     return [*found, SourceFile(head + listed(len(planned.functions)) + resource("slopes.c"))]

@@ -135,12 +135,12 @@ def _cheaper(
     """Return the cheaper adjoint for a block of rows: the function's own, or products with a table of its slopes."""
     forward = functions.forward(function)
     graph = functions.adjoint(function, inputs, outputs)
-    taped = functions.taped(forward, graph)
+    taped = functions.taped(function, graph)
     most, slopes = TABLE_COST * _operations(graph, taped), sparsity(forward)
     if slopes.sum() > MAX_SLOPES or _products(forward, slopes, inputs, outputs) > most:
         return graph, taped
     table = functions.adjoint(function, inputs, outputs, tabled=True)
-    other = functions.taped(forward, table)
+    other = functions.taped(function, table)
     return (table, other) if _operations(table, other) < most else (graph, taped)
 
 

@@ -32,8 +32,10 @@ if TYPE_CHECKING:  # what writes C is imported where it is called: a second star
     from symphys.codegen.emit.planned import Plan
     from symphys.codegen.emit.source import SourceFile
 
-MIN_LONG_OPERATIONS = 20_000
-"""Operations from which a kernel takes some seconds to compile, and begins with an interpreter."""
+MIN_LONG_OPERATIONS = 2_000
+"""Operations from which a kernel takes half a second or more to compile, and begins with an interpreter."""
+BACKGROUND_NICENESS = 10
+"""Of compilers beside a solve, so that they take what it leaves."""
 MIN_ANNOUNCED_TIME = 30.0
 """[s] Estimated time of compiling from which it is announced."""
 
@@ -46,6 +48,7 @@ def compile_program(
     seeded: Sequence[str] | None = None,
     threads: int | None = None,
     rows: int | None = None,
+    wait: bool = True,
 ) -> ProcessorKernel:
     """Build the kernel of a program, or take it from the cache.
 
@@ -59,13 +62,14 @@ def compile_program(
         threads: how many blocks are computed at once; None: one for each processor.
         rows: how many rollouts most calls will have. What suits them is compiled at once, and what suits other calls
             when these have taken as long as compiling takes. None: many.
+        wait: for the compiler; else see ``compiled``.
 
     Raises:
         KernelUnavailable: with one line that says why; the caller falls back.
     """
     single = precision == "single"
     width = BlockWidth(width_of(lanes, single), single, several=lanes == "auto")
-    return compiled(program, names_of(program, seeded), width, cache or default_cache(), threads, rows)[0]
+    return compiled(program, names_of(program, seeded), width, cache or default_cache(), threads, rows, wait)[0]
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,7 @@ def compiled(
     """Build the kernel of a program, or take it from the cache; return also its plan, to be kept.
 
     ``wait``: for the compiler; else a kernel of at least ``MIN_LONG_OPERATIONS`` operations begins with an interpreter,
-    and changes over once it is compiled. With $SYMPHYS_WAIT all wait.
+    which is compiled from its second call on, and changes over once it is there. With $SYMPHYS_WAIT all wait.
     """
     from symphys.codegen.emit.packs import single_lane_plan
     from symphys.codegen.emit.plan import plan
@@ -117,8 +121,7 @@ def compiled(
     lanes = suited(rows, width.lanes) if rows is not None and width.several else width.lanes
     if lanes != width.lanes:
         parts = sources(own or planned, lanes, width.single, narrow=True)
-    waits = wait or operations < MIN_LONG_OPERATIONS or lanes != width.lanes or bool(os.environ.get("SYMPHYS_WAIT"))
-    if not waits and libraries.find(lanes) is None:
+    if not waits(operations, wait or lanes != width.lanes) and libraries.find(lanes) is None:
         with suppress(KernelUnavailable):
             first = lanes, libraries.interpreter(planned)
             kernel = kernel_of(first, libraries, threads, started, cached=False)
@@ -128,6 +131,11 @@ def compiled(
     with libraries.built(lanes, parts) as built:
         first = lanes, libraries.load(built.path, lanes)
         return kernel_of(first, libraries, threads, started, built.cached, built.note), kept
+
+
+def waits(operations: int, wait: bool) -> bool:
+    """Whether to wait for the compiler of a kernel of so many operations, which is asked for with ``wait`` or not."""
+    return wait or operations < MIN_LONG_OPERATIONS or bool(os.environ.get("SYMPHYS_WAIT"))
 
 
 def double_reference(program: Program, names: tuple[str, ...]) -> ProcessorKernel:
@@ -228,7 +236,7 @@ class KeptLibraries:
         from symphys.codegen.emit.codes import codes_of, interpreter
 
         lanes, single = self.width.lanes, self.width.single
-        codes = LinkedCodes(codes_of(planned), lanes, np.float32 if single else np.float64)
+        codes = LinkedCodes(codes_of(planned.functions), lanes, np.float32 if single else np.float64)
         with shared_library([interpreter(lanes, single)], self.cache) as built:
             if built.note:
                 raise KernelUnavailable(built.note)
@@ -309,6 +317,8 @@ def compile_for(given: IO[bytes]) -> None:
     """Keep the library that a ``Background`` asks for, and print its path, or why there is none."""
     from symphys.codegen.emit.source import SourceFile
 
+    if hasattr(os, "nice"):
+        os.nice(BACKGROUND_NICENESS)
     request = json.load(given)
     parts, texts = [SourceFile(**part) for part in request["parts"]], request["texts"]
     cache = Cache(Path(request["cache"]["folder"]), request["cache"]["limit"])
@@ -324,7 +334,7 @@ def compile_for(given: IO[bytes]) -> None:
 def texts_of(parts: Sequence[SourceFile]) -> str:
     """Return a checksum of C files."""
     return hashlib.sha256(
-        "\0".join(f"{part.narrow} {part.straight} {part.gathers} {part.text}" for part in parts).encode()
+        "\0".join(f"{part.narrow} {part.straight} {part.broadcasts} {part.text}" for part in parts).encode()
     ).hexdigest()
 
 

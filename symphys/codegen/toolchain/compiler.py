@@ -43,8 +43,9 @@ STRAIGHT = (
     *("-fno-ipa-icf", "-fno-ipa-sra", "-fno-ipa-cp", "-fno-ipa-ra"),
 )
 """More flags of gcc where functions are straight lines of values, each computed once: a third less to compile."""
-GATHERS = ("-fdisable-rtl-combine",)
-"""More flags of gcc where vectors are put together word by word: the combiner takes seven eighths of its time there."""
+BROADCASTS = ("-O1", "-fdisable-rtl-combine")
+"""More flags of gcc where numbers are read into all lanes: its combiner takes seven eighths of its time there, and more
+than -O1 gives slower code (Jacobians of a hopper: 27 s in place of 71, and 0.88 of the time of a call)."""
 NARROW = ("-fno-tree-vectorize", "-fno-tree-slp-vectorize")
 """More flags where a lane is a number, or a vector is short: packing several into one takes longer."""
 COMPILE_TIMEOUT = 600.0
@@ -127,8 +128,8 @@ class Compiler:
         for source, target in zip(sources, objects, strict=True):
             file = target.with_suffix(".c")
             _write(file, source.text)
-            straight, gathers = (STRAIGHT if source.straight else ()), (GATHERS if source.gathers else ())
-            extra = (*(NARROW if source.narrow else ()), *((*straight, *gathers) if self.gnu else ()))
+            straight, broadcasts = (STRAIGHT if source.straight else ()), (BROADCASTS if source.broadcasts else ())
+            extra = (*(NARROW if source.narrow else ()), *((*straight, *broadcasts) if self.gnu else ()))
             commands.append([*self.command, *flags, *extra, "-c", str(file), "-o", str(target)])
         run_all(commands, COMPILE_TIMEOUT, processors(), folder)
         library = folder / "kernel.so"

@@ -9,11 +9,15 @@ from __future__ import annotations
 
 import contextlib
 import time
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeVar
 
+import casadi as ca
+
+from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import ProcessorKernel
 from symphys.codegen.toolchain.build import BlockWidth, KeptLibraries, compiled, kernel_of, temporary_folder, width_of
@@ -22,6 +26,8 @@ from symphys.codegen.toolchain.identity import identity_of, package_stamp
 from symphys.codegen.toolchain.plans import KeptPlan
 
 Precision = Literal["double", "single"]
+MIN_KEPT_INSTRUCTIONS = 5000
+"""Instructions of a function of casadi from which it is kept: fewer are built in some tenths of a second."""
 
 
 @dataclass(frozen=True)
@@ -89,3 +95,29 @@ def keep(key: str, write: Callable[[Path], None], cache: Cache) -> None:
         path = Path(folder) / "plan.npz"
         write(path)
         replace(cache, suffix=PLAN_SUFFIX).store(key, path)
+
+
+def kept_function(make: Callable[[], ca.Function], identity: str | None) -> ca.Function:
+    """Return a function of casadi, from the cache where one of this identity was made before; see ``ProgramSource``."""
+    key = None if identity is None else identity_of(identity, package_stamp())
+    try:
+        cache = default_cache()
+    except KernelUnavailable:
+        return make()
+    if key is not None and (kept := found(key[:32], _read_function, cache)) is not None:
+        return kept
+    function = make()
+    if key is not None and function.n_instructions() >= MIN_KEPT_INSTRUCTIONS:
+        keep(key[:32], lambda path: _write_function(function, path), cache)
+    return function
+
+
+def _write_function(function: ca.Function, path: Path) -> None:
+    path.write_bytes(zlib.compress(function.serialize().encode(errors="surrogateescape"), 1))
+
+
+def _read_function(path: Path) -> ca.Function:
+    try:
+        return ca.Function.deserialize(zlib.decompress(path.read_bytes()).decode(errors="surrogateescape"))
+    except (zlib.error, RuntimeError) as error:
+        raise ValueError(f"{path} holds no function") from error

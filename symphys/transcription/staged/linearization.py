@@ -31,11 +31,18 @@ class Linearization:
         statics: (s,) the entries of z that are no knots of a control.
     """
 
-    def __init__(self, rollout: Rollout, backend: str = BEST, threads: int | None = None, exact: bool = False) -> None:
-        """Compile the step; ``exact``: for smoothing 0 only."""
+    def __init__(
+        self,
+        rollout: Rollout,
+        backend: str = BEST,
+        threads: int | None = None,
+        exact: bool = False,
+        wait: bool = False,
+    ) -> None:
+        """Compile the step; arguments are as in ``LinearizedStep``."""
         self.rollout, self.tangent = rollout, Tangent(rollout)
         self.statics = statics_of(rollout)
-        self.step = LinearizedStep(rollout, self.tangent, backend, threads, exact)
+        self.step = LinearizedStep(rollout, self.tangent, backend, threads, exact, wait=wait)
 
     def motion(self, z: ArrayLike, smoothing: float, start: Array | None = None) -> StagedMotion:
         """Return the motion of z (len(z),), from its own first state or another one (nx,)."""

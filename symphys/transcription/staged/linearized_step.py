@@ -49,6 +49,7 @@ class LinearizedStep:
         exact: whether it is for smoothing 0 only.
         parameters: whether there are slopes by p; without, those are 0.
         clock: [s] the time at which step 0 begins; of a rollout whose duration does not vary.
+        wait: for the compiler; else an interpreter evaluates until it is done.
     """
 
     rollout: Rollout
@@ -58,6 +59,7 @@ class LinearizedStep:
     exact: bool = False
     parameters: bool = True
     clock: float = 0.0
+    wait: bool = False
     _note: str = field(default="", init=False)
 
     @cached_property
@@ -188,7 +190,7 @@ class LinearizedStep:
         try:
             self._refuse()
             source = self.source("slopes", lambda: step_program(self.arguments, self.exact, True))
-            return _BySlopes(compile_slopes(source, "off", threads=self._count))
+            return _BySlopes(compile_slopes(source, "off", threads=self._count, wait=self.wait))
         except (KernelUnavailable, ProgramError) as error:
             self._note = f"; {error}" if self.backend in PRECISIONS else ""
             return _ByCasadi(step_functions(self.arguments)[1])
@@ -213,7 +215,7 @@ class LinearizedStep:
 
     def _kernel(self, source: ProgramSource) -> Kernel:
         self._refuse()
-        return build_kernel(self.backend, source, [], self._count, wait=True)
+        return build_kernel(self.backend, source, [], self._count, wait=self.wait)
 
     def _refuse(self) -> None:
         """Raise KernelUnavailable where the backend is no kernel."""

@@ -116,7 +116,8 @@ class PolicyRollout:
             return None
         try:
             make = partial(policy_program, self.step, self.sizes, self.costs)
-            return compile_source(self.step.source("policy", make, *self.sizes, self.costs is None), (), self.threads)
+            source = self.step.source("policy", make, *self.sizes, self.costs is None)
+            return compile_source(source, (), self.threads, wait=self.step.wait)
         except (KernelUnavailable, ProgramError):
             return None
 

@@ -123,13 +123,15 @@ class StageFunctions:
             steps: of a horizon.
             backend: a name of a kernel, or another for casadi's virtual machine.
             threads: their number for the steps; None: one for each processor.
-            worth: operations of a horizon above which they are compiled; None: ``MIN_COMPILED_OPERATIONS``.
+            worth: operations of a horizon above which they are compiled, and waited for; None:
+                ``MIN_COMPILED_OPERATIONS``, and until they are an interpreter evaluates.
         """
         self.functions, self.backend, self.threads = list(functions), backend, threads
         keys = dict.fromkeys(segment for each in self.functions for segment in each.segments)
         order = ("before", "after", "u", "constants", "ticks", "next")
         self._segments = sorted((key for key in keys if key[1]), key=lambda key: order.index(key[0]))
         work = sum(each.function.n_instructions() for each in self.functions)
+        self._waits = worth is not None
         self._compiles = backend in PRECISIONS and work * steps > (MIN_COMPILED_OPERATIONS if worth is None else worth)
         self._gathered = {name: self._entries(name) for name in order}
         sizes = [int(each.function.numel_out(o)) for each in self.functions for o in range(each.function.n_out())]
@@ -183,7 +185,7 @@ class StageFunctions:
         if not self._compiles:
             return None
         try:
-            return compile_program(self._program, seeded=(), threads=self.threads, precision="double")
+            return compile_program(self._program, seeded=(), threads=self.threads, wait=self._waits)
         except (KernelUnavailable, ProgramError):
             return None  # the step's description says why there is no compiler
 

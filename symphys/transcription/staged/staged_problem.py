@@ -76,7 +76,7 @@ class RolloutStages:
         problem = rollout.problem
         self.rollout, self.steps = rollout, rollout.steps
         self.statics = statics_of(rollout)
-        self._linearization = Linearization(rollout, backend, threads, exact)
+        self._linearization = Linearization(rollout, backend, threads, exact, wait=priced)
         self.tangent = self._linearization.tangent
         self._evaluated, self._priced = (backend, 1, 0) if priced else (backend, threads, None), priced
         self._groups = TermGroups(rollout, self.tangent, backend, threads)

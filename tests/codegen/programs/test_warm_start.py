@@ -22,11 +22,13 @@ from symphys.codegen.toolchain import warm_start
 from symphys.codegen.toolchain.cache import PLAN_SUFFIX
 from symphys.codegen.toolchain.identity import identity_of
 from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
+from symphys.dynamics.kept import structure
 from symphys.expression import parse
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.transcription import transcribe
 from symphys.transcription.program import program_identity
+from symphys.transcription.rollout import symbolic_rollout
 
 Z = np.array([[1.0, 2.0], [0.3, -1.0]])
 
@@ -211,3 +213,57 @@ def test_a_second_start_of_a_problem_is_the_first(name: str, tmp_path: Path, mon
     np.testing.assert_array_equal(warm.shooting.constraint_upper, cold.terms.upper)
     assert warm.shooting.constraint_names == cold.terms.names
     assert warm.backend.cached
+
+
+def many_terms(factor: float) -> ca.Function:
+    x = ca.SX.sym("x")
+    y = x
+    for k in range(3000):
+        y = ca.sin(y) + factor / (1 + k)
+    return ca.Function("terms", [x], [y])
+
+
+def test_a_function_of_casadi_is_kept_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path / "kernels"))
+    made = list[float]()
+
+    def make(factor: float) -> ca.Function:
+        made.append(factor)
+        return many_terms(factor)
+
+    first = warm_start.kept_function(partial(make, 1 / 3), "a")
+    again = warm_start.kept_function(partial(make, 1 / 3), "a")
+    other = warm_start.kept_function(partial(make, 1 / 7), "b")
+    assert made == [1 / 3, 1 / 7]
+    assert float(again(0.1)) == float(first(0.1)) != float(other(0.1))
+    warm_start.kept_function(partial(make, 0.5), None)  # without an identity it is made each time
+    (kept, _) = sorted((tmp_path / "kernels").glob("*.plan"))
+    kept.write_bytes(kept.read_bytes()[:-9])
+    for identity, factor in (("a", 1 / 3), ("b", 1 / 7)):
+        warm_start.kept_function(partial(make, factor), identity)
+    assert len(made) == 4, "what is damaged is made again"
+
+
+def test_a_small_function_of_casadi_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path / "kernels"))
+    x = ca.SX.sym("x")
+    warm_start.kept_function(lambda: ca.Function("square", [x], [x * x]), "a")
+    assert not (tmp_path / "kernels").exists()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"ball.mass": 2.5}, {"simulation.dt": 0.005}, {"simulation.sweeps": 9}, {"ground.friction": 0.123}],
+    ids=lambda change: next(iter(change)),
+)
+def test_steps_of_unequal_worlds_are_not_the_same(change: dict[str, float]) -> None:
+    problem = load_problem(find("ball_throw"))
+
+    def identity(problem: Problem) -> str | None:
+        rollout = symbolic_rollout(problem)
+        scheme = rollout.parameters.scheme(problem.simulation)
+        return identity_of(structure(rollout.world, rollout.parameters.symbols, scheme), rollout.inputs)
+
+    assert identity(problem) is not None
+    assert identity(problem) != identity(problem.set(change))
+    assert identity(problem) == identity(problem.set({"simulation.duration": problem.simulation.duration / 2}))

@@ -12,8 +12,9 @@ from worlds.guarded import HEAPS, whole
 
 import symphys
 from symphys.codegen import Cache, FunctionCall, KernelUnavailable, MemoryLayout, Place, Program
-from symphys.codegen.slopes import SlopeKernel, compile_slopes
+from symphys.codegen.slopes import SlopeKernel, compile_slopes, kernel
 from symphys.codegen.slopes.plan import slope_plan
+from symphys.codegen.toolchain import build
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.staged.linearization import Linearization
 from symphys.transcription.staged.linearized_step import LinearizedStep
@@ -135,3 +136,33 @@ def test_zeros_may_stand_for_several_results(cache: Cache) -> None:
     assert np.array_equal(found[:, 0, 0], [1.0, 1.75])
     assert np.array_equal(found, without.jacobians(Z, np.zeros((2, 0))))
     assert np.isfinite(with_guards.jacobians(Z[:1], np.zeros((1, 0)))).all()
+
+
+class Later:
+    """A compiler that ends when the test says so."""
+
+    running = True
+
+    def __init__(self, parts: Any, texts: str, cache: Cache, done: Any, failed: Any) -> None:
+        self.arguments, self.done, self.failed = (parts, cache, texts), done, failed
+
+    def finish(self) -> None:
+        with build.shared_library(*self.arguments) as built:
+            self.done(built.path)
+
+
+@pytest.mark.parametrize("guarded", [True, False])
+def test_the_interpreter_gives_the_same_bits(
+    guarded: bool, tmp_path: Path, cache: Cache, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = pushes(guarded)
+    whole = compiled(program, "out", cache)
+    monkeypatch.setattr(build, "MIN_LONG_OPERATIONS", 0)
+    monkeypatch.setattr(kernel, "Background", Later)
+    interpreted = compile_slopes(program, "out", Cache(tmp_path / "kernels"), threads=1, wait=False)
+    given = np.random.default_rng(0).uniform(-1, 1, (7, program.z.size)), np.zeros(program.parameters.size)
+    first, library = interpreted.jacobians(*given), interpreted.library
+    np.testing.assert_array_equal(first, whole.jacobians(*given))
+    interpreted.finish()
+    assert interpreted.library is not library
+    np.testing.assert_array_equal(interpreted.jacobians(*given), first)
