@@ -71,6 +71,7 @@ def main(arguments: list[str]) -> int:
         return 2
     for variable in THREAD_VARIABLES:  # rollouts are shared out among threads, not matrices
         os.environ.setdefault(variable, "1")
+    os.environ.setdefault("SYMPHYS_WAIT", "1")  # kernels are measured, not the interpreter before them
     module, defaults = import_module(name), options_of(name)
     parser = argparse.ArgumentParser(
         prog=f"bench.py {name}", description=module.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter

@@ -39,7 +39,7 @@ def kept(
     *more: Hashable,
 ) -> T:
     """Return ``make(world, scheme, inputs, parameters, *more)``, or its result for an equal world."""
-    key = (make, structure(world, parameters), scheme, tuple(inputs), more)
+    key = (make, structure(world, parameters, scheme), tuple(inputs), more)
     if key not in KEPT:
         while len(KEPT) >= MAX_KEPT:
             del KEPT[next(iter(KEPT))]
