@@ -3,6 +3,9 @@
 Modules become bytecode, also where $PYTHONDONTWRITEBYTECODE is set, as in containers: else hundreds of processes of the
 tests would each compile the package from its sources, a third of a second.
 
+Kernels are waited for, since workers of tests leave compilers in the background no processor; tests of what evaluates
+until a kernel is there take $SYMPHYS_WAIT away.
+
 Ctrl-C reaches tests that send it themselves also where the shell ignores it, as with ``nohup make test &``.
 
 On a machine without a C compiler a test that finds none is skipped, with that as the reason.
@@ -23,6 +26,7 @@ from typing import Any
 import pytest
 
 os.environ.setdefault("SYMPHYS_CACHE", str(Path(__file__).parents[1] / "build" / "kernels"))
+os.environ.setdefault("SYMPHYS_WAIT", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from tools.repeats import few
 from worlds.staged_toys import acrobot, attitude, boxed, pendulum
-from worlds.toys import quadratic, stop_at, through_json
+from worlds.toys import quadratic, require, stop_at, through_json
 
+import symphys
+from symphys.codegen.toolchain import build
 from symphys.shooting import ShootingProblem
 from symphys.solvers import Outcome, Status, solver
 from symphys.solvers.ddp.gains import follow
+from symphys.transcription import transcribe
 
 SWING = 98.637754
 """The least objective of the acrobot's swing-up that is known; multiple shooting finds it too."""
@@ -118,3 +122,19 @@ def test_budgets_seeds_and_refusals() -> None:
 def test_values_that_cannot_be(bad: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         solver("ilqr").Options(**bad)
+
+
+@pytest.mark.slow
+def test_iterates_of_a_first_start_are_those_of_compiled_kernels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An interpreter evaluates values, steps and Jacobians until their compilers are done."""
+    require("simd")
+    monkeypatch.setattr(build, "MIN_LONG_OPERATIONS", 0)
+    found = []
+    for wait in ("", "1"):
+        monkeypatch.setenv("SYMPHYS_WAIT", wait)
+        monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path / f"kernels{wait}"))
+        problem = transcribe(symphys.load("cart_pole"), threads=1).shooting
+        found.append([(row.objective, row.step) for row in solve(problem, iterations=6).trace])
+    np.testing.assert_array_equal(*found)

@@ -114,6 +114,7 @@ class Widths:
         def done(path: Path) -> None:
             loaded = load(path)
             with self._lock:
+                self._spent.clear()  # of an interpreter
                 self._add(self.full, loaded)
 
         def failed(why: str) -> None:

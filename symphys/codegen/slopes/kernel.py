@@ -195,11 +195,8 @@ class SlopeKernel:
         self._check("parameters", given, (1, 2), self.program.parameters.size)
         if given.ndim == 2 and len(given) != len(z):
             raise ProgramError(f"the batch sizes {len(z)} of Z and {len(given)} of parameters differ")
-        return (
-            z,
-            given,
-            np.empty((len(z), self.library.data.height, self.library.data.width if columns is None else columns)),
-        )
+        data = self.library.data
+        return z, given, np.empty((len(z), data.height, data.width if columns is None else columns))
 
     def _run(self, z: Array, given: Array, found: Array, first: int, last: int, memory: Any) -> None:
         shared = given.ndim == 1
@@ -255,6 +252,8 @@ def compile_slopes(
         with suppress(KernelUnavailable):
             codes = LinkedCodes(codes_of(planned.functions), lanes, np.float64)
             with shared_library([interpreter(lanes, False, ("slopes.c",))], cache) as built:
+                if built.note:
+                    raise KernelUnavailable(built.note)
                 library = LoadedSlopes(built.path, kept, output, lanes, codes)
             kernel = _kernel(kept, replace(built, cached=False), library, output, lanes, started, threads)
             kernel.compile(parts, kept, cache)

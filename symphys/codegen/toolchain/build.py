@@ -34,8 +34,6 @@ if TYPE_CHECKING:  # what writes C is imported where it is called: a second star
 
 MIN_LONG_OPERATIONS = 2_000
 """Operations from which a kernel takes half a second or more to compile, and begins with an interpreter."""
-BACKGROUND_NICENESS = 10
-"""Of compilers beside a solve, so that they take what it leaves."""
 MIN_ANNOUNCED_TIME = 30.0
 """[s] Estimated time of compiling from which it is announced."""
 
@@ -317,8 +315,6 @@ def compile_for(given: IO[bytes]) -> None:
     """Keep the library that a ``Background`` asks for, and print its path, or why there is none."""
     from symphys.codegen.emit.source import SourceFile
 
-    if hasattr(os, "nice"):
-        os.nice(BACKGROUND_NICENESS)
     request = json.load(given)
     parts, texts = [SourceFile(**part) for part in request["parts"]], request["texts"]
     cache = Cache(Path(request["cache"]["folder"]), request["cache"]["limit"])

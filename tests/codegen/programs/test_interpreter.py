@@ -48,6 +48,7 @@ os.kill(os.getpid(), signal.{signal})
 @pytest.fixture(autouse=True)
 def worth(monkeypatch: pytest.MonkeyPatch) -> None:
     require("simd")
+    monkeypatch.delenv("SYMPHYS_WAIT", raising=False)
     monkeypatch.setattr(build, "MIN_LONG_OPERATIONS", 0)
 
 

@@ -157,6 +157,7 @@ def test_the_interpreter_gives_the_same_bits(
 ) -> None:
     program = pushes(guarded)
     whole = compiled(program, "out", cache)
+    monkeypatch.delenv("SYMPHYS_WAIT", raising=False)
     monkeypatch.setattr(build, "MIN_LONG_OPERATIONS", 0)
     monkeypatch.setattr(kernel, "Background", Later)
     interpreted = compile_slopes(program, "out", Cache(tmp_path / "kernels"), threads=1, wait=False)
