@@ -36,8 +36,3 @@ fill:
   NEXT;
 CASES
 }
-
-/* The numbers of functions become the addresses of their codes. */
-API void link_calls(word *entries, word count, const word *addresses) {
-  for (word i = 0; i < count; i++, entries += entries[1]) entries[0] = addresses[entries[0]];
-}

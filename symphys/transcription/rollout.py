@@ -264,12 +264,18 @@ class Rollout:
 
         return self.remembering(self._kept("report", make))
 
+    @property
+    def _shares(self) -> bool:
+        """Whether problems of a sweep share the built functions."""
+        return bool(self.problem.varied) and not self.problem.free_duration and not self.world.scheduled
+
     def built(self, make: Callable[..., T], *more: Hashable) -> T:
-        """Build a function of the world, once for all programs of this rollout and of others with equal worlds."""
+        """Build a function of the world, once for all programs of this rollout and of sweeps with equal worlds."""
         key = (make, more)
         if key not in self._built:
             scheme = self.parameters.scheme(self.problem.simulation)
-            self._built[key] = kept(make, self.world, scheme, self.inputs, self.parameters.symbols, *more)
+            arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
+            self._built[key] = kept(make, *arguments, *more) if self._shares else make(*arguments, *more)
         found: T = self._built[key]
         return found
 

@@ -22,7 +22,7 @@ Key = tuple[object, ...]
 
 @dataclass
 class FunctionGraphs:
-    """What is made of one casadi Function for all plans that it is part of.
+    """The graphs of a casadi Function and of its adjoints, which all plans share.
 
     Attributes:
         forward: its own graph.
@@ -34,7 +34,7 @@ class FunctionGraphs:
 
     @cached_property
     def key(self) -> Key:
-        """Return what equal functions share."""
+        """Equal for equal functions."""
         return self.forward.key()
 
     @cached_property

@@ -23,7 +23,7 @@ def _reciprocal(x: float) -> float | None:
 
 def ordered(op: str, operands: tuple[int, ...]) -> tuple[int, ...]:
     """Return the operands as equal values have them, whichever way round they were written."""
-    return operands[::-1] if op in COMMUTE and operands[0] > operands[1] else operands
+    return tuple(sorted(operands)) if op in COMMUTE else operands
 
 
 class Node(NamedTuple):
@@ -118,15 +118,11 @@ class Graph:
 
     def needed(self) -> list[int]:
         """Return the nodes that results are made from, in order."""
-        nodes, wanted = self.nodes, bytearray(len(self.nodes))
-        for result in self.results:
-            for x in result:
-                wanted[x] = 1
-        for x in range(len(nodes) - 1, -1, -1):
-            if wanted[x]:
-                for y in nodes[x].operands:
-                    wanted[y] = 1
-        return [x for x, on in enumerate(wanted) if on]
+        wanted = {x for result in self.results for x in result}
+        for x in range(len(self.nodes) - 1, -1, -1):
+            if x in wanted:
+                wanted.update(self.nodes[x].operands)
+        return sorted(wanted)
 
     def origins(self) -> list[int]:
         """Return for each node the arguments that it depends on, as bits."""

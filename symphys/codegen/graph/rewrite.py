@@ -16,11 +16,11 @@ Change = Callable[[Graph, int, Node], int]
 def rewritten(graph: Graph, into: Graph, change: Change) -> dict[int, int]:
     """Copy the needed nodes into another graph, each as ``change`` wants it; returns their new numbers."""
     numbers: dict[int, int] = {}
-    nodes = graph.nodes
     for x in graph.needed():
-        op, before, at, value = nodes[x]
-        operands = ordered(op, tuple([numbers[y] for y in before]))
-        numbers[x] = change(into, x, Node(op, operands, at, value))
+        node = graph.nodes[x]
+        operands = ordered(node.op, tuple(numbers[y] for y in node.operands))
+        moved = Node(node.op, operands, node.at, node.value)
+        numbers[x] = change(into, x, moved)
     return numbers
 
 

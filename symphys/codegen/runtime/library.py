@@ -92,16 +92,11 @@ class LinkedCodes:
     def linked(self, entries: Ints) -> Ints:
         """Return entries of calls one after the other with addresses in place of the numbers of functions."""
         found, at = entries.copy(), 0
-        while at < len(found):
+        while at + 1 < len(found):  # a table of no entries has one word
             if found[at] >= 0:
                 found[at] = self._addresses[found[at]]
             at += int(found[at + 1])
         return found
-
-    @property
-    def pointer(self) -> Any:
-        """Return the pointer to the address of each function."""
-        return self._addresses.ctypes.data_as(ctypes.c_void_p)
 
 
 def loaded(path: Path) -> ctypes.CDLL:
@@ -134,8 +129,7 @@ class Loaded:
         for name in TABLES:
             count, words = plan.tables[name]
             if codes is not None:
-                words = words.copy()
-                library.link_calls(words.ctypes.data_as(ctypes.c_void_p), WORD(count), codes.pointer)
+                words = codes.linked(words)
             setattr(self.data, name, self._list(count, words))
         self._kept.append(codes)
         self.data.written = self._list(len(plan.written), np.append(plan.written, 0))

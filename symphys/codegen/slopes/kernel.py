@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import logging
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -160,7 +161,7 @@ class SlopeKernel:
             self.library = LoadedSlopes(path, kept, self.output, self.report.lanes)
 
         def failed(why: str) -> None:
-            self.report = replace(self.report, note=f"an interpreter evaluates slopes, which is slower: {why}")
+            logging.getLogger("symphys").warning("an interpreter evaluates Jacobians, which is slower: %s", why)
 
         self._compiling = Background(parts, kept.texts, cache, done, failed)
 

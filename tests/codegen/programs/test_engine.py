@@ -10,7 +10,6 @@ from symphys.codegen import (
     Cache,
     FunctionCall,
     Kernel,
-    KernelUnavailable,
     MemoryLayout,
     Program,
     compile_program,
@@ -46,10 +45,7 @@ def throw(cache: Cache) -> Kernel:
         epilogue=(FunctionCall(end, (states.later(STEPS),), (last,)),),
         outputs={"state": last},
     )
-    try:
-        return compile_program(program, cache=cache)
-    except KernelUnavailable as error:
-        pytest.skip(str(error))
+    return compile_program(program, cache=cache)
 
 
 @pytest.mark.slow
