@@ -23,9 +23,9 @@ test-quick: $(VENV)/.testing  ## run the tests that tell most in a minute: the h
 	$(BIN)/pytest -n auto --dist loadfile $(QUICK) $(ARGS)
 
 test-rest: $(VENV)/.developing  ## run what test leaves out: whole solves, pages of the documents, laws once more
-	$(BIN)/pytest -n auto --dist worksteal -m "slow and not thorough" $(ARGS)
+	$(BIN)/pytest -n auto --dist worksteal -m "slow and not thorough" --ignore=tests/pipelines $(ARGS)
 
-test-all: $(VENV)/.developing test test-rest  ## run all tests but those of thorough
+test-all: $(VENV)/.developing test test-rest  ## run all tests but those of thorough and test-pipelines
 
 test-loaded: $(VENV)/.testing  ## run the tests beside four busy loops, which end with them, and with a random PYTHONHASHSEED
 	@for loop in 1 2 3 4; do (while kill -0 $$$$; do :; done) > /dev/null 2>&1 & done; \

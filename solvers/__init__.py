@@ -9,23 +9,28 @@ from __future__ import annotations
 if __name__ != "symphys.solvers":
     raise ImportError(f"this package installs as symphys.solvers: import that, not {__name__!r}")
 
+from collections.abc import Iterator, MutableMapping
 from difflib import get_close_matches
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from symphys.errors import SymphysError
+from symphys.later import later
 from symphys.solvers.core.checkpoint import OUTCOME, plain_outcome, revived_outcome
 from symphys.solvers.core.interface import Solver
 from symphys.solvers.core.multi_start import solve_multi_start
 from symphys.solvers.core.options import recorded_options
 from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageResult, Status, TraceRow
-from symphys.solvers.methods.cma_es import CMA, CmaOptions
-from symphys.solvers.methods.evolution import EVOLUTION, EvolutionOptions
-from symphys.solvers.methods.gradient import GRADIENT, GradientOptions
-from symphys.solvers.methods.ilqr import ILQR, IlqrOptions
-from symphys.solvers.methods.ipopt import IPOPT, IpoptOptions
-from symphys.solvers.methods.least_squares import LEAST_SQUARES, LeastSquaresOptions
-from symphys.solvers.methods.multiple_shooting import MULTIPLE_SHOOTING, MultipleShootingOptions
-from symphys.solvers.methods.stochastic import STOCHASTIC, StochasticOptions
+
+if TYPE_CHECKING:
+    from symphys.solvers.methods.cma_es import CmaOptions
+    from symphys.solvers.methods.evolution import EvolutionOptions
+    from symphys.solvers.methods.gradient import GradientOptions
+    from symphys.solvers.methods.ilqr import IlqrOptions
+    from symphys.solvers.methods.ipopt import IpoptOptions
+    from symphys.solvers.methods.least_squares import LeastSquaresOptions
+    from symphys.solvers.methods.multiple_shooting import MultipleShootingOptions
+    from symphys.solvers.methods.stochastic import StochasticOptions
 
 __all__ = [
     "OUTCOME",
@@ -53,9 +58,57 @@ __all__ = [
     "solver",
 ]
 
-SOLVERS: dict[str, Solver[Any]] = {
-    each.name: each for each in (GRADIENT, LEAST_SQUARES, IPOPT, ILQR, MULTIPLE_SHOOTING, CMA, STOCHASTIC, EVOLUTION)
+
+class Catalogue(MutableMapping[str, Solver[Any]]):
+    """Solvers by name. The module of each is imported when it is first asked for."""
+
+    def __init__(self, modules: dict[str, str]) -> None:
+        """Begin with the names of modules in ``methods``, which have the solver under its name in capitals."""
+        self._found: dict[str, Solver[Any] | str] = dict(modules)
+
+    def __getitem__(self, name: str) -> Solver[Any]:
+        """Return the solver called ``name``."""
+        found = self._found[name]
+        if isinstance(found, str):
+            found = self._found[name] = getattr(import_module(f"{__name__}.methods.{found}"), name.upper())
+        return found
+
+    def __setitem__(self, name: str, solver: Solver[Any]) -> None:
+        """Add a solver."""
+        self._found[name] = solver
+
+    def __delitem__(self, name: str) -> None:
+        """Remove a solver."""
+        del self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over names."""
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        """Return the number of solvers."""
+        return len(self._found)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a solver called ``name``; its module is not imported."""
+        return name in self._found
+
+
+MODULES = {
+    "gradient": "gradient",
+    "least_squares": "least_squares",
+    "ipopt": "ipopt",
+    "ilqr": "ilqr",
+    "multiple_shooting": "multiple_shooting",
+    "cma": "cma_es",
+    "stochastic": "stochastic",
+    "evolution": "evolution",
 }
+"""The module of each solver in ``methods``."""
+SOLVERS = Catalogue(MODULES)
+"""All solvers by name."""
+OPTIONS = {f"methods.{home}": (f"{name.title().replace('_', '')}Options",) for name, home in MODULES.items()}
+__getattr__ = later(__name__, OPTIONS)
 solve_together = solve_multi_start
 """Deprecated: the old name of ``solve_multi_start``."""
 

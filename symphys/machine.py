@@ -6,7 +6,6 @@ import importlib.metadata
 import platform
 import tempfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,6 +26,7 @@ from symphys.codegen import (
 )
 from symphys.codegen.cuda import compile_on, find_gpu
 from symphys.codegen.toolchain.compiler import find_compiler, processor, processors
+from symphys.records import dataclass
 
 PACKAGES = ("casadi", "click", "cma", "matplotlib", "numpy", "pydantic", "rich", "scipy")
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "spral")

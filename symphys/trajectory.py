@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cache, cached_property
 from typing import Annotated, get_type_hints
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.types import Array
 

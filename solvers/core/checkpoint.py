@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import astuple, dataclass, fields, is_dataclass
+from dataclasses import astuple, fields, is_dataclass
 from enum import Enum
 from functools import partial
 from typing import Any, TypeVar
@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from symphys.errors import SymphysError
+from symphys.records import dataclass
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.outcome import Counts, Outcome, StageResult, Status, TraceRow
 from symphys.solvers.core.point import Point

@@ -10,10 +10,9 @@ all there is. Refused points were evaluated and count as work.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point

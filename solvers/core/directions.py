@@ -11,10 +11,11 @@ spectral   d = -a g,  a = s.y / y.y, from the last step s and the change y of th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.types import Array
 
 ADAM_FLOOR = 1e-8

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, astuple, dataclass, replace
+from dataclasses import asdict, astuple, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import Checkpoint, from_plain, to_plain
 from symphys.solvers.core.continuation import Rate, exact_best, stage_result

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import Evaluator, ScenarioEvaluator, ScenarioSamples, ShootingProblem, Values
 from symphys.solvers.core.outcome import Counts
 from symphys.solvers.core.point import Incumbent, Point

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Generic, Protocol, TypeVar
 
+from symphys.records import dataclass
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StopReason

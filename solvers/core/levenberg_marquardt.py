@@ -13,10 +13,11 @@ algorithm 3.16).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from typing import Any, Generic, Protocol, Self, TypeVar
 
+from symphys.records import dataclass
 from symphys.types import Array, Bools
 
 MIN_DAMPING_FACTOR = 1 / 3

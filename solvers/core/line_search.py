@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.point import Point
 from symphys.types import Array

@@ -10,12 +10,13 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from symphys.errors import SymphysError
+from symphys.records import dataclass
 from symphys.shooting import Evaluator, ShootingProblem, Values
 from symphys.solvers.core.interface import Solver
 from symphys.solvers.core.outcome import Monitor, Outcome

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from difflib import get_close_matches
 from typing import Any, ClassVar
 
 from symphys.errors import SymphysError
+from symphys.records import dataclass
 from symphys.solvers.core.outcome import Status, StopReason, TraceRow
 
 TIME_USED_UP = "the time is used up: raise `max_seconds`"

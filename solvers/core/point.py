@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.types import Array
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.records import dataclass
 from symphys.shooting import CompiledRecursion, Expansion, Linearized
 from symphys.solvers.ddp.box_qp import solve_box_qp
 from symphys.solvers.ddp.knots import KnotSteps

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import StagedProblem
 from symphys.types import Array, Ints
 

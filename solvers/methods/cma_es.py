@@ -21,7 +21,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from typing import Any, Protocol
 
@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
+from symphys.records import dataclass
 from symphys.shooting import ScenarioSamples
 from symphys.solvers.core.checkpoint import damaged
 from symphys.solvers.core.convergence import PLATEAU_ADVICE, converged, not_finite

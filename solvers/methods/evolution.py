@@ -7,10 +7,10 @@ needs no derivatives, and its values include what derivatives do not: that a mot
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import ScenarioSamples
 from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.options import require

@@ -9,11 +9,11 @@ A step onto a plateau is refused and shortened, see ``core.convergence``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.convergence import (
     MAX_SHORTENINGS,

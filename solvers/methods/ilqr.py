@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import tee
 from typing import Any
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import Linearized, ShootingProblem, StagedMotion, StagedProblem
 from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.convergence import Progress, converged, not_finite, stationary
@@ -21,7 +22,6 @@ from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Counts, Status, StopReason
 from symphys.solvers.core.point import Point
 from symphys.solvers.ddp.backward_pass import Policy
-from symphys.solvers.ddp.box_qp import lapack
 from symphys.solvers.ddp.forward_pass import MotionBatch
 from symphys.solvers.ddp.gains import gains_about
 from symphys.solvers.ddp.iteration import STEP_LENGTHS, BestMotion, LocalExpansion
@@ -259,7 +259,6 @@ ILQR = make_solver(
     IlqrOptions,
     stage_of(Ilqr),
     refusal=refusal,
-    prepare=lapack,
     constraints=True,
     feedback=gains_about,
 )

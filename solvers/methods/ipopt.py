@@ -20,7 +20,7 @@ import io
 import math
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -28,6 +28,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.errors import SymphysError
+from symphys.records import dataclass
 from symphys.shooting import Nlp
 from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.convergence import converged, not_finite

@@ -10,12 +10,12 @@ targets, and its trust region cannot be set when a solve goes on, so an interrup
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.convergence import MAX_SHORTENINGS, Progress, ends_on_plateau, not_finite, stationary
@@ -210,24 +210,15 @@ class DenseModel(LocalModel[Array, Point | StopReason]):
         return point
 
 
-@cache
-def library() -> Any:
-    """Import and return scipy's linear algebra, which other solvers do not need."""
-    from scipy import linalg
-
-    return linalg
-
-
 def damped_step(jacobian: Array, r: Array, damping: float) -> Array:
     """Return (n,) -(J'J + lambda I)^-1 J'r, or -J'(JJ' + lambda I)^-1 r: whichever matrix is smaller."""
     tall = jacobian.shape[0] >= jacobian.shape[1]
     square = jacobian.T @ jacobian if tall else jacobian @ jacobian.T
     floor = 4 * len(square) * float(np.finfo(float).eps) * float(np.trace(square))
-    linear = library()
-    factor = linear.cho_factor(square + max(damping, floor) * np.eye(len(square)))
+    damped = square + max(damping, floor) * np.eye(len(square))
     if tall:
-        return np.asarray(-linear.cho_solve(factor, jacobian.T @ r))
-    return np.asarray(-jacobian.T @ linear.cho_solve(factor, r))
+        return np.asarray(-np.linalg.solve(damped, jacobian.T @ r))
+    return np.asarray(-jacobian.T @ np.linalg.solve(damped, r))
 
 
 def cosine(evaluator: CountingEvaluator, state: LeastSquaresState) -> float:
@@ -250,6 +241,5 @@ LEAST_SQUARES = make_solver(
     LeastSquaresOptions,
     stage_of(LevenbergMarquardt),
     refusal=refusal,
-    prepare=library,
     threaded=True,
 )

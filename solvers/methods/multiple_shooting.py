@@ -12,13 +12,14 @@ of the trace has.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
 from symphys.errors import SymphysError
+from symphys.records import dataclass
 from symphys.shooting import ShootingProblem, StagedProblem
 from symphys.solvers.core.checkpoint import damaged, revive
 from symphys.solvers.core.convergence import converged, not_finite

@@ -12,10 +12,11 @@ time before. Validation rates that they end early, through the cost of [terminat
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import ScenarioSamples
 from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.options import at_least, require

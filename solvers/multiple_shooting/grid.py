@@ -8,11 +8,11 @@ tangent of its node (none at node 0), the knots of its inputs, and the static en
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import StagedProblem
 from symphys.types import Array, Ints
 

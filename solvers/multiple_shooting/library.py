@@ -11,13 +11,13 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.solvers.multiple_shooting.nlp import MultipleShootingNlp
 from symphys.types import Array
 

@@ -7,12 +7,13 @@ each, that are scattered into fixed sparsity patterns, column by column as casad
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import casadi as ca
 import numpy as np
 
 from symphys.errors import SymphysError
+from symphys.records import dataclass
 from symphys.shooting import StagedMotion, StagedProblem
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.outcome import Counts

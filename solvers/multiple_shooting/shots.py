@@ -11,11 +11,11 @@ rotations are left out, since these get new references.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import Expansion, Linearized, StagedMotion, StagedProblem
 from symphys.shooting.staged_problem import Sparse
 from symphys.solvers.multiple_shooting.chart import pulled, transported

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import ScenarioSamples, Values
 from symphys.types import Array
 

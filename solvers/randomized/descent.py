@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import ScenarioSamples, ShootingProblem
 from symphys.solvers.core.checkpoint import revive
 from symphys.solvers.core.directions import DirectionMemory, MomentumWeights, adam

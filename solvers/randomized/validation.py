@@ -6,10 +6,10 @@ The validation samples are drawn once, so that all points are compared in the sa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting import Values
 from symphys.solvers.core.continuation import Rate
 from symphys.solvers.core.evaluator import CountingEvaluator

@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -25,6 +24,7 @@ from symphys.findings.numerics import GRADIENT, GRID, reach
 from symphys.findings.physics import sliding
 from symphys.problem import Problem, require_solvable
 from symphys.problem.problem import Source, load
+from symphys.records import dataclass
 from symphys.runs import check_tables
 from symphys.transcription import Assessment
 from symphys.verification import examine

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from symphys.codegen.backends.precision import warn
 from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.problem.problem import Source, load
+from symphys.records import dataclass
 from symphys.shooting import Evaluator, Linearized, Values
 from symphys.trajectory import Trajectory
 from symphys.transcription import Transcription

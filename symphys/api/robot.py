@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from html import escape
 from math import inf
 from pathlib import Path
@@ -15,6 +14,7 @@ from symphys.importing.robot import Imported, read_robot
 from symphys.importing.writing import HEADINGS, described, robot_text, sentence
 from symphys.problem import Problem, problem_of_tables
 from symphys.problem.robot_alone import lowest, stands
+from symphys.records import dataclass
 
 
 @dataclass(frozen=True, eq=False)

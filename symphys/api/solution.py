@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from symphys.api import views
 from symphys.errors import SymphysError
 from symphys.problem import Problem, load_problem
+from symphys.records import dataclass
 from symphys.results.config import read_config
 from symphys.results.discovery import is_run
 from symphys.results.file_names import CONFIG, GAINS, PROBLEM, TRAJECTORY

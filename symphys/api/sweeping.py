@@ -7,7 +7,7 @@ import shutil
 import weakref
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -22,6 +22,7 @@ from symphys.problem import Problem
 from symphys.problem.problem import Source, load, plain
 from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.reading import read_sweep
+from symphys.records import dataclass
 from symphys.results.run import read_run
 from symphys.runs import Job, make_jobs
 from symphys.runs.execute import Transcribe

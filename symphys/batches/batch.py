@@ -10,7 +10,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 from symphys import files
@@ -20,6 +20,7 @@ from symphys.batches.pool import NoWorkers, Pool
 from symphys.batches.queue import Queue
 from symphys.batches.worker import REPORT_INTERVAL
 from symphys.interrupts import Interrupts
+from symphys.records import dataclass
 from symphys.results.result import Result
 from symphys.runs.claim import FolderBusy, claimed, owner
 from symphys.runs.execute import Transcribe, TranscriptionCache, execute, with_claim

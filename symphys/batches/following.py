@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 from symphys import files
@@ -18,6 +18,7 @@ from symphys.batches.engines.driver import NOTE, OVER, RESUMED, Board, DriverTas
 from symphys.batches.ledger import Ledger, Observer
 from symphys.batches.limits import UNLIMITED, BatchLimits, Halt
 from symphys.interrupts import Interrupts
+from symphys.records import dataclass
 from symphys.results.file_names import RESULT
 from symphys.results.result import Result, read_result
 from symphys.runs.claim import holder, is_over

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 from symphys import files
+from symphys.records import dataclass
 from symphys.results.file_names import RESULT
 from symphys.results.result import Result
 from symphys.results.table import write_table

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from time import monotonic
 
 from symphys.interrupts import Stop
+from symphys.records import dataclass
 
 
 @dataclass(frozen=True)

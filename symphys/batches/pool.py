@@ -14,7 +14,7 @@ import subprocess
 import time
 from collections import Counter
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import field
 from multiprocessing import connection
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
@@ -26,6 +26,7 @@ from symphys.batches.limits import BatchLimits, Halt, timed_out
 from symphys.batches.queue import Queue
 from symphys.batches.worker import REPORT_INTERVAL, Begun, Ended, News, Order, Ready, Stopping, serve
 from symphys.interrupts import ignoring_interrupts
+from symphys.records import dataclass
 from symphys.results.result import Result
 from symphys.runs.execute import Transcribe, give_up, stop_at_limit
 from symphys.runs.job import Job

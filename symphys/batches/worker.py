@@ -6,9 +6,10 @@ import multiprocessing
 import os
 import threading
 import time
-from dataclasses import dataclass, field
+from dataclasses import field
 from multiprocessing.connection import Connection
 
+from symphys.records import dataclass
 from symphys.results.result import Result
 from symphys.runs.claim import FolderBusy
 from symphys.runs.execute import Transcribe, TranscriptionCache, execute

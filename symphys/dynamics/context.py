@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import casadi as ca
 
@@ -11,6 +10,7 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.state_layout import input_columns
 from symphys.model.world import Pair, Scheme, World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MIN_KICK_SHARE = 1 / 8

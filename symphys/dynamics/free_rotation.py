@@ -11,12 +11,12 @@ rotations are composed to fourth order (Yoshida, Construction of higher order sy
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from symphys.maths import rotation
+from symphys.records import dataclass
 from symphys.types import Expr
 
 OUTER = 1 / (2 - 2 ** (1 / 3))

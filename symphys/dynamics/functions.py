@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from itertools import combinations
 from typing import Any
 
@@ -24,6 +24,7 @@ from symphys.maths.verbatim import verbatim
 from symphys.model.scalar import is_zero
 from symphys.model.state_layout import Layout
 from symphys.model.world import Pair, Scheme, World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MAX_REDUCED_INSTRUCTIONS = 105_000

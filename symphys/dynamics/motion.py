@@ -6,7 +6,7 @@ step reads as leapfrog; see docs/time_step.md, "2. Predicted motion".
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 import casadi as ca
 
@@ -15,6 +15,7 @@ from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.maths.rotation import turn
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MAX_TURN = 4.0

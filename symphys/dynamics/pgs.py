@@ -14,7 +14,7 @@ way. Deviation: plain sweeps in between, which project and go round less.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise, takewhile
 
 import casadi as ca
@@ -41,6 +41,7 @@ from symphys.dynamics.unknowns import (
     VelocityConstraint,
 )
 from symphys.model.world import UNEQUAL, World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 SWEEPS_PER_EXTRAPOLATION = 4

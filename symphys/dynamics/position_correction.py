@@ -6,7 +6,7 @@ Angles of joints that count whole turns follow from these displacements.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -35,6 +35,7 @@ from symphys.dynamics.unknowns import (
 )
 from symphys.maths.smoothing import either
 from symphys.model.joints import kinematic_trees
+from symphys.records import dataclass
 from symphys.types import Expr
 
 CENTRE_SCHEDULE = 0, 0

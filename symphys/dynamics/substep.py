@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -44,6 +44,7 @@ from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Plane, Terrain
 from symphys.model.state_layout import BODY_FIELDS
 from symphys.model.world import Pair, World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MAX_DETERMINED_POINTS = 3

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import casadi as ca
 
 from symphys.maths.smoothing import ramp
+from symphys.records import dataclass
 from symphys.types import Expr
 
 COMPLIANCE = 1e-6

@@ -33,7 +33,7 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import inf
 from types import MappingProxyType
 from typing import Any
@@ -55,6 +55,7 @@ from symphys.model.shapes import Terrain
 from symphys.model.world import World
 from symphys.problem import Problem
 from symphys.problem.model import Sensor
+from symphys.records import dataclass
 from symphys.types import Array
 
 NUMBERS = r"(\[[^\[\]]*\])"

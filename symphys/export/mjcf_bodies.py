@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +19,7 @@ from symphys.model.joints.start import moved_to_zero
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import World
 from symphys.problem.world_tables import placed_joint, whole_state
+from symphys.records import dataclass
 from symphys.types import Array
 
 MAX_JOINT_GAP = 1e-5

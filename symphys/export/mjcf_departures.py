@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 from symphys.export.folder import ExportError
@@ -14,6 +13,7 @@ from symphys.model.heightfield import Heightfield
 from symphys.model.joints import Servo, VelocityMotor
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Terrain
+from symphys.records import dataclass
 
 MAX_LISTED = 5
 """Largest number of names in a message."""

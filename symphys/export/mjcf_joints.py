@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from math import pi
 from xml.etree.ElementTree import Element
 
@@ -17,6 +16,7 @@ from symphys.model.joints import Joint, Link
 from symphys.model.joints.coupling import JointCoupling
 from symphys.model.scalar import is_zero
 from symphys.model.world import World
+from symphys.records import dataclass
 from symphys.types import Array
 
 UNBOUNDED = 1e10

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from math import pi
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -15,6 +14,7 @@ from symphys.export.mjcf_bodies import StartState
 from symphys.model.heightfield import GRID_REFINEMENT, Heightfield, off_triangles
 from symphys.model.shapes import Capsule, Convex, Plane, Shape, Terrain, surface
 from symphys.model.world import Law, Side, World, side_name
+from symphys.records import dataclass
 from symphys.types import Array
 
 MJCF_PLACEMENT = {"centre": "pos", "orientation": "quat"}

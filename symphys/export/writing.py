@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from symphys.export.casadi_files import casadi_files
@@ -13,6 +12,7 @@ from symphys.export.mjcf_trial import tried_model
 from symphys.export.sources import c_files
 from symphys.problem import Problem, require_solvable
 from symphys.problem.problem import Source, load
+from symphys.records import dataclass
 from symphys.transcription.network_rollout import require_small_nets
 from symphys.transcription.transcribe import transcribe_whole
 from symphys.version import __version__

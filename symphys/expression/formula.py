@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import casadi as ca
 
 from symphys.expression.columns import FormulaError, UnfitError, column
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.types import Expr
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import reduce
 from math import pi
 
@@ -11,6 +10,7 @@ import casadi as ca
 
 from symphys.expression.columns import UnfitError, length, require_fit, require_length, require_same
 from symphys.maths import angles, rotation
+from symphys.records import dataclass
 from symphys.types import Expr
 
 CONSTANTS = {"pi": pi}

@@ -6,12 +6,13 @@ The fields are the keys that ``symphys.verification`` writes; ``nan`` is a numbe
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from typing import Self
 
 import numpy as np
 
 from symphys.json_values import Text, name, record
+from symphys.records import dataclass
 from symphys.types import Array
 
 

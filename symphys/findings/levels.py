@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from symphys.records import dataclass
 
 GOOD, FAIR, BAD, UNKNOWN = "good", "fair", "bad", "unknown"
 MARKS = {GOOD: "good", FAIR: "look closer", BAD: "do not rely on it", UNKNOWN: "not judged"}

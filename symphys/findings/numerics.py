@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from symphys.findings.examination import Examination, GradientCheck, Growth, Refined, Smoothed
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded, relative_change, worst_of
 from symphys.findings.writing import listed, percent, show
+from symphys.records import dataclass
 
 GRADIENT, GRID, GROWTH, SMOOTHING = "gradient", "grid", "growth", "smoothing"
 INFLUENCE = "influence"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from symphys.findings.advice import findings
 from symphys.findings.examination import Examination
 from symphys.findings.levels import FAIR, GOOD, Judged
 from symphys.findings.numerics import GROWTH, refined_finding
+from symphys.records import dataclass
 
 SOLVED = "solved"
 """Everything is met, or the point is stationary where there is nothing to meet; nothing speaks against it."""

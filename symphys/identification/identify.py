@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from symphys.identification.inference.residual_study import (
 )
 from symphys.identification.inference.uncertainty import Uncertainty
 from symphys.identification.interface import IdentificationError, RecordedResiduals
+from symphys.records import dataclass
 from symphys.results.identification import HISTORY, GlobalSearch, Identification, ParameterEstimate, QuantityResiduals
 from symphys.suggest import hint
 from symphys.types import Array, Ints

@@ -7,12 +7,13 @@ Jacobian of all residuals then is an arrow: a recording's residuals depend on th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol
 
 import numpy as np
 
 from symphys.errors import SymphysError
+from symphys.records import dataclass
 from symphys.types import Array, Bools, Ints
 
 Rows = list[tuple[Array, Array, Array]]

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,7 @@ from symphys.importing.tables.pose import begin, keyframe, lift, reference_pose
 from symphys.importing.tables.reading import ModelReading, numbers
 from symphys.importing.tables.sensors import read_sensors, read_sites
 from symphys.importing.tables.shapes import read_shapes, read_statics
+from symphys.records import dataclass
 
 DEFAULT_OPTIONS = ImportOptions()
 COMPILE_TIMEOUT = 120.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import inf
 from typing import Any, TypedDict, Unpack
 
@@ -15,6 +15,7 @@ from symphys.model.orientation import unit_quaternion
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import SOLID_SPHERE, UPRIGHT, Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
 from symphys.model.shapes.inertia import centring, inertia_of, off_centre, specific
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 
 HOLLOW_SPHERE = 2 / 3

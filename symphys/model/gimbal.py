@@ -8,10 +8,10 @@ more make a tree of chains, from one body with mass to each other: singular wher
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.types import Array
 
 SINGULAR = 1e-5

@@ -12,13 +12,13 @@ slopes where no twist does it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
 import casadi as ca
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.types import Array, Expr
 
 MAX_SLOPE_RATIO = 3.0

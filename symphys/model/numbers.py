@@ -7,10 +7,12 @@ Tables of problem files, bounds and scales of variables, the numbers that a phas
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from math import inf
 from types import MappingProxyType
 from typing import Any, Literal
+
+from symphys.records import dataclass
 
 TURNING: Mapping[str, str] = MappingProxyType({"torque": "N m", "angle": "rad", "inertia": "kg m^2"})
 SLIDING: Mapping[str, str] = MappingProxyType({"torque": "N", "angle": "m", "inertia": "kg"})

@@ -8,7 +8,7 @@ SI units; vectors are in world coordinates unless a field says "body frame".
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from math import prod
 from operator import itemgetter
 from types import MappingProxyType
@@ -26,6 +26,7 @@ from symphys.model.joints.specs import JointSpec
 from symphys.model.numbers import declare, table_key
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Static, Surface, contact_points, surface
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.types import Array
 

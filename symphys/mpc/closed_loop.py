@@ -9,7 +9,6 @@ from __future__ import annotations
 import gc
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, process_time
 
@@ -24,6 +23,7 @@ from symphys.mpc.controller import Controller
 from symphys.mpc.planner import RecedingPlan
 from symphys.mpc.plant import Plant
 from symphys.problem import PlantSettings, Target
+from symphys.records import dataclass
 from symphys.results.closed_loop import ClosedLoopRecord, TargetRecord
 from symphys.results.file_names import PROBLEM, SCENE, TRAJECTORY
 from symphys.results.scene_of_problem import make_scene

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from symphys.codegen import processors
 from symphys.errors import Issue, ProblemError, SymphysError
 from symphys.mpc.model import horizon_of, receding_model
 from symphys.problem import Problem
+from symphys.records import dataclass
 from symphys.shooting import AffinePolicy, StagedMotion
 from symphys.solvers.ddp.forward_pass import MotionBatch, follow_policy
 from symphys.solvers.ddp.iteration import LocalExpansion

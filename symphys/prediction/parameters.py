@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from symphys.identification import FitParameters
 from symphys.problem import Problem, Variable
 from symphys.problem.quantities import formula_units
+from symphys.records import dataclass
 from symphys.types import Array, Ints
 
 JOINT_FRICTION = "dry_friction"

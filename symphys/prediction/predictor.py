@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +14,7 @@ from symphys.model.joints.joint import UNWRAPPED
 from symphys.prediction.parameters import number_blocks
 from symphys.prediction.rotations import turned
 from symphys.problem import Problem, RecordedInput, Recording, Variable, VariableSlot
+from symphys.records import dataclass
 from symphys.trajectory import Trajectory
 from symphys.transcription.quantity_slopes import QuantitySlopes
 from symphys.transcription.rollout import symbolic_rollout

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 
 import casadi as ca
@@ -13,6 +12,7 @@ from symphys.dynamics.observation import joint_turn
 from symphys.maths import rotation
 from symphys.model.joints import Joint, Link, kinematic_trees
 from symphys.model.world import World
+from symphys.records import dataclass
 from symphys.types import Array
 
 ORIENTATION = "orientation"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import hypot
 from pathlib import Path
 from typing import Any, TypeVar, get_origin
@@ -25,6 +25,7 @@ from symphys.problem.schema.joints import JointTable, SiteTable
 from symphys.problem.schema.physics import BlockTable, BodyTable, PlaneTable, TerrainTable
 from symphys.problem.tables.bodies import read_orientation
 from symphys.problems import parts
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 
 LABELLED = ("cost", "target", "constraint", "scenario")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from itertools import chain
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
@@ -20,6 +20,7 @@ from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.recordings.files import without_places
 from symphys.problem.recordings.types import IdentifySettings, RecordedFile, Recording
 from symphys.problem.references import ReferenceTrajectory
+from symphys.records import dataclass
 from symphys.types import Array
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from symphys.problem.model import NOTHING, ProblemData
 from symphys.problem.reader import read_problem
 from symphys.problem.reading.source import parse_toml, read_source
 from symphys.problem.world_tables import world_tables
+from symphys.records import dataclass
 
 SET = "set"
 """The table of a problem file that holds settings."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
 from math import inf
 
 import numpy as np
@@ -21,6 +20,7 @@ from symphys.problem.parametric.joints import OWN
 from symphys.problem.parametric.parts import COEFFICIENTS, INERTIAL
 from symphys.problem.parametric.world import CONTACT, ParametricWorld
 from symphys.problem.references import DELAY, ReferenceTrajectory
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.types import Array
 

@@ -6,7 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -22,6 +22,7 @@ from symphys.problem.reading.faults import Faults
 from symphys.problem.reading.source import MAX_NUMBER, TOO_LARGE, read_source
 from symphys.problem.schema import Document
 from symphys.problem.schema.checks import IDENTIFIER
+from symphys.records import dataclass
 from symphys.suggest import quote
 from symphys.types import Array, Expr
 

@@ -7,7 +7,6 @@ the parameters in which worlds have differed so far, and evaluated for every fur
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NoReturn
 
@@ -26,6 +25,7 @@ from symphys.problem.parametric.placement import begin, placing, reposition
 from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.quantities import Quantity
 from symphys.problem.reading.faults import Faults
+from symphys.records import dataclass
 from symphys.suggest import quote
 from symphys.types import Array, Expr
 

@@ -6,13 +6,14 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from pathlib import Path
 from typing import Any
 
 from symphys import files
 from symphys import json_values as values
 from symphys.json_values import Text
+from symphys.records import dataclass
 
 
 @dataclass(frozen=True)

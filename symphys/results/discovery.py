@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED
+from symphys.records import dataclass
 from symphys.results.config import settings_words
 from symphys.results.file_names import CONFIG, FIGURES, PROBLEM, RESULT
 from symphys.results.run import Run, read_run

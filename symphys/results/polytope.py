@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.records import dataclass
 from symphys.types import Array, Ints
 
 COLLINEAR = 1e-9

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Self
 
@@ -16,6 +16,7 @@ from symphys import json_values as values
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import ACCEPTED, NOT_SOLVED, Verdict, judge_run
 from symphys.json_values import Text
+from symphys.records import dataclass
 from symphys.results.trace import renamed
 from symphys.types import Array
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
 from symphys import json_values as values
 from symphys.findings.examination import Examination
 from symphys.findings.levels import Judged
+from symphys.records import dataclass
 from symphys.results.config import Config
 from symphys.results.file_names import CONFIG, PROBLEM, RESULT, TRACE
 from symphys.results.result import (

@@ -6,7 +6,7 @@ What cannot be read, or is too large to draw, is left out of the picture.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 from symphys import json_values as values
 from symphys.json_values import Text
 from symphys.model.shapes import SHAPES
+from symphys.records import dataclass
 from symphys.results.drawable import MAX_DRAWABLE, small
 from symphys.results.polytope import Polytope, make_polytope
 from symphys.results.scene_joints import SceneJoint

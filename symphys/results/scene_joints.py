@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from typing import Any
 
 import numpy as np
 
 from symphys import json_values as values
 from symphys.json_values import Text
+from symphys.records import dataclass
 from symphys.types import Array
 
 AXES = {"hinge": ((0, 0),), "slider": ((1, 0),), "universal": ((1, 1), (0, 0))}

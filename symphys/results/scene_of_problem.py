@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import casadi as ca
@@ -17,6 +17,7 @@ from symphys.model.shapes import Fixture, Plane, Scalar, Shape, Terrain
 from symphys.model.world import World
 from symphys.problem import Problem
 from symphys.problem.world_tables import floats
+from symphys.records import dataclass
 from symphys.results.scene import Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
 from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneJointFrame, SceneMotor
 from symphys.trajectory import Trajectory

@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from symphys import json_values as values
 from symphys.files import check_regular
+from symphys.records import dataclass
 from symphys.results.text_files import reason
 from symphys.types import Array
 

@@ -7,9 +7,9 @@ the measurements behind it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from symphys.problem import Constraint, Cost, Problem, Target
+from symphys.records import dataclass
 
 MAX_SMALL = 300
 """Length of z up to which a derivative-free search, or a Jacobian, is worth its evaluations."""

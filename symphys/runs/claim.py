@@ -23,12 +23,13 @@ import threading
 import time
 import uuid
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 
 from symphys import files
 from symphys import json_values as values
+from symphys.records import dataclass
 
 TOUCH_INTERVAL = 10.0
 """[s] between two touches of a claim."""

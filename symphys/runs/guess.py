@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from symphys.errors import SymphysError
 from symphys.problem import Problem, Variable, load_problem
 from symphys.problem.guess import GuessedMotion, recorded_guess
+from symphys.records import dataclass
 from symphys.results.config import read_config
 from symphys.results.discovery import is_run, run_folders
 from symphys.results.file_names import CONFIG, MULTIPLIERS, PROBLEM, TRAJECTORY

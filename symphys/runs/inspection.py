@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from symphys import files
+from symphys.records import dataclass
 from symphys.results.config import Config, read_config
 from symphys.results.file_names import CONFIG, PROBLEM, RESULT
 from symphys.results.result import Result, read_result

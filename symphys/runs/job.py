@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from symphys.codegen.backends import BEST
 from symphys.problem import Problem, require_solvable, require_solvers, validate_options
+from symphys.records import dataclass
 from symphys.results.config import Config, case_name, make_config
 from symphys.runs.choice import chosen
 from symphys.runs.folder import RunFolder

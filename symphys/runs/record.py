@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from symphys.codegen.backends import Description
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import judge_run
 from symphys.problem import Problem
+from symphys.records import dataclass
 from symphys.results.result import (
     REACHED,
     BackendRecord,

@@ -7,7 +7,6 @@ same rollout, so the two agree bit for bit where versions and processor do.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from symphys import json_values as values
 from symphys.errors import SymphysError
 from symphys.files import FileError
 from symphys.problem import Problem, load_problem
+from symphys.records import dataclass
 from symphys.results.config import Config
 from symphys.results.file_names import CONFIG, PROBLEM, RESULT, TRAJECTORY
 from symphys.results.result import Result

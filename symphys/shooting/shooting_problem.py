@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Protocol
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.shooting.staged_problem import StagedProblem
 from symphys.types import Array, Ints
 

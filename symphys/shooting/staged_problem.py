@@ -9,9 +9,9 @@ next step's sweeps begin. So a linearisation is that of the real step.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Protocol
 
+from symphys.records import dataclass
 from symphys.types import Array, Ints
 
 Sparse = Any

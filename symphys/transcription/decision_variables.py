@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -12,6 +11,7 @@ from symphys.model.joints.joint import UNWRAPPED
 from symphys.model.state_layout import initial_state, input_columns, inputs_size
 from symphys.model.world import World
 from symphys.problem import Problem, Variable, begin, carried, placing, reposition
+from symphys.records import dataclass
 from symphys.shooting import VariableBlock
 from symphys.transcription.formula_names import Parameters, spans
 from symphys.types import Expr

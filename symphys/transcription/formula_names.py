@@ -9,7 +9,7 @@ by a number, as friction is, the first step has that part of its share from the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -22,6 +22,7 @@ from symphys.model.state_layout import input_columns, input_sizes, input_symbols
 from symphys.model.world import Scheme, World
 from symphys.problem import ALIVE, DURATION, Problem, Simulation, Variable, placing
 from symphys.problem.references import reference_values
+from symphys.records import dataclass
 from symphys.transcription.sensor_memory import SensorMemory
 from symphys.types import Array, Expr
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf, isfinite, isnan, nan
 
 from symphys.problem import Problem
+from symphys.records import dataclass
 from symphys.transcription.objective import goal_error
 from symphys.types import Array
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import isfinite
 
 import casadi as ca
@@ -12,6 +11,7 @@ import numpy as np
 from symphys.expression import Formula
 from symphys.model.state_layout import Layout, input_columns
 from symphys.problem import Constraint, Cost, Output, Target
+from symphys.records import dataclass
 from symphys.transcription.recorded_parts import (
     RolloutArrays,
     formula_arguments,

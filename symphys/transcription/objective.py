@@ -7,7 +7,7 @@ rollout in their place, a kernel the places of its vector, and rollouts with lar
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -16,6 +16,7 @@ import numpy as np
 from symphys.expression import Formula, MotionPart
 from symphys.maths.smoothing import length
 from symphys.problem import Constraint, Cost, Phase, Problem, Target
+from symphys.records import dataclass
 from symphys.transcription.rollout import Rollout
 from symphys.types import Expr
 

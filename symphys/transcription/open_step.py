@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -21,6 +21,7 @@ from symphys.model.joints import AffineMotor, Joint, Servo, TorqueMotor
 from symphys.model.state_layout import GIVEN, Layout, input_columns, input_sizes, inputs_size
 from symphys.model.world import World
 from symphys.problem import ALIVE, Cost, FeedbackController, Problem, Target, Variable
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.formula_names import input_names

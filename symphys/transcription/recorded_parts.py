@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from symphys.expression import Formula, MotionPart
+from symphys.records import dataclass
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from symphys.dynamics.observation import named_sensors
 from symphys.errors import SymphysError
 from symphys.expression import Formula, FormulaError, parse
 from symphys.problem import Problem
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.transcription.formula_names import instant, namespace
 from symphys.transcription.network_rollout import require_small_nets

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -19,6 +19,7 @@ from symphys.maths.verbatim import verbatim
 from symphys.model.state_layout import Layout, input_columns, input_sizes, inputs_size
 from symphys.model.world import World
 from symphys.problem import ALIVE, FeedbackController, ForceLaw, Problem, Sensor, Termination
+from symphys.records import dataclass
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.formula_names import (
     STEP_MARGIN,

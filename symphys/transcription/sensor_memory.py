@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -13,6 +12,7 @@ from symphys.expression import Formula
 from symphys.model.state_layout import Layout, input_columns, input_sizes
 from symphys.model.world import World
 from symphys.problem import ALIVE, Constraint, Cost, Output, Problem, Target
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

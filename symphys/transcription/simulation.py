@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -12,6 +12,7 @@ import numpy as np
 from symphys.dynamics.observation import reading_function
 from symphys.model.joints import Joint
 from symphys.model.state_layout import GIVEN, Layout, input_columns
+from symphys.records import dataclass
 from symphys.trajectory import NotFinite, Trajectory
 from symphys.transcription.nan_tracing import first_non_finite
 from symphys.transcription.recorded_parts import RolloutArrays

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -13,6 +13,7 @@ import numpy as np
 
 from symphys.codegen.backends import Description
 from symphys.problem import DURATION, Problem
+from symphys.records import dataclass
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import Trajectory
 from symphys.transcription.functions import ExpressionFunctions

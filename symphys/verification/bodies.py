@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -17,6 +17,7 @@ from symphys.model.joints.joint import DRIVE
 from symphys.model.scalar import is_zero
 from symphys.model.state_layout import Layout, input_symbols
 from symphys.model.world import World
+from symphys.records import dataclass
 from symphys.transcription import Record, Rollout
 from symphys.types import Array, Bools
 

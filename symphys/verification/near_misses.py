@@ -15,7 +15,6 @@ did.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from typing import Any
@@ -29,6 +28,7 @@ from symphys.maths import rotation
 from symphys.model.shapes import SolidShape
 from symphys.model.state_layout import GIVEN, Layout
 from symphys.model.world import Pair
+from symphys.records import dataclass
 from symphys.shooting import VariableBlock
 from symphys.transcription import Record, Rollout, Transcription
 from symphys.types import Array, Expr

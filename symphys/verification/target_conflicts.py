@@ -8,7 +8,6 @@ falls beyond it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem import Target
+from symphys.records import dataclass
 from symphys.shooting import ShootingProblem, VariableBlock
 from symphys.trajectory import NotFinite
 from symphys.transcription import Record, Rollout, Transcription

@@ -9,6 +9,7 @@ from typing import Any
 
 import bench
 import pytest
+from tools.repeats import thorough
 
 NAMES = bench.names()
 NEEDS = {"environments": ("torch", "gymnasium"), "imports": ("mujoco",), "speed": ("mujoco",)}
@@ -62,7 +63,7 @@ def run(name: str, tmp_path: Path, *arguments: str) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.parametrize("name", [thorough(QUICK[0]), *QUICK[1:]])
 def test_a_quick_run_has_rows(name: str, tmp_path: Path) -> None:
     found = run(name, tmp_path)
     assert found["rows"] and found["options"]["quick"] is True

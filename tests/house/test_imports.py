@@ -18,6 +18,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "errors": ("", "", "errors that a user may meet"),
     "suggest": ("", "", "hints for error messages"),
     "types": ("", "numpy", "what arrays and expressions are called"),
+    "records": ("", "", "data classes that are quick to define"),
     "deprecated": ("", "", "public names of older versions"),
     "later": ("", "", "names imported when first used"),
     "interrupts": ("", "", "Ctrl-C"),
@@ -58,7 +59,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "casadi mujoco numpy",
         "other programs' files",
     ),
-    "solvers": ("errors shooting", "casadi cma numpy scipy", "optimisation methods"),
+    "solvers": ("errors later shooting", "casadi cma numpy scipy", "optimisation methods"),
     "findings": ("json_values", "numpy", "what the numbers of an examination mean"),
     "results": (
         "archives errors files findings json_values model problem suggest trajectory",
@@ -113,7 +114,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
 """Of each room: which others it may import, which packages of third parties, and what it is."""
 FACADE = {"__init__", "__main__"}
 """The package itself, which hands names on, and ``python -m symphys``."""
-EVERYWHERE = {"types"}
+EVERYWHERE = {"types", "records"}
 """What all rooms may import."""
 
 

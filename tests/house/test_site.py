@@ -99,7 +99,7 @@ def test_the_notebook_has_no_outputs() -> None:
     assert len({cell["id"] for cell in notebook["cells"]}) == len(notebook["cells"])
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_notebook_runs(tmp_path: Path) -> None:
     """In an empty folder, as it stands; its figures show, and what its text says of the numbers holds."""
     pytest.importorskip("nbclient")

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import thorough
 from worlds.driven import TABLES
 
 import symphys
@@ -18,7 +19,7 @@ K = np.array([[-4], [-1], [2], [0.5]])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["problem", "ending", "sampled"])
+@pytest.mark.parametrize("name", ["problem", thorough("ending"), thorough("sampled")])
 def test_gymnasium_finds_no_fault(name: str, request: pytest.FixtureRequest) -> None:
     from gymnasium.utils.env_checker import check_env
 
@@ -27,7 +28,7 @@ def test_gymnasium_finds_no_fault(name: str, request: pytest.FixtureRequest) -> 
         check_env(symphys.env.Env(request.getfixturevalue(name)), skip_render_check=True)  # there is none
 
 
-@pytest.mark.parametrize("name", ["problem", "ending"])
+@pytest.mark.parametrize("name", [thorough("problem"), "ending"])
 def test_the_return_is_minus_the_objective(name: str, request: pytest.FixtureRequest) -> None:
     """To the rounding of observations, which are in single precision."""
     problem = request.getfixturevalue(name)

@@ -96,7 +96,7 @@ def test_missing_samples_are_left_out_and_orientations_have_three_residuals(resi
     assert np.abs(again[flight]).max() < 0.02, "the simulation that was recorded"
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_derivatives_are_those_of_differences(residuals: RecordingResiduals) -> None:
     shared, own = moved(residuals)
     which, h = np.array([0, 1]), 1e-5

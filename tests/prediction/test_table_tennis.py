@@ -55,7 +55,7 @@ def recorded(
     return symphys.load(kept | {"variable": [*shared, *own], "recording": recordings})
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_all_four_are_found_from_shots_of_different_spin() -> None:
     """Each shot has a velocity and a spin of its own, which are estimated with them."""
     found = symphys.identify(recorded(SHOTS, START, [THROWN, SPUN], list(TRUTH)), threads=1)

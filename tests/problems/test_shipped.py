@@ -505,7 +505,7 @@ PUTT = [2.3215, -1.1838]
 """Where the putt goes as the time step goes to 0, from 10 ms, 5 ms and 2.5 ms: its changes halve."""
 
 TABLE = [
-    *rows("acrobot", "ilqr multiple_shooting", solved=None, law=swings_up_acrobot, seeds=20),
+    *rows("acrobot", "ilqr multiple_shooting", "ilqr", solved=None, law=swings_up_acrobot, seeds=20),
     *rows("air_hockey", "ilqr", "ilqr", law=knocks_the_puck, seeds=5),
     *rows("arm_ball", "ilqr", "ilqr", below=0.5, finer=1, law=rolls_the_ball),
     *rows("arm_reach", {"gradient": 150}, "gradient", solved=None, law=reaches_the_point,
@@ -540,15 +540,15 @@ TABLE = [
     *rows("hopper_gait", "ipopt", "ipopt", law=closes_the_gait, finer=1, seeds=2),
     *rows("hopper_jump", "gradient", "gradient", of=3, law=jumps_half_a_metre),
     *rows("hopper_jump", "gradient", "gradient", of=5, wanted=2, law=jumps_half_a_metre),
-    *rows("ice_and_asphalt", "least_squares ilqr", "ilqr", law=stops_on_asphalt),
+    *rows("ice_and_asphalt", "least_squares ilqr", "least_squares ilqr", law=stops_on_asphalt),
     *rows("juggle", {"gradient": 60, "least_squares": 6, "ipopt": 30, "cma": 1500}, law=brings_bat_and_ball_back,
           seeds=2, backend="casadi"),
     *rows("juggle", "least_squares", law=meets_the_ball_with_the_speed_of_the_formula,
           polish=True, backend="casadi"),
-    *rows("knock", {"least_squares": 7}, answer=slides.KICK, within=[1e-4, 2e-3, 1e-4], polish=True),
+    *rows("knock", {"least_squares": 7}, "least_squares", answer=slides.KICK, within=[1e-4, 2e-3, 1e-4], polish=True),
     *rows("knock", {"gradient": 40, "ipopt": 18, "cma": 350}, "gradient ipopt cma", law=goes_along_as_fast, seeds=2),
     *rows("mini_cheetah_ahead", "ilqr", "ilqr", below=2.0, finer=1, law=lifts_every_foot),
-    *rows("parcel", {"least_squares": 6}, answer=[3.6643, 0.5606, 3.7407], within=5e-4,
+    *rows("parcel", {"least_squares": 6}, "least_squares", answer=[3.6643, 0.5606, 3.7407], within=5e-4,
           law=brings_the_plate(1e-4, 3e-3), polish=True),
     *rows("parcel", {"gradient": 14}, law=brings_the_plate(0.01, np.inf), seeds=2),
     *rows("parcel", {"ipopt": 15, "cma": 350}, "ipopt cma", law=brings_the_plate(0.01, np.inf), seeds=2),

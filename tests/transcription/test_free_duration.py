@@ -97,7 +97,7 @@ def test_a_free_duration_at_the_value_of_the_file_changes_nothing(name: str, tmp
     assert motion.position == pytest.approx(expected.position, rel=1e-9, abs=1e-10)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_an_examination_is_of_the_duration_of_z(made: Transcription, other: Transcription) -> None:
     found = examine(made, made.shooting.start(0))
     expected = survey(other, other.record(other.shooting.start(0)))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tools.repeats import thorough
 
 from symphys.codegen import interpret
 from symphys.errors import ProblemError, SymphysError
@@ -58,7 +59,7 @@ def test_a_sled_slides_over_ice_then_asphalt() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("dt", [0.02, 0.01, 0.005])
+@pytest.mark.parametrize("dt", [0.02, 0.01, thorough(0.005)])
 def test_the_stopping_distance_and_its_slopes(dt: float) -> None:
     """x = v0 t - mu g t^2 / 2 + v1^2 / 2 mu' g; it stops within a step, so that slopes are of first order."""
     made = made_of(SLED, dt=dt)
@@ -182,7 +183,7 @@ def test_gravity_and_motors_change_at_their_time() -> None:
     assert motion["cart.position"][-1, 0] == pytest.approx(0.16 / 3 + w * 0.6 + 0.36, abs=1e-13)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_phases_scale_with_a_free_duration() -> None:
     """Twice as long: x = v0 T/2 - ..., with half of the time on ice."""
     free = {"name": "T", "sets": "simulation.duration", "guess": 0.8}

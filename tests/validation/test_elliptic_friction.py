@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from tools.laboratory import Lab, central_difference, value_and_gradient
-from tools.repeats import few
+from tools.repeats import few, thorough
 from worlds.blocks import block, rod, turned_by
 
 import symphys
@@ -117,8 +117,10 @@ def test_equal_coefficients_are_one(smoothing: float, shape: str) -> None:
         assert ends[1][name] == pytest.approx(ends[0][name], abs=1e-7)
 
 
-@pytest.mark.parametrize("smoothing", [0.0, 0.02])
-@pytest.mark.parametrize("shape", ["ball", pytest.param("block", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("shape", "smoothing"),
+    [("ball", 0.0), ("ball", 0.02), pytest.param("block", 0.0, marks=pytest.mark.slow), thorough("block", 0.02)],
+)
 def test_derivatives_by_the_coefficients_and_the_start(smoothing: float, shape: str) -> None:
     """Against central differences, of a landing and a slide at an angle."""
     mu = [ca.SX.sym("along"), ca.SX.sym("across")]

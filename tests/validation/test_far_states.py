@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from tools.repeats import few
+from tools.repeats import few, thorough
 from worlds.mixed import mixed
 
 from symphys.dynamics.functions import step_function
@@ -25,6 +25,7 @@ WORLDS = {
     "two capsules": make_world([Body(name, 1.0, INERTIA, (Capsule(0.1, 0.3),)) for name in "ab"]),
     "joints": mixed()[0],
 }
+LONGEST = ("capsule on hills", "two capsules")
 SIZES = (1e-6, 1.0, 1e3, 1e6)
 FASTEST = {"two capsules": 1e4}
 """[m/s], [rad/s] for worlds whose numbers may overflow at 1e6; docs/python.md says which."""
@@ -44,7 +45,7 @@ def far(world: World, rng: np.random.Generator, most: float) -> Array:
 
 
 @pytest.mark.slow
-@few("name", WORLDS, 1)
+@few("name", [*(name for name in WORLDS if name not in LONGEST), *map(thorough, LONGEST)], 1)
 def test_steps_from_far_states_are_finite(name: str) -> None:
     """Value, forward and reverse derivatives, exact and smoothed."""
     world = WORLDS[name]

@@ -159,7 +159,7 @@ def test_gradients_agree_with_central_differences():
     assert slope == pytest.approx(reference, abs=1e-6 * np.abs(reference).max())
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_check_rejects_a_wrong_derivative():
     """The same comparison fails when one path of the derivative is cut."""
     final = random_impact()
@@ -168,7 +168,7 @@ def test_the_check_rejects_a_wrong_derivative():
     assert slope != pytest.approx(reference, abs=1e-6 * np.abs(reference).max())
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_forward_results_do_not_depend_on_gradients():
     """Bit-identical values with and without derivatives in the same function, and from call to call."""
     final = random_impact()

@@ -148,7 +148,7 @@ def test_landings_off_the_middle_are_those_of_many_sweeps() -> None:
     assert rates[0] == pytest.approx(rates[1], abs=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_crate_slides_straight_on_two_rails() -> None:
     """As far as on one: v^2 / (2 mu g)."""
     rails = [Fixture(f"rail{k}", Box((1, 0.025, 0.05), (0, y, -0.05))) for k, y in enumerate((-0.15, 0.15))]

@@ -8,7 +8,7 @@ from worlds.random_worlds import STRUCTURES, draw, lot, steps
 
 Structure = tuple[str, str, str, str]
 FEW = (2, 6, 7)
-"""Structures of the quick test: a box and a capsule under all kinds of laws, on the ground, on hills, at a post."""
+"""Structures of the short test: a box and a capsule under all kinds of laws, on the ground, on hills, at a post."""
 LARGEST = 1e6
 """Of the numbers of a state: bodies of some kg, tenths of a metre apart, at some m/s."""
 
@@ -26,7 +26,7 @@ def not_finite(structure: Structure, count: int, cuts: int | None) -> set[int]:
 @pytest.mark.parametrize("structure", [STRUCTURES[k] for k in FEW], ids="-".join)
 def test_random_scenes_are_finite(structure: Structure) -> None:
     """Touching, overlapping, coincident, aligned, at rest; by state, sizes, place, mass, law and smoothing."""
-    assert not_finite(structure, 80, cuts=0) == set()
+    assert not_finite(structure, 40, cuts=0) == set()
 
 
 @pytest.mark.thorough

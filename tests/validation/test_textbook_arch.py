@@ -86,7 +86,7 @@ def fallen(thick: float, mu: float) -> float:
     return float(z[0] - z[-1])
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_arch_stands_if_it_is_rough_enough() -> None:
     """Below the least friction no forces balance it and it falls; 10 % above, it stands."""
     rough = next(mu for mu in np.arange(0.1, 1.0, 0.001) if can_stand(0.3, mu))

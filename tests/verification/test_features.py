@@ -94,8 +94,8 @@ MORE: dict[str, Tables] = {
 }
 
 
-LONGEST = {"load on two boards"}
-"""Examined with ``make thorough``: its steps take half a minute to build."""
+LONGEST = {"load on two boards", "inertia and centre of mass", "orientation", "reactions of joints"}
+"""Examined with ``make thorough``: their steps take up to half a minute to build."""
 
 
 @few(

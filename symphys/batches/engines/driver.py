@@ -13,7 +13,7 @@ import socket
 import threading
 import uuid
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from time import monotonic
 
@@ -23,6 +23,7 @@ from symphys.batches.ledger import Ledger, Observer
 from symphys.batches.limits import BatchLimits, Halt
 from symphys.batches.pool import NoWorkers, Pool
 from symphys.batches.queue import Queue
+from symphys.records import dataclass
 from symphys.results.result import Result
 from symphys.runs.execute import Transcribe
 from symphys.runs.job import Job

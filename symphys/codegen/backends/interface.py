@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Protocol
 
 from symphys.codegen import Program
+from symphys.records import dataclass
 from symphys.shooting import Evaluator, Nlp
 
 Function = Any

@@ -9,7 +9,7 @@ import ctypes
 import shutil
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
@@ -27,6 +27,7 @@ from symphys.codegen.runtime.kernel import Outputs
 from symphys.codegen.toolchain.build import temporary_folder
 from symphys.codegen.toolchain.processes import ELSEWHERE
 from symphys.codegen.toolchain.warm_start import ProgramSource
+from symphys.records import dataclass
 from symphys.shooting import LaterNlp, Nlp, Values
 from symphys.types import Array
 

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from symphys.codegen.toolchain.build import temporary_folder
 from symphys.codegen.toolchain.cache import KINDS, Cache, default_cache
 from symphys.codegen.toolchain.compiler import processors
 from symphys.codegen.toolchain.processes import ELSEWHERE
+from symphys.records import dataclass
 
 RESERVED_BYTES = 2**28
 """[bytes] left to others, and to what a launch needs: stacks of all resident threads."""

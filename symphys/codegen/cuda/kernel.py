@@ -9,7 +9,6 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any, Literal
 
@@ -38,6 +37,7 @@ from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.runtime.kernel import BuildReport, Kernel
 from symphys.codegen.runtime.library import TABLES, WORD, List, RowSource, data_places, program_fields, strided
 from symphys.codegen.toolchain.build import names_of
+from symphys.records import dataclass
 from symphys.types import Ints
 
 ROOM = "symphys.codegen.cuda"

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from symphys.codegen.emit.pieces import Cut, Form, pieces_of
 from symphys.codegen.emit.source import DRIVER, SourceFile, head_of, resource
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import FORMS
+from symphys.records import dataclass
 
 WORD_BITS = 21
 """Bits of an operand for the word; the others are for the place."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from symphys.codegen.graph.operations import FORMS, PLAIN, SCALAR
+from symphys.records import dataclass
 
 
 @dataclass(frozen=True)

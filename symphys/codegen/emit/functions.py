@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
@@ -16,6 +16,7 @@ from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.graph.rewrite import Taped, taped
 from symphys.codegen.program.program import Function, Place
+from symphys.records import dataclass
 
 Key = tuple[object, ...]
 

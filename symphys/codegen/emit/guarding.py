@@ -13,7 +13,7 @@ then.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from symphys.codegen.emit.tables import Table
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.program import FunctionCall, Place, Program
+from symphys.records import dataclass
 from symphys.types import Ints
 
 NONE = -1

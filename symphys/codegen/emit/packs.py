@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
@@ -24,6 +24,7 @@ from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.shapes import BROADCAST, GATHER, GATHER_ALIASED, INTERLEAVED, Access, Shape
 from symphys.codegen.program.phase_calls import PhaseCalls
 from symphys.codegen.program.program import Program
+from symphys.records import dataclass
 from symphys.types import Ints
 
 NONE = -1

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import groupby
 
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.rewrite import fused_results, with_fused_products
+from symphys.records import dataclass
 
 MAX_STATEMENTS = 500
 """Statements in one C function, and copies of what is given: a compiler's time grows faster than its length."""

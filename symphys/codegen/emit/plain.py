@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 from symphys.codegen.emit.dialect import NUMBERS
 from symphys.codegen.emit.guarding import Guarding
@@ -15,6 +14,7 @@ from symphys.codegen.emit.writer import write
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.program.program import Function, Place, Program
 from symphys.codegen.runtime.library import data_places
+from symphys.records import dataclass
 
 RANGES = ("z", "parameters", "zeroed", "constants", "outputs", "seeded")
 TABLES = ("prologue", "body", "epilogue", "again", "back_body", "back_prologue", "back_epilogue")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from symphys.codegen.emit.guarding import TABLES, Guarding
+from symphys.records import dataclass
 from symphys.types import Ints
 
 if TYPE_CHECKING:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.resources import files
 
 from symphys.codegen.emit.dialect import ONE_LANE, PACK, VECTORS, Dialect
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.writer import write
+from symphys.records import dataclass
 
 ROOM = "symphys.codegen"
 DRIVER = ("program.h", "guards.c", "driver.c")

@@ -7,12 +7,12 @@ entries that are made alike.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from symphys.codegen.program.phase_calls import PhaseCalls, grouped
+from symphys.records import dataclass
 from symphys.types import Ints
 
 

@@ -8,13 +8,13 @@ load across a store that might write the same word.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 from symphys.codegen.emit.dialect import VECTORS, Dialect
 from symphys.codegen.emit.pieces import Form, GraphPiece, pieces_of
 from symphys.codegen.emit.shapes import PackWords, PlaceWords, Shape
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.operations import MASKS
+from symphys.records import dataclass
 
 
 class Lines:

@@ -8,7 +8,6 @@ or at none.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from symphys.codegen.program.phase_calls import PhaseCalls
 from symphys.codegen.program.program import FunctionCall, Place, Program
 from symphys.codegen.program.spans import Spans, stretches
+from symphys.records import dataclass
 from symphys.types import Bools, Ints
 
 Words = slice | NDArray[np.int64]

@@ -5,11 +5,12 @@ Comparisons and logic give masks, integers of all ones or all zeros in each lane
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import frexp
 from typing import NamedTuple
 
 from symphys.codegen.graph.operations import MASKS
+from symphys.records import dataclass
 
 MAX_EXPONENT = 100
 """Exponents for which powers of two have reciprocals, in single precision too."""

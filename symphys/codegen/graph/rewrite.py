@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from symphys.codegen.graph.graph import Graph, Node, ordered
 from symphys.codegen.graph.operations import MASKS
+from symphys.records import dataclass
 
 Change = Callable[[Graph, int, Node], int]
 """(new graph, number of the old node, node with new operands) -> number of the new node"""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from symphys.codegen.program.program import FunctionCall, Place, Program
 from symphys.codegen.runtime.library import Loaded, Memory
+from symphys.records import dataclass
 
 if TYPE_CHECKING:
     from symphys.codegen.runtime.batch import RolloutBatch

@@ -9,7 +9,6 @@ The check takes many calls at a time. If some of them are wrong, it takes each b
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +18,7 @@ from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.calls import AdjointDiscount, Function, FunctionCall, Place
 from symphys.codegen.program.phase_calls import PhaseCalls, rows_of
 from symphys.codegen.program.spans import Spans, stretches
+from symphys.records import dataclass
 from symphys.types import Ints
 
 CHUNK = 4096

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from symphys.codegen.program.calls import Place
+from symphys.records import dataclass
 from symphys.types import Ints
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from symphys.codegen.runtime.library import BatchData, Loaded, Memory
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.runtime.widths import Widths
 from symphys.codegen.toolchain.compiler import processors
+from symphys.records import dataclass
 from symphys.types import Array
 
 Outputs = dict[str, NDArray[np.float64]]

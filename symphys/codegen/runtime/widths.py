@@ -9,7 +9,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -22,6 +21,7 @@ from symphys.codegen.runtime.library import BatchData, Loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.toolchain.cache import Cache
 from symphys.codegen.toolchain.processes import Background
+from symphys.records import dataclass
 
 if TYPE_CHECKING:
     from symphys.codegen.emit.source import SourceFile

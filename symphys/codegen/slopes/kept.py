@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 from symphys.codegen.program.program import Place, Program
 from symphys.codegen.slopes.plan import Adjoints, RowBlock, SlopePlan
 from symphys.codegen.toolchain.plans import KeptProgram, listed
+from symphys.records import dataclass
 
 TABLES = ("entries", "calls", "copies", "uses", "cells")
 """Fields of ``Adjoints``."""

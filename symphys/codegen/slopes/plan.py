@@ -12,7 +12,6 @@ left out stay by themselves.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import groupby, pairwise
 from typing import Literal
 
@@ -29,6 +28,7 @@ from symphys.codegen.graph.adjoint import Mask
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.rewrite import Taped
 from symphys.codegen.program.program import Function, FunctionCall, Place, Program
+from symphys.records import dataclass
 from symphys.types import Bools, Ints
 
 MAX_MERGED_CALLS = 4

@@ -9,7 +9,6 @@ import os
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Literal
@@ -27,6 +26,7 @@ from symphys.codegen.toolchain.compiler import Compiler, find_compiler, processo
 from symphys.codegen.toolchain.plans import KeptPlan
 from symphys.codegen.toolchain.processes import ELSEWHERE
 from symphys.codegen.toolchain.temporary import TemporaryFolder
+from symphys.records import dataclass
 
 if TYPE_CHECKING:  # what writes C is imported where it is called: a second start writes none
     from symphys.codegen.emit.planned import Plan

@@ -21,12 +21,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.temporary import lock as lock_file
+from symphys.records import dataclass
 
 try:
     import fcntl

@@ -13,13 +13,13 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.processes import ADVICE, ELSEWHERE, run, run_all
+from symphys.records import dataclass
 
 if TYPE_CHECKING:
     from symphys.codegen.emit.source import SourceFile
@@ -118,8 +118,9 @@ class Compiler:
     def flags(self, processor: Processor) -> tuple[str, ...]:
         """Return the flags of every C file, which are part of a kernel's identity."""
         if "ziglang" in self.command and processor.features:  # its default is the machine's own processor
-            return (*FLAGS, f"-mcpu={processor.architecture.replace('-', '_')}", "-mprefer-vector-width=512")
-        return (*FLAGS, *processor.flags())
+            cpu = processor.architecture.replace("-", "_")
+            return (*FLAGS, f"-mcpu={cpu}", "-mprefer-vector-width=512", *own_flags())
+        return (*FLAGS, *processor.flags(), *own_flags())
 
     def build(self, sources: Sequence[SourceFile], flags: Sequence[str], folder: Path) -> Path:
         """Compile each source in a process of its own, link them, and return the shared library."""
@@ -130,11 +131,16 @@ class Compiler:
             _write(file, source.text)
             straight, broadcasts = (STRAIGHT if source.straight else ()), (BROADCASTS if source.broadcasts else ())
             extra = (*(NARROW if source.narrow else ()), *((*straight, *broadcasts) if self.gnu else ()))
-            commands.append([*self.command, *flags, *extra, "-c", str(file), "-o", str(target)])
+            commands.append([*self.command, *flags, *extra, *own_flags(), "-c", str(file), "-o", str(target)])
         run_all(commands, COMPILE_TIMEOUT, processors(), folder)
         library = folder / "kernel.so"
         run([*self.command, *flags, "-shared", *map(str, objects), "-o", str(library), "-lm"], COMPILE_TIMEOUT, folder)
         return library
+
+
+def own_flags() -> tuple[str, ...]:
+    """Return the flags of $SYMPHYS_CFLAGS, which come last."""
+    return tuple(shlex.split(os.environ.get("SYMPHYS_CFLAGS", "")))
 
 
 def processors() -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from symphys.codegen.emit.guarding import Guarding
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.program.program import AdjointDiscount, FunctionCall, Place, Program
+from symphys.records import dataclass
 
 
 class KeptProgram(Program):

@@ -15,13 +15,14 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.cache import Cache
+from symphys.records import dataclass
 
 if TYPE_CHECKING:
     from symphys.codegen.emit.source import SourceFile

@@ -11,7 +11,7 @@ import contextlib
 import time
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, TypeVar
 
@@ -24,6 +24,7 @@ from symphys.codegen.toolchain.build import BlockWidth, KeptLibraries, compiled,
 from symphys.codegen.toolchain.cache import PLAN_SUFFIX, Cache, default_cache
 from symphys.codegen.toolchain.identity import identity_of, package_stamp
 from symphys.codegen.toolchain.plans import KeptPlan
+from symphys.records import dataclass
 
 Precision = Literal["double", "single"]
 MIN_KEPT_INSTRUCTIONS = 5000

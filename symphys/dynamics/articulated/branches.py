@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -21,6 +20,7 @@ from symphys.dynamics.articulated.schur_complement import (
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.tracing.decorator import traced
 from symphys.model.joints import KinematicTree
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

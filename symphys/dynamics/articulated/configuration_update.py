@@ -9,7 +9,7 @@ coordinates). The matrix is the tree's own, so that bodies that are light to tur
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import casadi as ca
 
@@ -25,6 +25,7 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import GeneralizedVelocities, Momentum
 from symphys.maths import rotation
 from symphys.model.joints import KinematicTree
+from symphys.records import dataclass
 from symphys.types import Expr
 
 CORRECTION_STEPS = 2

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 
+from symphys.records import dataclass
 from symphys.types import Expr
 
 Sparse = dict[int, Expr]

@@ -6,7 +6,6 @@ Rotations are quaternions from the start of the substep to its end, world frame.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 
@@ -16,6 +15,7 @@ from symphys.dynamics.joints.joint_frames import joint_frames_on, locked
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.model.joints import Joint, KinematicTree
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

@@ -10,7 +10,6 @@ holds whatever these impulses are: joints hold exactly, and the sweeps project c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -32,6 +31,7 @@ from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import GeneralizedVelocities, Momentum
 from symphys.model.joints import KinematicTree
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

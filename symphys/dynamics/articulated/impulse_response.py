@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 
@@ -13,6 +12,7 @@ from symphys.dynamics.articulated.schur_complement import BranchMatrix, Columns,
 from symphys.dynamics.motion import BodyJacobian
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.rotation import cross_matrix
+from symphys.records import dataclass
 from symphys.types import Expr
 
 Response = tuple[Expr, Expr]

@@ -9,12 +9,12 @@ number of branches, and equal branches share their functions.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 
 from symphys.dynamics.articulated.factorisation import Factorisation, Sparse, factorise
 from symphys.dynamics.tracing.decorator import traced
+from symphys.records import dataclass
 from symphys.types import Expr
 
 Parents = tuple[int | None, ...]

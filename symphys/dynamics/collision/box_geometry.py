@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -12,6 +11,7 @@ from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath, c
 from symphys.dynamics.collision.witness_points import steady
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Box, Capsule
+from symphys.records import dataclass
 from symphys.types import Expr
 
 PARALLEL = 1e-6

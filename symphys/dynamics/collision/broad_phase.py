@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
@@ -30,6 +29,7 @@ from symphys.model.scalar import is_number, is_zero
 from symphys.model.shapes import Box, Capsule, Plane, Sphere, Surface
 from symphys.model.shapes.shape import SolidShape
 from symphys.model.world import Side, World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MIN_PAIRS = 12

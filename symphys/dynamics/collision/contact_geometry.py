@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 import casadi as ca
 
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -13,6 +12,7 @@ from symphys.dynamics.collision.contact_geometry import Contact, Displacement, F
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import first_root
 from symphys.model.shapes import Box, Capsule, Plane, Sphere
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

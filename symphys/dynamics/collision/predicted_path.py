@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from symphys.maths.inlined import inlined
 from symphys.model.scalar import is_zero
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

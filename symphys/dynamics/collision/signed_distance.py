@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import casadi as ca
@@ -12,6 +11,7 @@ from symphys.dynamics.collision.contact_geometry import Contact, Displacement, F
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.model.shapes import SolidShape
+from symphys.records import dataclass
 from symphys.types import Expr
 
 NEWTON_STEPS = 5

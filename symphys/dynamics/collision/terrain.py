@@ -9,7 +9,6 @@ method finds. Shapes with several balls or points (capsules, boxes) do not see a
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -20,6 +19,7 @@ from symphys.dynamics.collision.predicted_path import ZERO_PATH, PredictedPath, 
 from symphys.dynamics.collision.signed_distance import InField
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.model.shapes import Box, Capsule, Sphere, Terrain
+from symphys.records import dataclass
 from symphys.types import Expr
 
 FOOT_STEPS = 3

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
 from symphys.dynamics.collision.predicted_path import Parabola
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.maths.smoothing import length
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

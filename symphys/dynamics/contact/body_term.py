@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -12,6 +11,7 @@ from symphys.dynamics.collision.contact_geometry import Contact, Frame
 from symphys.dynamics.motion import PredictedMotion, apply
 from symphys.dynamics.unknowns import GeneralizedVelocities, Momentum
 from symphys.maths.rotation import cross_matrix
+from symphys.records import dataclass
 from symphys.types import Expr
 
 Motions = tuple[PredictedMotion, ...]

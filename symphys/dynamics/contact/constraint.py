@@ -13,7 +13,6 @@ without an impulse gives none.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -27,6 +26,7 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Linearisation
 from symphys.maths.smoothing import positive, positive_slope
 from symphys.model.world import Law
+from symphys.records import dataclass
 from symphys.types import Expr
 
 NEVER, ALWAYS = ca.SX(0), ca.SX(1)

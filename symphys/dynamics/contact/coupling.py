@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -13,6 +12,7 @@ from symphys.dynamics.motion import inertia_matrix
 from symphys.maths.smoothing import length
 from symphys.model.body import Body
 from symphys.model.world import Pair, World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MAX_SEQUENTIAL_COUPLING = 2.0

@@ -13,7 +13,6 @@ impulses of soft ones ask a ``Friction``. Its coefficients, and how those of two
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import hypot
 from typing import Protocol
 
@@ -22,6 +21,7 @@ import casadi as ca
 from symphys.dynamics.contact.body_term import Motions
 from symphys.maths.smoothing import TINY_SQUARE, TINY_WIDTH_SQUARE, length, onto_disc, positive
 from symphys.model.world import Law
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MIN_DIRECTION_ANGLE = 0.05

@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
@@ -51,6 +50,7 @@ from symphys.dynamics.unknowns import (
 )
 from symphys.maths.smoothing import clip
 from symphys.model.world import World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 State = Any

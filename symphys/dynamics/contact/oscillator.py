@@ -21,11 +21,10 @@ implicit Euler, which damps what a step cannot resolve.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from symphys.maths.smoothing import clip
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MAX_ANGLE = 2.5

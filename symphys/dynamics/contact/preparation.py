@@ -7,8 +7,6 @@ u rebound speed, chi in [0, 1]: 1 where the rebound leaves the step, 0 where it 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Frame
@@ -31,6 +29,7 @@ from symphys.dynamics.motion import apply
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import clip, positive
 from symphys.model.world import Law
+from symphys.records import dataclass
 from symphys.types import Expr
 
 REBOUND_MARGIN = 1e-4

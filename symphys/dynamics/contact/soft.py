@@ -7,7 +7,6 @@ leapfrog begins anew. Letters as there; f is the force over stiffness, -(e + 2 z
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -16,6 +15,7 @@ from symphys.dynamics.collision.time_of_impact import MAX_TOUCH_GAP
 from symphys.dynamics.contact.oscillator import MIN_B, response, spring_law
 from symphys.maths.smoothing import clip
 from symphys.model.world import Law
+from symphys.records import dataclass
 from symphys.types import Expr
 
 NEWTON_STEPS = 4

@@ -7,7 +7,6 @@ it, and ``defer_impacts`` selects the contacts that must give no impulse in the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 
@@ -36,6 +35,7 @@ from symphys.maths.smoothing import either, positive
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Sphere
 from symphys.model.world import Law, Pair, World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 SIMULTANEITY_SHARE = 1e-9

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -35,6 +35,7 @@ from symphys.dynamics.unknowns import AllVelocities, Momenta, PlacedConstraint, 
 from symphys.model.joints import Joint, JointCoupling, carriers, kinematic_trees, tree_joints
 from symphys.model.state_layout import COUPLED
 from symphys.model.world import World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 LIMITS = ("lower", "upper")

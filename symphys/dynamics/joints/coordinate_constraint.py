@@ -8,7 +8,6 @@ the rate after it: keep b K/(1 + b K), slope b/(1 + b K), offset a/(1 + b K), wi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -18,6 +17,7 @@ from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, appl
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import COMPLIANCE, GeneralizedVelocities, Linearisation
 from symphys.maths.smoothing import at_least, at_most, positive_slope
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

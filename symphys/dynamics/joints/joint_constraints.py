@@ -8,7 +8,7 @@ sweeps start from, which is unstable as soon as these do not converge by half in
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, isfinite
 from typing import Any
 
@@ -26,6 +26,7 @@ from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import Momentum
 from symphys.maths.smoothing import at_least, at_most, clip
 from symphys.model.joints import AffineMotor, Joint, JointCoupling, Servo, Spring, TorqueMotor, VelocityMotor
+from symphys.records import dataclass
 from symphys.types import Expr
 
 NO_STRIKE = ca.SX(0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 
@@ -13,6 +12,7 @@ from symphys.dynamics.joints.joint_impulse import Directions
 from symphys.dynamics.tracing.decorator import traced
 from symphys.maths import rotation
 from symphys.model.joints import Coordinate, Joint, PlacedFrames
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from symphys.dynamics.contact import body_term
 from symphys.dynamics.contact.body_term import BodyTerm
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

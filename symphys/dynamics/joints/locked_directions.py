@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -11,6 +10,7 @@ from symphys.dynamics.articulated.factorisation import factorise
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
 from symphys.dynamics.unknowns import COMPLIANCE, Linearisation
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 
@@ -14,6 +13,7 @@ from symphys.dynamics.joints.locked_directions import LockConstraint
 from symphys.dynamics.motion import BodyJacobian, PredictedMotion, apply
 from symphys.dynamics.tracing.decorator import repeat, traced
 from symphys.dynamics.unknowns import GeneralizedVelocities, PlacedConstraint
+from symphys.records import dataclass
 from symphys.types import Expr
 
 Displacements = tuple[Displacement, ...]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -23,6 +22,7 @@ from symphys.maths.rotation import matrix, rotate
 from symphys.model.joints import Coordinate, Joint, JointFrame, PlacedFrames, kinematic_trees
 from symphys.model.state_layout import INPUT_FIELDS, Layout, input_sizes
 from symphys.model.world import World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 WORLD_ORIENTATION = (1.0, 0.0, 0.0, 0.0)

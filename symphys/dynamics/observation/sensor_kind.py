@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any, Literal, TypeVar
 
 from symphys.model.joints import Joint
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 T = TypeVar("T")

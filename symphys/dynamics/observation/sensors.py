@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -14,6 +13,7 @@ from symphys.maths import rotation
 from symphys.maths.rotation import matrix
 from symphys.model.body import Body, Site
 from symphys.model.world import World
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

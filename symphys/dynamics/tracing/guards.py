@@ -9,7 +9,6 @@ of that kind, or are used by such calls only, can be left out.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from typing import Any, NamedTuple
 
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.dynamics.tracing.recording import TracedCall, TracedVector
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MAX_EXAMINED_ARGUMENTS = 80

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cache
 from itertools import count
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.tracing.decorator import traced
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import casadi as ca
@@ -43,6 +42,7 @@ from symphys.dynamics.tracing.pytree import (
     unflatten,
 )
 from symphys.maths.verbatim import verbatim
+from symphys.records import dataclass
 from symphys.types import Expr
 
 Structure = tuple[int, tuple[int, ...]]

@@ -14,13 +14,13 @@ Pereyra 1973; in bundle adjustment: Triggs et al. 2000, section 6.1). Blocks are
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.square_root import EPS, eliminate, pseudo_root, stacked, triangle
 from symphys.identification.interface import FitParameters, RecordedResiduals, Rows
+from symphys.records import dataclass
 from symphys.types import Array, Bools, Ints
 
 Weighting = Callable[[Array], Array]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.fitting.state import FitOptions, FitOutcome, FitState, FitStatus, FitStep, begin
 from symphys.identification.inference.uncertainty import Information, Uncertainty, uncertainty
 from symphys.identification.interface import DerivedResiduals, FitParameters, RecordedResiduals, ResidualRows, Rows
+from symphys.records import dataclass
 from symphys.types import Array, Bools, Ints
 
 GUESS_FACTORS = (0.01, 0.03, 0.1, 0.3, 0.5, 2.0, 4.0, 10.0)

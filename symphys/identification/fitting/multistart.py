@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ import numpy as np
 from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.state import FitOptions, FitOutcome, begin
 from symphys.identification.interface import FitParameters, IdentificationError, RecordedResiduals
+from symphys.records import dataclass
 from symphys.results.identification.record import GlobalSearch
 from symphys.types import Array, Ints
 

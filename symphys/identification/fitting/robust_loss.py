@@ -13,11 +13,11 @@ and from 30 % off it ended in another minimum of the bounces, where most residua
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from symphys.identification.interface import IdentificationError
+from symphys.records import dataclass
 from symphys.types import Array
 
 

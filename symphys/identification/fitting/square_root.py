@@ -9,10 +9,9 @@ sections 5.5 and 5.6).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.types import Array, Bools
 
 EPS = float(np.finfo(float).eps)

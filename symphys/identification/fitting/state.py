@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from itertools import pairwise
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 from symphys.identification.fitting.arrow import ArrowSystem
 from symphys.identification.fitting.robust_loss import RobustLoss
 from symphys.identification.interface import IdentificationError, RecordedResiduals
+from symphys.records import dataclass
 from symphys.solvers.core.levenberg_marquardt import Damped
 from symphys.types import Array
 

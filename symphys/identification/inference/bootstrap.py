@@ -12,7 +12,6 @@ explains widen it. With fewer than ``MIN_RECORDINGS`` recordings a draw says not
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.stats
@@ -22,6 +21,7 @@ from symphys.identification.fitting.levenberg_marquardt import RecordingFit
 from symphys.identification.fitting.state import FitOptions, FitState, begin
 from symphys.identification.inference.uncertainty import CONFIDENCE_LEVEL, Information
 from symphys.identification.interface import IdentificationError, RecordedResiduals
+from symphys.records import dataclass
 from symphys.types import Array, Ints
 
 MIN_RECORDINGS = 5

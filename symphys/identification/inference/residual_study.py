@@ -9,13 +9,14 @@ number of means, so that noise has about 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy.stats
 
 from symphys.identification.interface import DerivedResiduals, RecordedResiduals, ResidualRows
+from symphys.records import dataclass
 from symphys.results.identification.record import PredictionErrors, QuantityResiduals
 from symphys.types import Array, Bools, Ints
 

@@ -17,8 +17,6 @@ that of the Jacobian is beyond where the Jacobian holds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.stats
 
@@ -36,6 +34,7 @@ from symphys.identification.fitting.square_root import (
     triangle,
 )
 from symphys.identification.interface import FitParameters, RecordedResiduals, Rows
+from symphys.records import dataclass
 from symphys.types import Array, Bools, Ints
 
 CONFIDENCE_LEVEL = 0.95

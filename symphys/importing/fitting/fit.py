@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from symphys.files import write_bytes
 from symphys.importing.fitting.mesh import Mesh
 from symphys.maths import rotation
 from symphys.model.shapes import Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.types import Array
 

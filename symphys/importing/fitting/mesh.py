@@ -7,13 +7,13 @@ outside if it is before the surface as seen from one of many directions. Hollows
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.records import dataclass
 from symphys.types import Array, Ints
 
 SAMPLES = 40_000

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Literal
 from xml.parsers import expat
@@ -16,6 +16,7 @@ from xml.parsers import expat
 from symphys.files import check_regular
 from symphys.importing.reading.folders import Folders, exists
 from symphys.importing.records import ImportProblem
+from symphys.records import dataclass
 from symphys.suggest import quote
 
 MAX_BYTES = 50_000_000

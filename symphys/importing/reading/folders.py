@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from symphys.importing.records import ImportProblem
+from symphys.records import dataclass
 from symphys.suggest import quote
 
 PACKAGE = "package:"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 from xml.etree import ElementTree
 from xml.parsers import expat
 
 from symphys.importing.records import Finding, JointMotor, counted, listed
+from symphys.records import dataclass
 
 Base = Literal["auto", "free", "fixed"]
 WORLD = "world"

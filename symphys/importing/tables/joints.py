@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Container, Sequence
-from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
@@ -22,6 +21,7 @@ from symphys.importing.tables.reading import (
     numbers,
 )
 from symphys.model.gimbal import Screw, locks
+from symphys.records import dataclass
 from symphys.types import Array
 
 PARALLEL_TOLERANCE = 1e-9

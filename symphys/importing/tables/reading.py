@@ -8,12 +8,13 @@ from __future__ import annotations
 import keyword
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 
 from symphys.importing.records import Finding, ImportOptions, JointMotor, Kind
+from symphys.records import dataclass
 from symphys.types import Array
 
 MAX_NAME_LENGTH = 64

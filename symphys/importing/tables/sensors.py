@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from symphys.importing.tables.reading import (
     numbers,
     quaternion,
 )
+from symphys.records import dataclass
 from symphys.types import Array
 
 MIN_ARM = 1e-6

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import ClassVar
 
 import casadi as ca
 
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import casadi as ca
 
 from symphys.model.controllers.linear import rows_times
+from symphys.records import dataclass
 from symphys.types import Expr
 
 Activation = Literal["tanh", "relu", "linear"]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import ClassVar
 
 import casadi as ca
 
 from symphys.model.numbers import table_key
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from symphys.model.joints.joint import Joint
 from symphys.model.scalar import Scalar
+from symphys.records import dataclass
 
 DEGREE = 4
 """Of the polynomial."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from symphys.model.joints.kind import Kind
 from symphys.model.joints.specs import JointSpec
+from symphys.records import dataclass
 
 FIXED = Kind("fixed", turns=((0, 1), (1, 2), (2, 0)))
 

@@ -6,13 +6,13 @@ A fault is a ValueError whose text completes the name of what is wrong: "must be
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
 
 from symphys.maths import rotation
 from symphys.model.joints.joint import JointFrame
+from symphys.records import dataclass
 from symphys.types import Array
 
 Vector = Sequence[float] | Array

@@ -7,7 +7,7 @@ share pitch / 2 pi of force a nut pushes with.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import isfinite, pi
 from typing import Any, ClassVar
 
@@ -16,6 +16,7 @@ from symphys.model.joints.kind import Coordinate, Kind
 from symphys.model.joints.specs import SingleAxisJoint
 from symphys.model.numbers import declare
 from symphys.model.scalar import Scalar
+from symphys.records import dataclass
 from symphys.types import Array
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import casadi as ca
@@ -10,6 +9,7 @@ import casadi as ca
 from symphys.maths.smoothing import angle_of
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 from symphys.model.joints.specs import SingleAxisJoint
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from symphys.maths.angles import nearest
@@ -11,6 +11,7 @@ from symphys.model.joints.kind import Kind, PlacedFrames
 from symphys.model.joints.motor import AffineMotor, Motor, given_torque
 from symphys.model.numbers import Number, declare, numbers_of
 from symphys.model.scalar import Scalar, is_zero
+from symphys.records import dataclass
 
 PARTS = ("motor", "lower", "upper", "spring", "friction")
 UNWRAPPED = "unwrapped"

@@ -10,7 +10,6 @@ the complement of S.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import casadi as ca
 
@@ -18,6 +17,7 @@ from symphys.maths import rotation
 from symphys.maths.angles import nearest
 from symphys.model.numbers import numbers_of
 from symphys.model.scalar import Scalar, is_zero
+from symphys.records import dataclass
 from symphys.types import Expr
 
 TINY = 1e-24

@@ -6,9 +6,9 @@ Joints that close a loop or are soft are no part of a tree; sweeps project them 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from symphys.model.joints.joint import Joint
+from symphys.records import dataclass
 
 FLOATING = 6
 """Coordinates of a root that nothing holds: velocity and angular velocity."""

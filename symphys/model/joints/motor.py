@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import inf
 from types import MappingProxyType
 from typing import ClassVar
 
 from symphys.model.numbers import Number, declare, table_key
 from symphys.model.scalar import Scalar, is_zero
+from symphys.records import dataclass
 
 LARGEST = declare("{torque}", "the most that it gives", "positive", least=0.0, phase="impulse")
 """Metadata of the largest torque of a motor that aims at a velocity."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from symphys.model.joints.kind import Kind
 from symphys.model.joints.specs import JointSpec, MovingJoint
 from symphys.model.joints.start import State, moved_to_start, spanning_tree, unmoved
 from symphys.model.shapes import UPRIGHT
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.types import Array
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import casadi as ca
 
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 from symphys.model.joints.specs import SingleAxisJoint
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import Field, field, fields
 from math import inf, isfinite
 from typing import Any, ClassVar
 
@@ -21,6 +21,7 @@ from symphys.model.joints.kind import Kind
 from symphys.model.joints.motor import Motor
 from symphys.model.numbers import table_key
 from symphys.model.scalar import Scalar
+from symphys.records import dataclass
 from symphys.types import Array
 
 Vector = Sequence[float] | Array

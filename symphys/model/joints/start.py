@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import casadi as ca
@@ -14,6 +13,7 @@ from symphys.maths import rotation
 from symphys.model.joints.frames import WORLD
 from symphys.model.joints.joint import JointFrame
 from symphys.model.joints.kind import Kind, PlacedFrames
+from symphys.records import dataclass
 from symphys.types import Array, Expr
 
 State = dict[str, Array]

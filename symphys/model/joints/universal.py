@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -12,6 +12,7 @@ from symphys.model.joints.frames import two_axes
 from symphys.model.joints.kind import Coordinate, Kind, PlacedFrames
 from symphys.model.joints.specs import AXIS, MovingJoint, Vector
 from symphys.model.numbers import table_key
+from symphys.records import dataclass
 from symphys.types import Array, Expr
 
 

@@ -8,7 +8,7 @@ sizes, volume, inertia, contact points, and how problem files, pictures and MJCF
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -24,6 +24,7 @@ from symphys.model.shapes.plane import Plane
 from symphys.model.shapes.shape import UPRIGHT, RoundedHull, SizeKey, SolidShape
 from symphys.model.shapes.sphere import SOLID_SPHERE, Sphere
 from symphys.model.shapes.terrain import Terrain
+from symphys.records import dataclass
 
 __all__ = [
     "POINTS",

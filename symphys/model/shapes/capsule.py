@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import pi
 from typing import Any, ClassVar, Self
 
 from symphys.model.scalar import Scalar
 from symphys.model.shapes.shape import MIN_FLATNESS, UPRIGHT, RoundedHull, SizeKey, SolidShape
 from symphys.model.shapes.sphere import SOLID_SPHERE
+from symphys.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from symphys.model.scalar import Scalar
 from symphys.model.shapes.hull import Corners, Hull, hull_of
 from symphys.model.shapes.shape import UPRIGHT, RoundedHull, SizeKey, SolidShape
+from symphys.records import dataclass
 
 SLOTS = 8
 """Points in which a hull may touch ground at once."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import cos, pi, sin
 from typing import Any, ClassVar, Self
 
 from symphys.model.scalar import Scalar
 from symphys.model.shapes.shape import MIN_FLATNESS, UPRIGHT, RoundedHull, SizeKey, SolidShape
+from symphys.records import dataclass
 
 DRAWN = 16
 """Meridians in pictures, and half as many circles of latitude."""

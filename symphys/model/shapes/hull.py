@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from symphys.model.shapes.shape import MIN_FLATNESS
+from symphys.records import dataclass
 from symphys.types import Array, Ints
 
 COPLANAR_TOLERANCE = 1e-6

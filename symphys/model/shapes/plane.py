@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import pi
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -12,6 +12,7 @@ import casadi as ca
 
 from symphys.model.numbers import Number
 from symphys.model.scalar import Scalar, is_zero
+from symphys.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from symphys.model.numbers import Number
 from symphys.model.scalar import Scalar, is_zero
+from symphys.records import dataclass
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 """The quaternion of no rotation."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import pi
 from typing import Any, ClassVar, Self
 
 from symphys.model.scalar import Scalar
 from symphys.model.shapes.shape import RoundedHull, SizeKey, SolidShape
+from symphys.records import dataclass
 
 SOLID_SPHERE = 2 / 5
 """Of a uniform ball: moment of inertia by mass and squared radius."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar
 
 from symphys.model.numbers import Number
+from symphys.records import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
 from symphys.model.shapes import SURFACES, points_of_kinds
 from symphys.problem.parametric.parts import PairRule, ParametricBody, Part
+from symphys.records import dataclass
 from symphys.types import Bools, Ints
 
 KINDS = tuple(SURFACES.values())

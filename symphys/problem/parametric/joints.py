@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 from symphys.model.joints import Joint, JointFrame, Kind, Limits, Motor, Spring
@@ -11,6 +11,7 @@ from symphys.model.joints.joint import joint_numbers
 from symphys.model.numbers import Number, numbers_of
 from symphys.model.scalar import Scalar
 from symphys.problem.parametric.parts import Numbers, PairRule, Value
+from symphys.records import dataclass
 
 Part = TypeVar("Part", bound=Motor | Spring)
 OWN = tuple(numbers_of(Joint))

@@ -11,7 +11,7 @@ J. Multivariate Analysis 100(9), 2009), of which any three make a correlation ma
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from math import sqrt
 from typing import Any
@@ -25,6 +25,7 @@ from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Shape, Sphere, Static, Surface
 from symphys.model.shapes.inertia import MOMENT_ROUNDING, Tensor, inertia_of, specific
 from symphys.model.world import Law
+from symphys.records import dataclass
 
 Numbers = float | tuple[float, ...]
 Value = Callable[[str], Any]

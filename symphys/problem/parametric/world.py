@@ -8,7 +8,7 @@ A [[pair]] of two surfaces goes before one of a surface and a group, and that on
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -35,6 +35,7 @@ from symphys.problem.parametric.parts import (
     less,
     stated,
 )
+from symphys.records import dataclass
 from symphys.types import Array
 
 CONTACT = "contact"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NoReturn
 
 from symphys.errors import Issue, ProblemError
+from symphys.records import dataclass
 from symphys.suggest import quote
 
 Place = Sequence[str | int]

@@ -9,13 +9,14 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.archives import ArchiveError, read_arrays
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.types import Array
 

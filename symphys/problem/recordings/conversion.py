@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
@@ -16,6 +15,7 @@ from symphys.problem.parametric.world import ParametricWorld
 from symphys.problem.recordings.columns import RecordedColumns, RecordingFault
 from symphys.problem.recordings.types import Recording
 from symphys.problem.schema.recording import CONVERSIONS, ColumnsTable, RecordingTable
+from symphys.records import dataclass
 from symphys.suggest import quote
 from symphys.types import Array
 

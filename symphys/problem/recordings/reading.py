@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from math import floor
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -44,6 +44,7 @@ from symphys.problem.recordings.types import IdentifySettings, Measured, Recorde
 from symphys.problem.schema import Document
 from symphys.problem.schema.recording import ColumnsTable, InputTable, MeasuredTable, RecordingTable, leaves
 from symphys.problem.tables.bodies import read_orientation
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.types import Array
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -14,6 +14,7 @@ from symphys.model.joints.start import moved_to_start, moved_to_zero, placed_fra
 from symphys.model.state_layout import GIVEN
 from symphys.problem.parametric.joints import ParametricJoint
 from symphys.problem.parametric.placement import follow
+from symphys.records import dataclass
 from symphys.types import Array
 
 State = dict[str, Array]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 import numpy as np
 
 from symphys.expression import Formula
+from symphys.records import dataclass
 from symphys.types import Array
 
 

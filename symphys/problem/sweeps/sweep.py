@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 from symphys.errors import SymphysError
 from symphys.problem.reading.messages import shown
 from symphys.problem.schema.sweep import MAX_SAMPLES, MAX_VALUES
+from symphys.records import dataclass
 
 Spacing = Literal["linear", "log"]
 SPACINGS: tuple[Spacing, ...] = ("linear", "log")

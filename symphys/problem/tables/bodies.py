@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from math import hypot, isfinite
 from typing import Any
 
@@ -31,6 +30,7 @@ from symphys.problem.schema.physics import (
 )
 from symphys.problem.schema.shapes import EXAMPLES, ShapeTable, SolidTable
 from symphys.problem.schema.types import RollPitchYaw
+from symphys.records import dataclass
 from symphys.suggest import quote
 from symphys.types import Array
 

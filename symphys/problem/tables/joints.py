@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
@@ -30,6 +29,7 @@ from symphys.problem.reading.faults import Faults, Place
 from symphys.problem.reading.messages import wanted
 from symphys.problem.schema.joints import CouplingTable, JointTable, MotorTable, SiteTable
 from symphys.problem.tables.bodies import read_orientation
+from symphys.records import dataclass
 from symphys.suggest import hint, quote
 from symphys.types import Array
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -19,6 +19,7 @@ from symphys.problem.schema import Document
 from symphys.problem.schema.checks import OF_PHASE
 from symphys.problem.schema.objectives import ConstraintTable, CostTable, OutputTable, TargetTable
 from symphys.problem.tables.simulation import check_moment, find_phase
+from symphys.records import dataclass
 from symphys.types import Array
 
 NO_PHASES: Mapping[str, Phase] = MappingProxyType({})

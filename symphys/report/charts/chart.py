@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.report.charts.tables import Table, thin
 from symphys.types import Array
 

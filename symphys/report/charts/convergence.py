@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from symphys.findings.writing import capital
+from symphys.records import dataclass
 from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart, Key, Line, Panel
 from symphys.report.charts.tables import Table, thin

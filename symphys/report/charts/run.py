@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from symphys.findings.examination import Energy, Growth
 from symphys.findings.numerics import reach
 from symphys.findings.writing import capital, show
+from symphys.records import dataclass
 from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart, Key, Line, Panel, lines
 from symphys.report.charts.convergence import AXIS_TITLES, VIOLATION_FLOOR, WORK

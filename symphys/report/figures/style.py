@@ -7,7 +7,6 @@ import re
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator, SymmetricalLogLocator
 
 from symphys import files
+from symphys.records import dataclass
 from symphys.report.charts.palette import FAINT, GRID, INK, SOFT, number_label
 from symphys.report.figures.data import DataFigure, table
 from symphys.types import Array

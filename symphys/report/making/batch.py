@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from symphys.interrupts import Interrupts
+from symphys.records import dataclass
 from symphys.report.making.run_pages import PageFault, attempt, make_run_pages
 from symphys.report.making.stamps import BATCH_PAGE, batch_digest, folder_digest, is_current
 from symphys.report.pages.batch import write_batch_figures, write_batch_report

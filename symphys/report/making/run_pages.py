@@ -11,7 +11,6 @@ import signal
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -19,6 +18,7 @@ from time import monotonic
 
 from symphys import files
 from symphys.interrupts import Interrupts, ignoring_interrupts
+from symphys.records import dataclass
 from symphys.report.pages.run import PAGE, write_run_figures, write_run_report
 from symphys.results.file_names import FIGURES
 from symphys.results.text_files import ReportError

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from symphys.findings.writing import show
+from symphys.records import dataclass
 from symphys.report.charts import palette
 from symphys.report.pages.markup import Html, join, tag
 from symphys.results.discovery import Study

@@ -6,13 +6,13 @@ import json
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from urllib.parse import quote
 
 from symphys import files
 from symphys.findings import writing
 from symphys.findings.verdict import BEST_FOUND, DOUBTED
 from symphys.findings.writing import show
+from symphys.records import dataclass
 from symphys.report.charts import palette
 from symphys.report.making.stamps import RUN_PAGE
 from symphys.report.pages import words

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from symphys import files
 from symphys.findings import writing
+from symphys.records import dataclass
 from symphys.report.charts.chart import Chart
 from symphys.report.charts.motion import motion_charts
 from symphys.report.charts.run import run_charts

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from symphys.records import dataclass
 from symphys.report.charts import palette
 from symphys.results.scene import Scene
 from symphys.trajectory import Trajectory

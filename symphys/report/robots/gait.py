@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from symphys.findings.writing import percent
+from symphys.records import dataclass
 from symphys.report.charts.chart import Bars, Chart, Panel
 from symphys.report.charts.contacts import labels, pair_of
 from symphys.report.charts.tables import TIME

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Polygon
 
+from symphys.records import dataclass
 from symphys.report.charts.tables import thin
 from symphys.report.robots.branches import colours, linked, traced
 from symphys.report.robots.joint_marks import draw_joint_positions, draw_lines

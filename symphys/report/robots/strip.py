@@ -6,11 +6,11 @@ The section shown follows bodies that travel far to the right or the left; up an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from symphys.records import dataclass
 from symphys.report.charts.tables import TIME, vector
 from symphys.report.figures import style
 from symphys.report.figures.data import DataFigure, keep

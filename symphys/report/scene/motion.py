@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Polygon
 
+from symphys.records import dataclass
 from symphys.report.charts import palette
 from symphys.report.charts.tables import TIME, thin, vector
 from symphys.report.figures import style

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.axes import Axes
 
+from symphys.records import dataclass
 from symphys.report.figures import style
 from symphys.report.figures.data import DataFigure
 from symphys.report.scene.views import NAMES, View, corners, reach

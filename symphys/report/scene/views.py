@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.results.polytope import flat_hull
 from symphys.results.scene import Scene, Solid
 from symphys.trajectory import Trajectory

@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from symphys import files
 from symphys import json_values as values
+from symphys.records import dataclass
 from symphys.results.text_files import ReportError, read_archive, read_table
 from symphys.types import Array
 

@@ -11,13 +11,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
 
 from symphys import files
 from symphys import json_values as values
+from symphys.records import dataclass
 from symphys.results.file_names import SCENE
 from symphys.results.scene import Scene
 from symphys.results.text_files import ReportError, read_archive, read_table

@@ -5,12 +5,12 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
 from typing import Any
 
 from symphys.errors import SymphysError
+from symphys.records import dataclass
 from symphys.results.table.columns import UNFINISHED, UNREADABLE, Row, columns, find_column
 from symphys.suggest import quote
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from symphys import json_values as values
 from symphys.files import FileError
+from symphys.records import dataclass
 from symphys.results.file_names import CONFIG, PROBLEM, RESULT
 from symphys.results.result import VariableRecord
 from symphys.results.text_files import ReportError, read_table, read_words

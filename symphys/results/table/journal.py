@@ -15,12 +15,12 @@ import math
 import os
 import zlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from symphys import files
 from symphys.json_values import UNPRINTABLE
+from symphys.records import dataclass
 from symphys.results.file_names import RESULT
 from symphys.results.table.columns import FIXED, MAX_EXACT_INTEGER, NUMBERS, numeric
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from symphys import files
+from symphys.records import dataclass
 from symphys.results.file_names import CONFIG, FIGURES, PROBLEM, RESULT
 from symphys.results.table.columns import Row, numeric
 from symphys.results.table.journal import JOURNAL_FILE, Journal, Kept, Stamp, stamp_of

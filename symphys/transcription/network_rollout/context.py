@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.problem import ALIVE, Problem
+from symphys.records import dataclass
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.network_rollout.partition import Partition, partition

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from symphys.codegen.cuda import Device
+from symphys.records import dataclass
 from symphys.shooting import Values, WithoutResiduals
 from symphys.transcription.network_rollout.context import RolloutContext
 from symphys.transcription.network_rollout.forward_backward import (

@@ -8,7 +8,6 @@ gradient of the weights is one product a layer and segment.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen.backends.calls import row_by_row
+from symphys.records import dataclass
 from symphys.transcription.network_rollout.context import RolloutContext
 from symphys.transcription.network_rollout.layers import Layers, NetValues, values_of
 from symphys.transcription.stage import BatchStep

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from symphys.errors import Issue, ProblemError
 from symphys.model.controllers import Net
 from symphys.problem import Constraint, Cost, FeedbackController, Output, Problem, Target
+from symphys.records import dataclass
 from symphys.transcription.formula_names import input_names, spans
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.sampler import swept_inputs

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from time import perf_counter
 from typing import Any
@@ -14,6 +14,7 @@ from symphys.codegen import KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, Description, described
 from symphys.codegen.cuda import DeviceKernel
 from symphys.problem import Problem
+from symphys.records import dataclass
 from symphys.shooting import Nlp, ShootingProblem
 from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions

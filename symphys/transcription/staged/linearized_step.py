@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,7 @@ from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
 from symphys.codegen.slopes import SlopeKernel, compile_slopes
 from symphys.codegen.toolchain.identity import identity_of
 from symphys.codegen.toolchain.warm_start import ProgramSource
+from symphys.records import dataclass
 from symphys.transcription.program import program_identity
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.step_program import (

@@ -9,7 +9,6 @@ Todorov, Control-Limited Differential Dynamic Programming, ICRA 2014, section II
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -29,6 +28,7 @@ from symphys.codegen import (
 )
 from symphys.codegen.backends import PRECISIONS
 from symphys.codegen.toolchain.warm_start import compile_source
+from symphys.records import dataclass
 from symphys.shooting import AffinePolicy
 from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -21,6 +20,7 @@ from symphys.codegen import (
     compile_program,
 )
 from symphys.codegen.backends import PRECISIONS
+from symphys.records import dataclass
 from symphys.types import Array, Expr, Ints
 
 

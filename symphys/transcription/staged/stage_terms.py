@@ -13,7 +13,7 @@ of the last step.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any, Literal
 
@@ -23,6 +23,7 @@ import numpy as np
 from symphys.errors import SymphysError
 from symphys.expression import Formula, MotionPart, parse
 from symphys.problem import Constraint, Cost, Problem, Target
+from symphys.records import dataclass
 from symphys.suggest import quote
 from symphys.transcription.formula_names import spans
 from symphys.transcription.rollout import Rollout

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -10,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen import FunctionCall, MemoryLayout, Place, Program
+from symphys.records import dataclass
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout, call

@@ -11,7 +11,6 @@ initial state is off them is kept.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -27,6 +26,7 @@ from symphys.dynamics.step import max_splits
 from symphys.maths import rotation
 from symphys.model.joints import Joint, JointFrame, KinematicTree, Link, kinematic_trees, tree_joints
 from symphys.model.state_layout import BODY_FIELDS, Layout
+from symphys.records import dataclass
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.stage_functions import ByColumns
 from symphys.types import Array, Expr

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -11,6 +10,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.stage_functions import ReadingFunction, StageFunctions, StepRows, reading
 from symphys.transcription.staged.stage_terms import Kind, StageSymbols, StageTerm, motion_sums, stage_terms

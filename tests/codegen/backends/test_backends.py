@@ -8,7 +8,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from tools.repeats import few
+from tools.repeats import few, thorough
 from worlds.pushed import PUSHED
 from worlds.toys import require
 
@@ -112,7 +112,7 @@ def test_the_first_bad_step_is_named_and_so_is_the_body() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("backend", ["c", "simd"])
+@pytest.mark.parametrize("backend", [thorough("c"), "simd"])
 def test_constraints_and_their_derivatives_reach_nlp_solvers(backend: str, tmp_path: Path) -> None:
     """A constraint at every step, and costs of controls that share lanes."""
     require(backend)

@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from tools.repeats import thorough
 
 from symphys.dynamics.functions import report_function, step_function, trace_step
 from symphys.dynamics.tracing import trace
@@ -61,7 +62,7 @@ def builds(monkeypatch: pytest.MonkeyPatch) -> list[object]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["balls", "box"])
+@pytest.mark.parametrize("name", ["balls", thorough("box")])
 def test_a_step_of_pieces_that_were_there_is_that_built_alone(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     world, asked = (
         world_of(name),

@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from tools.repeats import first
+from tools.repeats import first, thorough
 
 from symphys.dynamics.functions import TracedStep, step_function, trace_step
 from symphys.dynamics.tracing.decorator import repeat, traced, tracing
@@ -67,7 +67,7 @@ def run(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", worlds())
+@pytest.mark.parametrize("name", [thorough(name) if name == "compound" else name for name in worlds()])
 @first("scheme", [Scheme(sweeps=5), Scheme(sweeps=2, warm_start=False), Scheme(sweeps=1)])
 def test_pieces_give_the_whole_step(name: str, scheme: Scheme) -> None:
     compare(worlds()[name], scheme)

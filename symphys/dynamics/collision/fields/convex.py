@@ -6,8 +6,6 @@ is against the triangle that it comes from until the next one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +16,7 @@ from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Convex, Sphere
+from symphys.records import dataclass
 from symphys.types import Expr
 
 EDGES = ((0, 1), (1, 2), (2, 0))

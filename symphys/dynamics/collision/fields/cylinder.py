@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact
@@ -13,6 +11,7 @@ from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Capsule, Cylinder, Sphere
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MIN_AXIS_DISTANCE = 2e-12

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact
@@ -12,6 +10,7 @@ from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.maths.smoothing import TINY_SQUARE, length
 from symphys.model.shapes import Capsule, Ellipsoid, Sphere
+from symphys.records import dataclass
 from symphys.types import Expr
 
 FOOT_STEPS = 5

@@ -13,7 +13,7 @@ was on both bodies for the rest of the step.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import casadi as ca
 
@@ -29,6 +29,7 @@ from symphys.dynamics.collision.contact_geometry import Contact, flipped
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.witness_points import Witness, contact_of
 from symphys.model.shapes import Box
+from symphys.records import dataclass
 from symphys.types import Expr
 
 RIM_SHARE = 0.001

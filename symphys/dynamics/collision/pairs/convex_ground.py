@@ -11,7 +11,6 @@ its faces and rolls over its edges, and no corner that is the deepest is left ou
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import cos, pi, sin
 from typing import Any
 
@@ -23,6 +22,7 @@ from symphys.dynamics.collision.half_space import ball_on_plane
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.terrain import Paraboloid, ball_on_terrain, surface_of
 from symphys.model.shapes import SLOTS, Convex, Plane, Terrain
+from symphys.records import dataclass
 from symphys.types import Expr
 
 Point = Sequence[Any]

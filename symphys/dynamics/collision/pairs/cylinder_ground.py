@@ -7,7 +7,7 @@ up to rounding, no point of its rim is the deepest, and the three are marked on 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import cos, pi, sin
 
 import casadi as ca
@@ -21,6 +21,7 @@ from symphys.dynamics.collision.terrain import ball_on_terrain, surface_of, upwa
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.maths.smoothing import length
 from symphys.model.shapes import Cylinder, Plane, Terrain
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MIN_TILT_SINE = 1e-6

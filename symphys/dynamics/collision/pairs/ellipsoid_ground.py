@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes
@@ -21,6 +19,7 @@ from symphys.dynamics.collision.terrain import (
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.maths.smoothing import length
 from symphys.model.shapes import Ellipsoid, Plane, Terrain
+from symphys.records import dataclass
 from symphys.types import Expr
 
 TOUCH_STEPS = 4

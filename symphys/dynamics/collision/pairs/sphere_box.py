@@ -6,8 +6,6 @@ the ball: it sinks there, and would strike the rim of the next of two boards tha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import Offset, axes
@@ -17,6 +15,7 @@ from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.signed_distance import ball_in_field
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Box, Sphere
+from symphys.records import dataclass
 from symphys.types import Expr
 
 MIN_RIM_APPROACH = 1e-9

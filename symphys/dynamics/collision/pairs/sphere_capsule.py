@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from symphys.dynamics.collision.body_points import axes
@@ -13,6 +11,7 @@ from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.signed_distance import NEWTON_STEPS
 from symphys.dynamics.collision.time_of_impact import contact_along
 from symphys.model.shapes import Capsule, Sphere
+from symphys.records import dataclass
 from symphys.types import Expr
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact, Displacement, Frame
@@ -11,6 +9,7 @@ from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.time_of_impact import MIN_CLOSING_SPEED, NEWTON_STEPS, approaches, clip_to_end
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.model.shapes import Sphere
+from symphys.records import dataclass
 from symphys.types import Expr
 
 TINY_LENGTH = 1e-12
