@@ -18,6 +18,7 @@ import numpy as np
 from symphys.codegen import AdjointDiscount, FunctionCall, MemoryLayout, Place, Program
 from symphys.codegen.program.collection import uncollected
 from symphys.codegen.toolchain.identity import identity_of
+from symphys.dynamics.kept import structure
 from symphys.expression import Formula
 from symphys.model.controllers import Net
 from symphys.model.controllers.net import Activation, Layer, activated
@@ -319,6 +320,23 @@ def program_identity(problem: Problem, exact: bool) -> str | None:
     """Return a key of a rollout's program; problems that differ only in texts and solver options share it."""
     data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in IGNORED_FIELDS}
     return identity_of(data, exact)
+
+
+OF_STEP = ("sensors", "controllers", "forces", "references", "phases", "termination")
+"""Fields of a problem on which its step depends, besides its world and its parameters."""
+
+
+def step_identity(rollout: Rollout, exact: bool) -> str | None:
+    """Return a key of one step: other costs, targets, limits, guesses and durations have the same.
+
+    The duration is part of it where it is free, and where formulas may name it.
+    """
+    problem, parameters, simulation = rollout.problem, rollout.parameters, rollout.problem.simulation
+    world = structure(rollout.world, parameters.symbols, parameters.scheme(simulation))
+    columns = [(name, each.start, each.stop) for name, each in parameters.columns.items()]
+    own = [getattr(problem, name) for name in OF_STEP]
+    timed = simulation if problem.free_duration or any(own) else simulation.dt
+    return identity_of(world, timed, own, columns, rollout.inputs, tuple(rollout.memory.columns), exact)
 
 
 def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:

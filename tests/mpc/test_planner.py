@@ -180,7 +180,7 @@ def test_a_control_may_be_named_by_its_variable() -> None:
     assert made.first(made.start, 0.0).cost == pytest.approx(planner().first(planner().start, 0.0).cost, rel=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_an_input_that_a_force_law_adds_to_may_stand_beside_a_state() -> None:
     """At the end of a step it is that of the step, which follows from the state before: a named part is too."""
     brake = {"name": "brake", "on": "bob.torque", "value": "-brake.c * bob.angular_velocity", "numbers": {"c": 0.1}}

@@ -505,7 +505,7 @@ PUTT = [2.3215, -1.1838]
 """Where the putt goes as the time step goes to 0, from 10 ms, 5 ms and 2.5 ms: its changes halve."""
 
 TABLE = [
-    *rows("acrobot", "ilqr multiple_shooting", "ilqr", solved=None, law=swings_up_acrobot, seeds=20),
+    *rows("acrobot", "ilqr multiple_shooting", "ilqr multiple_shooting", solved=None, law=swings_up_acrobot, seeds=20),
     *rows("air_hockey", "ilqr", "ilqr", law=knocks_the_puck, seeds=5),
     *rows("arm_ball", "ilqr", "ilqr", below=0.5, finer=1, law=rolls_the_ball),
     *rows("arm_reach", {"gradient": 150}, "gradient", solved=None, law=reaches_the_point,
@@ -523,7 +523,7 @@ TABLE = [
     *rows("cart_pole", {"gradient": 150, "least_squares": 8, "ipopt": 25, "cma": 6000},
           law=swings_up_by_the_equations, seeds=2),
     *rows("cart_pole", "least_squares", law=takes_the_least_force, polish=True),
-    *rows("cart_pole_walls", "ilqr", below=0.4702 * 1.001, law=bounces_off_a_wall_once, seeds=3),
+    *rows("cart_pole_walls", "ilqr", "ilqr", below=0.4702 * 1.001, law=bounces_off_a_wall_once, seeds=3),
     *rows("catch", "ilqr", "ilqr", below=0.07, of=5, wanted=5, finer=3),
     *rows("cost_of_transport", "ilqr multiple_shooting ipopt", "multiple_shooting ipopt",
           law=costs_least_transport),
@@ -550,7 +550,7 @@ TABLE = [
     *rows("mini_cheetah_ahead", "ilqr", "ilqr", below=2.0, finer=1, law=lifts_every_foot),
     *rows("parcel", {"least_squares": 6}, "least_squares", answer=[3.6643, 0.5606, 3.7407], within=5e-4,
           law=brings_the_plate(1e-4, 3e-3), polish=True),
-    *rows("parcel", {"gradient": 14}, law=brings_the_plate(0.01, np.inf), seeds=2),
+    *rows("parcel", {"gradient": 14}, "gradient", law=brings_the_plate(0.01, np.inf), seeds=2),
     *rows("parcel", {"ipopt": 15, "cma": 350}, "ipopt cma", law=brings_the_plate(0.01, np.inf), seeds=2),
     *rows("pendulum", "ilqr", below=44.827183 * (1 + 1e-3), law=swings_up_pendulum, seeds=5),
     *rows("planar_hopper", "ilqr", "ilqr", of=3, law=flies_a_parabola),

@@ -87,7 +87,7 @@ def test_v11_box_on_box() -> None:
     assert max(unrest(states, name) for name in ("low", "high")) < STILL
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_v11_capsules_rest_on_each_other() -> None:
     """Brax: rest heights .5, .25 and 1.25: one on end, one on its side, a short one (a ball) on top of the first."""
     tall = Body("tall", 1.0, (0.05, 0.05, 0.02), (Capsule(0.25, 0.25),))

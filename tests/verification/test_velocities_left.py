@@ -56,7 +56,7 @@ def missed(few: Transcription) -> float:
     return float(speeds(rollout, bodies(rollout, record), after - x[1:]).max())
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("text", "sweeps"),
     [

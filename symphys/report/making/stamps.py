@@ -32,6 +32,7 @@ DRAWING = (
     "json_values.py",
     "later.py",
     "model",
+    "records.py",
     "report",
     "results",
     "suggest.py",

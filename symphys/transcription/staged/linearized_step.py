@@ -17,7 +17,7 @@ from symphys.codegen.slopes import SlopeKernel, compile_slopes
 from symphys.codegen.toolchain.identity import identity_of
 from symphys.codegen.toolchain.warm_start import ProgramSource
 from symphys.records import dataclass
-from symphys.transcription.program import program_identity
+from symphys.transcription.program import step_identity
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.step_program import (
     StepArguments,
@@ -207,11 +207,10 @@ class LinearizedStep:
     def source(self, what: str, make: Callable[[], Program], *how: object) -> ProgramSource:
         """Return a program of this step, which need not be made where what is built of it is kept.
 
-        ``how``: all that the program depends on besides the problem and what the step is built for.
+        ``how``: all that the program depends on besides the step.
         """
-        rollout = self.rollout
-        problem, asked = program_identity(rollout.problem, self.exact), (rollout.inputs, tuple(rollout.memory.columns))
-        identity = None if problem is None else identity_of(problem, asked, what, self.parameters, *how)
+        step, varied = step_identity(self.rollout, self.exact), self.arguments.varied.tolist()
+        identity = None if step is None or None in how else identity_of(step, varied, what, *how)
         return ProgramSource(make, identity)
 
     def _kernel(self, source: ProgramSource) -> Kernel:

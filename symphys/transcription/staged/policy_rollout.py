@@ -30,7 +30,7 @@ from symphys.codegen.backends import PRECISIONS
 from symphys.codegen.toolchain.warm_start import compile_source
 from symphys.records import dataclass
 from symphys.shooting import AffinePolicy
-from symphys.transcription.program import step_calls
+from symphys.transcription.program import program_identity, step_calls
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.linearized_step import LinearizedStep
 from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm
@@ -116,7 +116,8 @@ class PolicyRollout:
             return None
         try:
             make = partial(policy_program, self.step, self.sizes, self.costs)
-            source = self.step.source("policy", make, *self.sizes, self.costs is None)
+            whole = program_identity(self.step.rollout.problem, self.step.exact)
+            source = self.step.source("policy", make, *self.sizes, self.costs is None, whole)
             return compile_source(source, (), self.threads, wait=self.step.wait)
         except (KernelUnavailable, ProgramError):
             return None

@@ -65,7 +65,7 @@ def agree(there: Kernel, here: Kernel, Z: Any, within: float) -> None:
     np.testing.assert_allclose(gradient, slopes, atol=within * np.abs(slopes).max())
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 @needs_compiler
 def test_a_hundred_steps_with_contact_are_the_processors(tmp_path: Path) -> None:
     here = compile_program(hopping(), seeded=SEEDED, threads=1)
