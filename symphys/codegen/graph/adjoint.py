@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from symphys.codegen.graph.graph import Graph, Node, ordered
+from symphys.codegen.graph.graph import Graph, Node, made, ordered
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.graph.rewrite import rewritten, with_reciprocals
 from symphys.codegen.program.program import Function
@@ -45,8 +45,8 @@ def with_early_sums(graph: Graph, primal: int) -> Graph:
             terms = [(sign, numbers[y]) for sign, y in _terms(graph, x, within)]
             numbers[x] = _summed(new, terms, _times(new, ready))
         else:
-            operands = ordered(node.op, tuple(numbers[y] for y in node.operands))
-            numbers[x] = new.put(Node(node.op, operands, node.at, node.value))
+            operands = ordered(node.op, tuple(map(numbers.__getitem__, node.operands)))
+            numbers[x] = new.put(made(node.op, operands, node.at, node.value))
     new.results = [[numbers[x] for x in result] for result in graph.results]
     last = Graph(graph.sizes)
     numbers = rewritten(new, last, lambda into, _, node: into.put(node))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 
-from symphys.codegen.graph.graph import Graph, Node, ordered
+from symphys.codegen.graph.graph import Graph, Node, made, ordered
 from symphys.codegen.graph.operations import MASKS
 from symphys.records import dataclass
 
@@ -16,11 +16,10 @@ Change = Callable[[Graph, int, Node], int]
 def rewritten(graph: Graph, into: Graph, change: Change) -> dict[int, int]:
     """Copy the needed nodes into another graph, each as ``change`` wants it; returns their new numbers."""
     numbers: dict[int, int] = {}
+    moved = numbers.__getitem__
     for x in graph.needed():
-        node = graph.nodes[x]
-        operands = ordered(node.op, tuple(numbers[y] for y in node.operands))
-        moved = Node(node.op, operands, node.at, node.value)
-        numbers[x] = change(into, x, moved)
+        op, operands, at, value = graph.nodes[x]
+        numbers[x] = change(into, x, made(op, ordered(op, tuple(map(moved, operands))), at, value))
     return numbers
 
 
@@ -77,12 +76,14 @@ def fused_results(graph: Graph) -> set[int]:
 def _found_in(graph: Graph, other: Graph) -> dict[int, int]:
     """Return the nodes that another graph has too, and their numbers there."""
     found: dict[int, int] = {}
-    for x, node in enumerate(graph.nodes):
-        if all(y in found for y in node.operands):
-            operands = ordered(node.op, tuple(found[y] for y in node.operands))
-            number = other.numbers.get(Node(node.op, operands, node.at, node.value))
-            if number is not None:
-                found[x] = number
+    for x, (op, operands, at, value) in enumerate(graph.nodes):
+        try:
+            there = tuple(map(found.__getitem__, operands))
+        except KeyError:
+            continue
+        number = other.numbers.get(made(op, ordered(op, there), at, value))
+        if number is not None:
+            found[x] = number
     return found
 
 
