@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from symphys import files
+from symphys.records import dataclass
 from symphys.results.config import Config, case_name
 from symphys.results.file_names import (
     CHECKPOINT,
@@ -27,7 +27,7 @@ WRITTEN = (RESULT, CHECKPOINT, CONFIG, TRAJECTORY, GUESS, GAINS, MULTIPLIERS, SC
 """Files of a run besides the problem; the result is removed first, since nothing counts without it."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class RunFolder:
     """The files of one run; ``symphys.results.file_names`` lists what each holds."""
 
