@@ -9,7 +9,7 @@ from __future__ import annotations
 if __name__ != "symphys.solvers":
     raise ImportError(f"this package installs as symphys.solvers: import that, not {__name__!r}")
 
-from collections.abc import Iterator, MutableMapping
+from collections import UserDict
 from difflib import get_close_matches
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -59,39 +59,15 @@ __all__ = [
 ]
 
 
-class Catalogue(MutableMapping[str, Solver[Any]]):
-    """Solvers by name. The module of each is imported when it is first asked for."""
-
-    def __init__(self, modules: dict[str, str]) -> None:
-        """Begin with the names of modules in ``methods``, which have the solver under its name in capitals."""
-        self._found: dict[str, Solver[Any] | str] = dict(modules)
+class Catalogue(UserDict[str, Any]):
+    """Solvers by name. The module of each, in ``methods``, is imported when it is first asked for."""
 
     def __getitem__(self, name: str) -> Solver[Any]:
-        """Return the solver called ``name``."""
-        found = self._found[name]
-        if isinstance(found, str):
-            found = self._found[name] = getattr(import_module(f"{__name__}.methods.{found}"), name.upper())
+        """Return the solver called ``name``; its module has it under this name in capitals."""
+        if isinstance(self.data[name], str):
+            self.data[name] = getattr(import_module(f"{__name__}.methods.{self.data[name]}"), name.upper())
+        found: Solver[Any] = self.data[name]
         return found
-
-    def __setitem__(self, name: str, solver: Solver[Any]) -> None:
-        """Add a solver."""
-        self._found[name] = solver
-
-    def __delitem__(self, name: str) -> None:
-        """Remove a solver."""
-        del self._found[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Iterate over names."""
-        return iter(self._found)
-
-    def __len__(self) -> int:
-        """Return the number of solvers."""
-        return len(self._found)
-
-    def __contains__(self, name: object) -> bool:
-        """Whether there is a solver called ``name``; its module is not imported."""
-        return name in self._found
 
 
 MODULES = {
@@ -106,7 +82,6 @@ MODULES = {
 }
 """The module of each solver in ``methods``."""
 SOLVERS = Catalogue(MODULES)
-"""All solvers by name."""
 OPTIONS = {f"methods.{home}": (f"{name.title().replace('_', '')}Options",) for name, home in MODULES.items()}
 __getattr__ = later(__name__, OPTIONS)
 solve_together = solve_multi_start

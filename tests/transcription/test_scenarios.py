@@ -180,12 +180,12 @@ def test_evaluations_are_those_of_the_numbers_in_a_file(walker: Transcription, p
     """Values and gradients of rows against files with the same numbers."""
     scenario = walker.shooting.scenario
     assert scenario is not None
-    z, drawn = np.array([[0.3, -0.2]]), scenario.draw(np.random.default_rng(2), 2)
+    z, drawn = np.array([[0.3, -0.2]]), scenario.draw(np.random.default_rng(2), 3)
     numbers = columns(Sampler(walker.problem), drawn.numbers)
     numbers["torso.force"][:] = 0
     found = scenario.gradient(z, ScenarioSamples(0, np.concatenate(list(numbers.values()), axis=1)), 0.0)
     assert found.gradient is not None
-    for k in range(2):
+    for k in range(3):
         settings = {
             "ground.friction": float(numbers["ground.friction"][k, 0]),
             **{f"body.{body}.mass": float(numbers[f"{body}.mass"][k, 0]) for body in ("torso", "leg")},

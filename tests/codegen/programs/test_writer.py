@@ -41,7 +41,7 @@ def compare(functions: list[Any], cache: Cache, z: Any, precision: Any = "double
 
 
 @pytest.mark.slow
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(st.lists(step, min_size=1, max_size=25), min_size=4, max_size=4),
     st.lists(st.lists(st.floats(-3, 3, width=16).filter(bool), min_size=5, max_size=5), min_size=3, max_size=3),
