@@ -121,7 +121,7 @@ def interface(robots: int, steps: int, repeats: int) -> Iterator[Row]:
     rollout = symphys.compile(table_problem([], steps))
     rollout.finish()
     Z = rollout.z() + 0.01 * np.random.default_rng(0).standard_normal((robots, rollout.n))
-    evaluator = rollout._made.shooting.evaluator
+    evaluator = rollout._made.shooting.evaluator.make()
     kernel, parameters, seeds = evaluator.kernel, evaluator.parameters(0.0), evaluator.steepest
     calls = {"inner": lambda: kernel.gradient(Z, seeds, parameters), "outer": lambda: rollout.gradient(Z)}
     times = all_turns(calls, repeats)

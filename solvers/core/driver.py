@@ -149,6 +149,7 @@ def make_solver(
     threaded: bool = False,
     scenarios: bool | None = False,
     feedback: MakeGains = without_feedback,
+    by_steps: bool = False,
 ) -> Solver[O_inv]:
     """Make a solver from its parts; parameters that are not described here are fields of ``Solver``.
 
@@ -170,6 +171,8 @@ def make_solver(
     ) -> Outcome:
         """Solve as ``interface.Solve`` has it."""
         check(options)
+        if by_steps and problem.by_steps is not None:
+            problem = replace(problem, evaluator=problem.by_steps)
 
         def run_stage(
             context: StageContext, saved: dict[str, object] | None, recorder: IterationRecorder
@@ -184,7 +187,7 @@ def make_solver(
         )
         return Driver(request, run_stage, rate(options, seed)).run()
 
-    return Solver(name, summary, Options, solve, prepare, threaded, scenarios)
+    return Solver(name, summary, Options, solve, prepare, threaded, scenarios, by_steps)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from symphys.records import dataclass
-from symphys.shooting import Evaluator, ScenarioEvaluator, ScenarioSamples, ShootingProblem, Values
+from symphys.shooting import Evaluator, ScenarioEvaluator, ScenarioSamples, ShootingProblem, StagedMotion, Values
 from symphys.solvers.core.outcome import Counts
 from symphys.solvers.core.point import Incumbent, Point
 from symphys.types import Array
@@ -85,6 +85,13 @@ class CountingEvaluator:
     def value(self, z: Array) -> Point:
         """Evaluate one rollout at z, which must lie within the bounds."""
         return self.values([z])[0]
+
+    def along(self, motion: StagedMotion) -> Point:
+        """Evaluate a z whose motion is known; simulate it where the problem is not evaluated by steps."""
+        steps = self.problem.by_steps
+        if steps is None:
+            return self.value(motion.z)
+        return self._offered(self._points(motion.z[None], steps.along(motion.z[None], motion.x[None])))[0]
 
     def values(self, population: Sequence[Array]) -> list[Point]:
         """Evaluate one rollout for each point in one call; stop after it if one of them meets everything."""

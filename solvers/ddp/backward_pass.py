@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,24 +31,19 @@ class Policy:
     """The result of a backward pass.
 
     Attributes:
-        gains: how the new knots of each step answer: ``ahead`` (w,), and ``back`` (w, n + o + s) of state, old knots
-            and static entries; None for steps that decide nothing.
+        ahead: (N, w) the change of the new knots of each step; 0 of knots that are none, see ``KnotArrays``.
+        back: (N, w, n + o + s) how they answer the state, old knots and static entries.
         statics: (s,) the change of the static entries of z.
         first, second: the fall of the objective that is expected of a step of length a: a first + a^2 second.
         gradient: (len(z),) of the augmented objective; 0 where it was not asked for.
     """
 
-    gains: Sequence[Feedback | None]
+    ahead: Array
+    back: Array
     statics: Array
     first: float
     second: float
     gradient: Array
-
-    @cached_property
-    def aligned(self) -> tuple[Array, Array]:
-        """Return ``ahead`` (N, w) and ``back`` (N, w, n) of all steps, where their knots are aligned."""
-        gains = [gain for gain in self.gains if gain is not None]
-        return np.array([gain.ahead for gain in gains]), np.array([gain.back for gain in gains])
 
 
 def backward_pass(
@@ -72,7 +66,7 @@ def backward_pass(
         bounds: of z.
         damping: of Levenberg and Marquardt: added to the Hessian by knots, in units of their scales.
         gradient: whether it is computed. It takes a costate; without, slopes are those of the whole cost to go.
-        compiled: takes runs of small steps.
+        compiled: makes costates, and takes runs of small steps.
 
     Source: Tassa, Erez, Todorov, Synthesis and stabilization of complex behaviors through online trajectory
     optimization, IROS 2012. Theirs has one slope of the cost to go; here it is a costate and what decisions add to
@@ -80,7 +74,7 @@ def backward_pass(
     """
     # Eliminate all knots, backwards over the steps.
     costate = gradient or bool(knots.padded.old.size or len(statics))
-    made = _Steps(costs, knots, statics, bounds, damping, costate)
+    made = _Steps(costs, knots, statics, bounds, damping, costate, compiled)
     found = riccati_recursion(made.from_end(slopes), made.last(), compiled)
     if found is None:
         return None
@@ -90,8 +84,7 @@ def backward_pass(
     if chosen is None:
         return None
     first, second = found.first + float(slope @ chosen), found.second + float(chosen @ curve @ chosen) / 2
-    gains = made.gains(found.feedback[::-1])
-    return Policy(gains, chosen, first, second, made.gradient)
+    return Policy(*made.gains(found.feedback), chosen, first, second, made.gradient)
 
 
 class _Steps:
@@ -104,8 +97,16 @@ class _Steps:
     """
 
     def __init__(
-        self, costs: Expansion, knots: KnotSteps, statics: Ints, bounds: Bounds, damping: float, costate: bool
+        self,
+        costs: Expansion,
+        knots: KnotSteps,
+        statics: Ints,
+        bounds: Bounds,
+        damping: float,
+        costate: bool,
+        compiled: CompiledRecursion | None,
     ) -> None:
+        self._compiled = compiled
         self.costs, self.knots, self.statics, self.padded = costs, knots, statics, knots.padded
         self._with_costate = costate
         self.gradient = np.zeros(len(bounds.scale))
@@ -120,6 +121,7 @@ class _Steps:
         last = slice(0, costs.x.shape[1]) if self._asked is None else _selection(self._asked[-1])
         self._lives = [last] * (len(knots) + 1)
         self._start = np.zeros((costs.x.shape[1], len(statics)))
+        self._runs = list[tuple[slice, Selection]]()
 
     @property
     def _sizes(self) -> tuple[int, int, int, int]:
@@ -167,25 +169,14 @@ class _Steps:
         slope = cost.slope @ start + self._start.T @ self._costate + self.costs.s
         return slope, start.T @ cost.curve @ start + self.costs.ss
 
-    def gains(self, feedback: Sequence[Feedback | None]) -> Sequence[Feedback | None]:
-        """Return the feedback of all steps by the whole tangent and the knots that there are."""
-        n, o, s, _ = self._sizes
-        lives = {id(each): each for each in self._lives[:-1]}.values()
-        if not o and not s and (self.padded.new >= 0).all() and all(_is_whole(each, n) for each in lives):
-            return feedback
-        return [self._gain(k, each) for k, each in enumerate(feedback)]
-
-    def _gain(self, k: int, feedback: Feedback | None) -> Feedback | None:
-        """Return the feedback of step k by the whole tangent; None where it decides nothing."""
-        w, o, (n, most, s, _) = len(self.knots[k].new), len(self.knots[k].old), self._sizes
-        if feedback is None or not w:
-            return None
-        back = np.zeros((w, n + o + s))
-        live = feedback.back.shape[1] - most - s
-        back[:, :n][:, self._lives[k]] = feedback.back[:w, :live]
-        back[:, n : n + o] = feedback.back[:w, live : live + o]
-        back[:, n + o :] = feedback.back[:w, live + most :]
-        return Feedback(feedback.ahead[:w], back)
+    def gains(self, feedback: Sequence[Feedback]) -> Feedback:
+        """Return the feedback of all steps by the whole tangent, from that of the runs that were made."""
+        (n, o, s, w), count = self._sizes, len(self.knots)
+        whole = Feedback(np.zeros((count, w)), np.zeros((count, w, n + o + s)))
+        for (steps, live), (ahead, back) in zip(self._runs, feedback, strict=True):
+            whole.ahead[steps] = ahead
+            whole.back[steps, :, _columns(live, n, n + o + s)] = back
+        return whole
 
     def _curves_of_costs(self) -> Array:
         """Return the curvatures (N, c, c) of all costs by the columns (state, old knots, static entries, new knots)."""
@@ -233,16 +224,19 @@ class _Steps:
         live, later, room = self._lives[first], self._lives[end], [each[steps] for each in self._room]
         beside = self._carried(first, end)
         if not _is_whole(live, n):
-            columns = np.concatenate([np.arange(n)[live], np.arange(n, after.shape[2])])
+            columns = _columns(live, n, after.shape[2])
             after, slopes, curves = after[:, :, columns], slopes[:, columns], curves[:, columns][:, :, columns]
             beside = beside[:, :, columns]
         parts, last = (slopes, curves, *room), end - first - 1
         if _is_same(live, later):
+            self._runs.append((steps, live))
             yield LinearSteps(np.concatenate([after[:, live], beside], axis=1), *parts)
             return
+        self._runs.append((slice(end - 1, end), live))
         through = np.concatenate([after[last:, later], beside[last:]], axis=1)
         yield LinearSteps(through, *(each[last:] for each in parts))
         if last:
+            self._runs.append((slice(first, end - 1), live))
             through = np.concatenate([after[:last, live], beside[:last]], axis=1)
             yield LinearSteps(through, *(each[:last] for each in parts))
 
@@ -256,14 +250,16 @@ class _Steps:
 
     def _by_costate(self, first: int, run: Linearized) -> tuple[Array, Array]:
         """Return slopes (K, m) by inputs and (K, s) by static entries of the objective, and move on the costate."""
-        costs, by_inputs = self.costs, np.empty((len(run.a), run.b.shape[2]))
-        by_statics = np.zeros((len(run.a), len(self.statics)))
-        for k in reversed(range(len(run.a))):
-            by_inputs[k] = costs.u[first + k] + self._costate @ run.b[k]
-            if by_statics.size:
-                by_statics[k] = self._costate @ run.c[k]
-            self._costate = costs.x[first + k] + self._costate @ run.a[k]
-        return by_inputs, by_statics
+        steps = slice(first, first + len(run.a))
+        slopes = self.costs.x[steps]
+        if self._compiled is not None:
+            after, self._costate = self._compiled.costates(run.a, slopes, self._costate)
+        else:
+            after = np.empty_like(slopes)
+            for k in reversed(range(len(run.a))):
+                after[k] = self._costate
+                self._costate = slopes[k] + self._costate @ run.a[k]
+        return self.costs.u[steps] + (after[:, None] @ run.b)[:, 0], (after[:, None] @ run.c)[:, 0]
 
 
 def _selection(chosen: NDArray[np.bool_]) -> Selection:
@@ -273,6 +269,11 @@ def _selection(chosen: NDArray[np.bool_]) -> Selection:
         return slice(0, 0)
     first, last = int(numbers[0]), int(numbers[-1])
     return slice(first, last + 1) if last - first + 1 == len(numbers) else numbers
+
+
+def _columns(live: Selection, n: int, count: int) -> Selection:
+    """Return the columns of a selection of the first n numbers, then of all from n to ``count``."""
+    return slice(None) if _is_whole(live, n) else np.concatenate([np.arange(n)[live], np.arange(n, count)])
 
 
 def _is_whole(selection: Selection, n: int) -> bool:

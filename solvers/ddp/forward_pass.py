@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from symphys.shooting import AffinePolicy, Followed, StagedMotion, StagedProblem
 from symphys.solvers.ddp.backward_pass import Policy
-from symphys.solvers.ddp.knots import KnotStep, PaddedKnots
-from symphys.solvers.ddp.riccati import Feedback
+from symphys.solvers.ddp.knots import PaddedKnots
 from symphys.types import Array
 
 
@@ -50,24 +48,9 @@ def forward_pass(
 
 def affine(motion: StagedMotion, policy: Policy, knots: PaddedKnots) -> AffinePolicy:
     """Return the policy as arrays."""
-    lower, upper = knots.bounds
-    if knots.steps.aligned and not len(policy.statics):
-        about = motion.x[:-1], np.zeros(knots.old.shape), motion.z[knots.new]
-        return AffinePolicy(*about, *policy.aligned, knots.weights, knots.keep, lower, upper)
-    z, (count, o), s = np.append(motion.z, 0.0), knots.old.shape, len(policy.statics)
-    n = next((gain.back.shape[1] - len(step.old) - s for gain, step in _pairs(policy, knots) if gain is not None), 0)
-    ahead, back = np.zeros(knots.new.shape), np.zeros((*knots.new.shape, n + o + s))
-    for k, (gain, step) in enumerate(_pairs(policy, knots)):
-        if gain is not None:
-            rows, end = len(gain.ahead), n + len(step.old)
-            ahead[k, :rows], back[k, :rows, :end] = gain.ahead, gain.back[:, :end]
-            back[k, :rows, n + o :] = gain.back[:, end:]
-    parts = motion.x[:count], z[knots.old], z[knots.new], ahead, back, knots.weights, knots.keep
-    return AffinePolicy(*parts, lower, upper)
-
-
-def _pairs(policy: Policy, knots: PaddedKnots) -> Iterator[tuple[Feedback | None, KnotStep]]:
-    return zip(policy.gains, knots.steps, strict=True)
+    z, count = np.append(motion.z, 0.0), len(knots.new)
+    about = motion.x[:count], z[knots.old], z[knots.new]
+    return AffinePolicy(*about, policy.ahead, policy.back, knots.weights, knots.keep, *knots.bounds)
 
 
 def follow_policy(

@@ -54,12 +54,13 @@ def gain_arrays(
     step, entry, by_state = np.zeros(total, np.int64), np.zeros(total, np.int64), np.zeros((total, n))
     others, by_others = np.full((total, width), -1), np.zeros((total, width))
     first = 0
-    for k, (knot, gain) in enumerate(zip(knots, policy.gains, strict=True)):
-        if gain is not None:
-            rows, beside = slice(first, first + len(knot.new)), np.concatenate([knot.old, statics])
-            step[rows], entry[rows], by_state[rows] = k, knot.new, gain.back[:, :n]
-            others[rows, : len(beside)], by_others[rows, : len(beside)] = beside, gain.back[:, n:]
-            first = rows.stop
+    for k, knot in enumerate(knots):
+        rows, beside = slice(first, first + len(knot.new)), np.concatenate([knot.old, statics])
+        back = policy.back[k, : len(knot.new)]
+        of_others = np.concatenate([back[:, n : n + len(knot.old)], back[:, back.shape[1] - len(statics) :]], axis=1)
+        step[rows], entry[rows], by_state[rows] = k, knot.new, back[:, :n]
+        others[rows, : len(beside)], by_others[rows, : len(beside)] = beside, of_others
+        first = rows.stop
     arrays = {"step": step, "knot": entry, "by_state": by_state, "others": others, "by_others": by_others}
     return {"z": motion.z, "states": motion.x, **arrays}
 

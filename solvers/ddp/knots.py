@@ -108,21 +108,24 @@ class PaddedKnots:
 
 def knot_steps(problem: StagedProblem) -> KnotSteps:
     """Return the knots of each step; knots that never act are in none."""
-    steps, m = problem.steps, problem.input_size
-    weights = problem.weights.tocsr()
-    rows, columns = weights.nonzero()
-    first, last = dict[int, int](), dict[int, int]()
-    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
-        k = row // max(m, 1)
-        first[column] = min(k, first.get(column, k))
-        last[column] = max(k, last.get(column, k))
-    new = [np.array(sorted(c for c, k in first.items() if k == step), np.int64) for step in range(steps)]
-    found = KnotSteps()
-    old = np.zeros(0, np.int64)
+    steps, m, weights = problem.steps, problem.input_size, problem.weights.tocsr().tocoo()
+    rows, columns, values = (each[weights.data != 0] for each in (weights.row, weights.col, weights.data))
+    at, count = rows // max(m, 1), weights.shape[1]
+    first, last = np.full(count, steps), np.full(count, -1)
+    np.minimum.at(first, columns, at)
+    np.maximum.at(last, columns, at)
+    order = np.argsort(at, kind="stable")
+    ends = np.searchsorted(at[order], np.arange(steps + 1))
+    begun = np.argsort(first, kind="stable")
+    begins = np.searchsorted(first[begun], np.arange(steps + 1))
+    found, old, place = KnotSteps(), np.zeros(0, np.int64), np.zeros(count, np.int64)
     for k in range(steps):
-        acting = np.concatenate([old, new[k]])
-        kept = np.array([i for i, column in enumerate(acting.tolist()) if last[column] > k], np.int64)
-        block = weights[k * m : (k + 1) * m][:, acting].toarray()
-        found.append(KnotStep(old, new[k], np.asarray(block, float), kept))
+        new = begun[begins[k] : begins[k + 1]]
+        acting = np.concatenate([old, new])
+        place[acting] = np.arange(len(acting))
+        entries, block = order[ends[k] : ends[k + 1]], np.zeros((m, len(acting)))
+        block[rows[entries] - k * m, place[columns[entries]]] = values[entries]
+        kept = np.flatnonzero(last[acting] > k)
+        found.append(KnotStep(old, new, block, kept))
         old = acting[kept]
     return found

@@ -44,7 +44,7 @@ class CostToGo(NamedTuple):
 
 
 class Feedback(NamedTuple):
-    """The decisions of a step: ``ahead`` (w,), and gains ``back`` (w, r) by the state; 0 at active bounds."""
+    """The decisions of K steps: ``ahead`` (K, w), and gains ``back`` (K, w, r) by the state; 0 at active bounds."""
 
     ahead: Array
     back: Array
@@ -54,12 +54,12 @@ class RiccatiSolution(NamedTuple):
     """The result of a recursion.
 
     Attributes:
-        feedback: of the steps, from the last to the first; None for those without decisions.
+        feedback: of the runs, in their order.
         first, second: the fall of the costs that is expected of a step of length a: a first + a^2 second.
         cost: to go, of the first state.
     """
 
-    feedback: list[Feedback | None]
+    feedback: list[Feedback]
     first: float
     second: float
     cost: CostToGo
@@ -78,7 +78,7 @@ def riccati_recursion(
     Source: Tassa, Mansard, Todorov, Control-Limited Differential Dynamic Programming, ICRA 2014, section III. The
     damping, of Levenberg and Marquardt, acts on decisions alone: cost to go is what they cost without it.
     """
-    cost, found = last, list[Feedback | None]()
+    cost, found = last, list[Feedback]()
     first = second = 0.0
     for run in runs:
         if compiled is not None and compiled.suits(run.through):
@@ -86,38 +86,38 @@ def riccati_recursion(
             if made is None:
                 return None
             ahead, back, expected, (slope, curve) = made
-            found.extend(map(Feedback, ahead[::-1], back[::-1]) if ahead.size else [None] * len(ahead))
+            feedback, cost = Feedback(ahead, back), CostToGo(slope, curve)
         else:
-            solved = _taken(run, cost, found)
+            solved = _taken(run, cost)
             if solved is None:
                 return None
-            expected, (slope, curve) = solved
-        first, second, cost = first + expected[0], second + expected[1], CostToGo(slope, curve)
+            feedback, expected, cost = solved
+        found.append(feedback)
+        first, second = first + expected[0], second + expected[1]
     return RiccatiSolution(found, first, second, cost)
 
 
-def _taken(
-    run: LinearSteps, cost: CostToGo, found: list[Feedback | None]
-) -> tuple[tuple[float, float], CostToGo] | None:
-    """Take a run of steps and append their feedback; return the fall that is expected, and the cost to go before it."""
+def _taken(run: LinearSteps, cost: CostToGo) -> tuple[Feedback, tuple[float, float], CostToGo] | None:
+    """Take a run of steps; return their feedback, the fall that is expected, and the cost to go before it."""
     slope, curve = cost
     first = second = 0.0
-    for through, own_slope, own_curve, lower, upper, damping in zip(*(each[::-1] for each in run), strict=True):
+    count, w = run.damping.shape
+    rest = run.through.shape[2] - w
+    found = Feedback(np.empty((count, w)), np.empty((count, w, rest)))
+    for k in reversed(range(count)):
+        through, own_slope, own_curve, lower, upper, damping = (each[k] for each in run)
         # Q = cost of the step + cost to go of the next state: slope and curvature by (state, decisions).
         total = own_slope + slope @ through
         whole = own_curve + through.T @ (curve @ through)
-        if not len(damping):
+        if not w:
             slope, curve = total, whole
-            found.append(None)
             continue
-        rest = len(total) - len(damping)
         # Minimise Q over the decisions within bounds; feedback of those at no bound.
         by_decisions, hessian, cross = total[rest:], whole[rest:, rest:], whole[rest:, :rest]
         made = _decided(hessian, damping, by_decisions, cross, lower, upper)
         if made is None:
             return None
-        ahead, back = made
-        found.append(made)
+        found.ahead[k], found.back[k] = ahead, back = made
         # Expected change for a step length t: first t + second t^2; then the cost to go of the state.
         along = hessian @ ahead
         first, second = first + float(by_decisions @ ahead), second + float(ahead @ along) / 2
@@ -125,11 +125,13 @@ def _taken(
         # back' hessian back = -back' cross - back' damping back, since back solves the damped system
         curve = whole[:rest, :rest] + (cross - damping[:, None] * back).T @ back
         curve = 0.5 * (curve + curve.T)
-    return (first, second), CostToGo(slope, curve)
+    return found, (first, second), CostToGo(slope, curve)
 
 
-def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: Array, upper: Array) -> Feedback | None:
-    """Return the optimal decisions within bounds, and the gains of those that are at no bound."""
+def _decided(
+    hessian: Array, damping: Array, slope: Array, cross: Array, lower: Array, upper: Array
+) -> tuple[Array, Array] | None:
+    """Return the optimal decisions (w,) within bounds, and the gains (w, r) of those that are at no bound."""
     damped = hessian.copy()
     damped.ravel()[:: len(slope) + 1] += damping
     factor, fault = lapack().dpotrf(damped, lower=1, clean=0)
@@ -138,11 +140,11 @@ def _decided(hessian: Array, damping: Array, slope: Array, cross: Array, lower: 
     both = lapack().dpotrs(factor, np.concatenate([slope[:, None], cross], axis=1), lower=1)[0]
     ahead = -both[:, 0]
     if (ahead >= lower).all() and (ahead <= upper).all():
-        return Feedback(ahead, -both[:, 1:])
+        return ahead, -both[:, 1:]
     found = solve_box_qp(damped, slope, lower, upper, np.zeros_like(slope))
     if found is None:
         return None
     back = np.zeros_like(cross)
     if found.factor is not None:
         back[found.free] = -lapack().dpotrs(found.factor, cross[found.free], lower=1)[0]
-    return Feedback(found.step, back)
+    return found.step, back

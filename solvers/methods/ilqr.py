@@ -118,7 +118,7 @@ class Ilqr(Method[IlqrState]):
 
     def init(self) -> Iteration[IlqrState] | StopReason:
         """Simulate the guess."""
-        point = self.evaluator.value(self.start)
+        point = self.evaluator.along(self._motion(self.start))
         if not point.finite:
             return not_finite(point)
         limits = len(self.staged.lower)
@@ -153,7 +153,7 @@ class Ilqr(Method[IlqrState]):
     def terminate(self, state: IlqrState) -> StopReason | None:
         """Return the reason if the state is stationary, the budget used up, or progress has stalled."""
         if state.settled:
-            point = self.evaluator.value(state.z)
+            point = self.evaluator.along(self._motion(state.z))
             return (
                 converged(self.evaluator)
                 if len(self.staged.lower)
@@ -171,7 +171,7 @@ class Ilqr(Method[IlqrState]):
         """Return the state after a step, with its point; start computing the slopes about it."""
         if before.iteration + 1 < self.options.iterations:
             self._runs(self._motion(after.z))
-        point = self.evaluator.value(after.z)
+        point = self.evaluator.along(self._motion(after.z))
         if not point.finite:
             return not_finite(point)
         state = replace(after, iteration=before.iteration + 1, progress=before.progress.after(after.value))
@@ -180,7 +180,7 @@ class Ilqr(Method[IlqrState]):
 
     def _settle(self, state: IlqrState, policy: Policy) -> Iteration[IlqrState] | StopReason:
         """Update the multipliers at a minimum of the augmented objective, or end."""
-        point = self.evaluator.value(state.z)
+        point = self.evaluator.along(self._motion(state.z))
         norm = self.evaluator.stationarity(state.z, policy.gradient)
         after = replace(state, iteration=state.iteration + 1, settled=True)
         if not len(self.staged.lower):
@@ -211,6 +211,7 @@ class Ilqr(Method[IlqrState]):
         """Return the motion of z; that of the last step is cached."""
         if self._kept is None or not np.array_equal(self._kept.z, z):
             self._kept = self.staged.roll_out(z, self.evaluator.smoothing)
+            self.evaluator.counter.add(Counts(rollouts=1))
         return self._kept
 
     _kept: StagedMotion | None = None
@@ -261,4 +262,5 @@ ILQR = make_solver(
     refusal=refusal,
     constraints=True,
     feedback=gains_about,
+    by_steps=True,
 )

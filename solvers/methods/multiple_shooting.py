@@ -324,4 +324,5 @@ MULTIPLE_SHOOTING = make_solver(
     check=check,
     refusal=refusal,
     constraints=True,
+    by_steps=True,
 )

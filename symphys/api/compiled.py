@@ -189,7 +189,9 @@ def compile(
     """
     require_backend(backend)
     read = load(problem)
-    return CompiledRollout(read, smoothing, transcribed(read, smoothing == 0, backend, threads), (backend, threads))
+    made = transcribed(read, smoothing == 0, backend, threads)
+    _ = made.backend  # it is built when it is asked for, which is now
+    return CompiledRollout(read, smoothing, made, (backend, threads))
 
 
 def compile_step(

@@ -203,3 +203,17 @@ __attribute__((visibility("default"))) int riccati(W steps, W next, W n, W w, co
   free(free_at);
   return done;
 }
+
+/* The costates after steps, (steps, n), the last step first: costate = slope + costate a. Matrices a (n, n) lie `step`
+   numbers apart, their rows `row`. */
+__attribute__((visibility("default"))) void costates(W steps, W n, W step, W row, const double *a, const double *slopes,
+            const double *last, double *after, double *first) {
+  memcpy(after + (steps - 1) * n, last, (size_t)n * sizeof(double));
+  for (W k = steps - 1; k >= 0; k--) {
+    const double *v = after + k * n;
+    double *to = k ? after + (k - 1) * n : first;
+    memcpy(to, slopes + k * n, (size_t)n * sizeof(double));
+    for (W i = 0; i < n; i++)
+      for (W j = 0; j < n; j++) to[j] += v[i] * a[k * step + i * row + j];
+  }
+}

@@ -164,8 +164,8 @@ class Planner:
         # Expand about the plan, compute the policy, and search along it.
         about = LocalExpansion(self.stages, self._motion(plan), self._limits, self._knots, self._scale)
         policy = about.policy(self.damping, gradient=False)
-        if policy is not None and all(np.isfinite(each).all() for each in policy.aligned):
-            best, back = about.search(policy, self._costs), policy.aligned[1]
+        if policy is not None and all(np.isfinite(each).all() for each in (policy.ahead, policy.back)):
+            best, back = about.search(policy, self._costs), policy.back
             if best.value < plan.cost:
                 self.damping = max(self.horizon.damping, self.damping * DAMPING_SHRINK)
                 decisions = best.motion.z[self._new]

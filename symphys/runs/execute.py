@@ -195,6 +195,8 @@ def solve(
     with a few words before each part of judging. ``bounded``: whether a limit may kill the process, so that the
     solver's outcome is saved before it is judged.
     """
+    if solver(job.config.solver).by_steps:
+        transcription = transcription.by_steps
     shooting = replace(transcription.shooting, multipliers=job.guess.multipliers)
     log(f"evaluated by {transcription.backend}")
     for note in job.guess.notes:

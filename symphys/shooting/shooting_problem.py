@@ -94,6 +94,38 @@ class Evaluator(Protocol):
         ...
 
 
+class StepwiseEvaluator(Evaluator, Protocol):
+    """An ``Evaluator`` that takes one step after the other."""
+
+    def along(self, Z: Array, X: Array) -> Values:
+        """Return the values of motions of Z (batch, n) whose states X (batch, N + 1, nx) are known."""
+        ...
+
+
+class LaterEvaluator:
+    """An ``Evaluator`` that is made when it is first asked for values."""
+
+    def __init__(self, make: Callable[[], Evaluator]) -> None:
+        """Keep ``make``, which returns the same evaluator whenever it is called."""
+        self.make = make
+
+    def value(self, Z: Array, smoothing: float) -> Values:
+        """Implement ``Evaluator.value``."""
+        return self.make().value(Z, smoothing)
+
+    def gradient(self, Z: Array, smoothing: float) -> Values:
+        """Implement ``Evaluator.gradient``."""
+        return self.make().gradient(Z, smoothing)
+
+    def residuals(self, Z: Array, smoothing: float) -> Values:
+        """Implement ``Evaluator.residuals``."""
+        return self.make().residuals(Z, smoothing)
+
+    def jacobian(self, Z: Array, smoothing: float) -> Values:
+        """Implement ``Evaluator.jacobian``."""
+        return self.make().jacobian(Z, smoothing)
+
+
 class WithoutResiduals:
     """The half of ``Evaluator`` that problems without ``squares`` lack."""
 
@@ -222,6 +254,7 @@ class ShootingProblem:
         scenario: evaluates points in samples of the problem's scenarios; None: it has none.
         staged: makes the problem as a chain of steps when it is first asked for; SymphysError where formulas look at
             more than one state. None: there is none, as of problems with scenarios.
+        by_steps: evaluates by the steps of ``staged``, for solvers that compile no rollout; None: there is none.
         guessed_states: (z (n,), numbers (M,) of states from 1 on, smoothing) -> (M, nx) where the motion is guessed to
             pass. None: where the rollout of z leads.
         multipliers: those that a solve of this or a like problem ended with where its guess is, see
@@ -242,6 +275,7 @@ class ShootingProblem:
     output_names: tuple[str, ...] = ()
     scenario: ScenarioEvaluator | None = None
     staged: Callable[[], StagedProblem] | None = None
+    by_steps: StepwiseEvaluator | None = None
     guessed_states: GuessedStates | None = None
     multipliers: Mapping[str, Array] = field(default_factory=dict)
 

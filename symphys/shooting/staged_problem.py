@@ -119,7 +119,14 @@ class AffinePolicy:
 
 
 class CompiledRecursion(Protocol):
-    """A run of steps of the Riccati recursion within bounds, compiled; see ``symphys.solvers.ddp.riccati``."""
+    """Recursions over a run of steps, compiled: costates, and Riccati's within bounds; see ``solvers.ddp``."""
+
+    def costates(self, a: Array, slopes: Array, last: Array) -> tuple[Array, Array]:
+        """Return the costates (K, n) after K steps, and that before them: slopes[k] + costate @ a[k].
+
+        Of ``a`` (K, n, n), slopes (K, n) of costs by the states before the steps, and the last costate (n,).
+        """
+        ...
 
     def suits(self, through: Array) -> bool:
         """Whether it is the faster way for steps of this shape (K, r, r + w)."""

@@ -126,12 +126,16 @@ class Terms:
     means: Expr
 
 
-def rollout_terms(rollout: Rollout) -> Terms:
-    """Return the terms of a rollout as expressions of its z and smoothing."""
+def rollout_terms(rollout: Rollout, motion: tuple[Expr, Expr] | None = None) -> Terms:
+    """Return the terms of a rollout as expressions of its z and smoothing.
+
+    ``motion``: other states (nx, N + 1) and inputs (nu, N), of which and of z they are expressions then.
+    """
     samples = FormulaSamples(rollout)
     asked = terms(samples)
-    moments = [part for k, step in samples.moments for part in (rollout.x[:, k], rollout.u[:, step])]
-    series = [rollout.sampled(*each) for each in samples.series]
+    x, u = (rollout.x, rollout.u) if motion is None else motion
+    moments = [part for k, step in samples.moments for part in (x[:, k], u[:, step])]
+    series = [rollout.sampled_along(*each, x, u, rollout.p, rollout.z) for each in samples.series]
     parts = {name: part for name, part in vars(asked).items() if isinstance(part, ca.MX)}
     function = ca.Function("terms", samples.symbols, list(parts.values()))
     found = function.call([rollout.z, rollout.p, *moments, *series], True, False)

@@ -360,6 +360,13 @@ class Rollout:
         """The inputs (nu, N)."""
         return self.given if self.feedback is None else self._motion[1]
 
+    def applied(self, x: Expr) -> Expr:
+        """Return the inputs (nu, N) of steps from states (nx, N + 1): those of variables, controllers and laws."""
+        if self.feedback is None:
+            return self.given
+        times = ca.DM(np.arange(self.steps)).T * self.interval
+        return self.feedback.map(self.steps)(x[:, :-1], self.given, ca.repmat(self.p, 1, self.steps), times)
+
     @property
     def steps(self) -> int:
         """The number of steps ``N``."""
@@ -383,12 +390,11 @@ class Rollout:
         """Return the number of the state at the end, or nearest to a time [s]."""
         return self.steps if isinstance(when, str) else round(when / self.dt)
 
-    def sampled(self, formula: Formula, shift: int) -> Expr:
-        """Return the values (m, N) of a formula at the starts (0) or ends (1) of all steps, with each step's inputs."""
-        return self.sampled_along(formula, shift, self.x, self.u, self.p, self.z)
-
     def sampled_along(self, formula: Formula, shift: int, x: Expr, u: Expr, p: Expr, z: Expr) -> Expr:
-        """Return ``sampled`` of other states (nx, N + 1), inputs (nu, N), parameters (np,) and decision vector (n,)."""
+        """Return the values (m, N) of a formula at the starts (0) or ends (1) of all steps, with each step's inputs.
+
+        Of states (nx, N + 1), inputs (nu, N), parameters (np,) and a decision vector (n,).
+        """
         ticks, interval = np.arange(shift, self.steps + shift), self.parameters.step_length(self.problem.simulation, p)
         named = any(variable.name in formula.names for variable in self.problem.variables)
         shared = ca.repmat(z, 1, self.steps) if named else ca.DM(z.shape[0], self.steps)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import cache
 from math import exp, inf
 from time import perf_counter
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -23,6 +23,7 @@ from symphys.codegen.backends import (
     build_kernel,
     choose,
     described,
+    require_backend,
 )
 from symphys.codegen.backends.interface import joined
 from symphys.codegen.backends.simd import common, probed
@@ -32,6 +33,8 @@ from symphys.problem import GuessedMotion, Problem, Variable
 from symphys.shooting import (
     Evaluator,
     GuessedStates,
+    LaterEvaluator,
+    LaterNlp,
     Nlp,
     ScenarioSamples,
     ShootingProblem,
@@ -46,8 +49,12 @@ from symphys.transcription.objective import Terms, bounds, has_squares, limits, 
 from symphys.transcription.program import program_identity, rollout_program
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.sampler import Sampler, swept_inputs
+from symphys.transcription.staged.step_evaluator import StepEvaluator, evaluated_by_steps
 from symphys.transcription.transcription import Transcription
 from symphys.types import Array
+
+if TYPE_CHECKING:
+    from symphys.transcription.staged.staged_problem import RolloutStages
 
 
 def transcribe(
@@ -88,13 +95,14 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
     functions = ExpressionFunctions(rollout)
     names, lower, upper = bounds(problem, lambda formula: int(rollout.compiled(formula).size1_out(0)))
     built = perf_counter() - began
-    chosen = _evaluating(rollout, functions, exact, backend, threads)
+    require_backend(backend)
+    chosen = cache(lambda: _evaluating(rollout, functions, exact, backend, threads))
     staged = cache(lambda: _stages(rollout, backend, threads, exact or not any(problem.simulation.smoothing)))
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),
-        evaluator=chosen.evaluator,
-        nlp=chosen.nlp,
+        evaluator=LaterEvaluator(lambda: chosen().evaluator),
+        nlp=LaterNlp(lambda: chosen().nlp),
         squares=has_squares(problem),
         constraint_names=names,
         constraint_lower=lower,
@@ -104,16 +112,22 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
         stop_when_met=problem.stop_when_met,
         output_names=tuple(output.label for output in problem.outputs),
         staged=staged,
+        by_steps=_by_steps(rollout, staged, backend),
         guessed_states=states_of(staged, problem.guess),
     )
-    return Transcription(problem, rollout, functions, shooting, chosen.description, built)
+    return Transcription(problem, rollout, functions, shooting, lambda: chosen().description, built)
 
 
-def _stages(rollout: Rollout, backend: str, threads: int | None, exact: bool) -> StagedProblem:
+def _stages(rollout: Rollout, backend: str, threads: int | None, exact: bool) -> RolloutStages:
     """Return the staged problem, built on demand."""
     from symphys.transcription.staged.staged_problem import RolloutStages
 
     return RolloutStages(rollout, backend, threads, exact)
+
+
+def _by_steps(rollout: Rollout, staged: Callable[[], RolloutStages], backend: str) -> StepEvaluator | None:
+    """Return the evaluator by steps; None where its merits are others, and for a backend that compiles no steps."""
+    return StepEvaluator(rollout, staged) if backend != "c" and evaluated_by_steps(rollout.problem) else None
 
 
 def _evaluating(
@@ -365,15 +379,20 @@ def with_scenarios(
         made = [_sample_evaluator(each.problem, exact, backend, count) for each in samplers]
     except (KernelUnavailable, ProgramError) as error:
         description = replace(plain.backend, note=f"{NO_SAMPLES}: {error}")
-        return replace(plain, problem=problem, backend=description)
+        return replace(plain, problem=problem, described=lambda: description)
     scenario = ScenarioGrids(list(grids), samplers, [evaluator for evaluator, _ in made])
     shooting = replace(
-        plain.shooting, evaluator=NominalEvaluator(scenario), scenario=scenario, squares=False, nlp=Nlp(None)
+        plain.shooting,
+        evaluator=NominalEvaluator(scenario),
+        scenario=scenario,
+        squares=False,
+        nlp=Nlp(None),
+        by_steps=None,
     )
     note = joined(made[0][1].note, f"{len(grids)} discretisations" if len(grids) > 1 else "")
     cached = all(description.cached for _, description in made)
     description = replace(made[0][1], seconds=perf_counter() - began, note=note, cached=cached)
-    return replace(plain, problem=problem, shooting=shooting, backend=description)
+    return replace(plain, problem=problem, shooting=shooting, described=lambda: description)
 
 
 def _sample_evaluator(problem: Problem, exact: bool, backend: str, threads: int) -> tuple[SampleEvaluator, Description]:

@@ -19,15 +19,15 @@ from symphys.trajectory import Trajectory
 from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.gradient_probe import ExpressionProbe, Probe
 from symphys.transcription.judge import Assessment, assessment
-from symphys.transcription.objective import FormulaSamples, Terms, terms
+from symphys.transcription.motion_values import motion_values
+from symphys.transcription.objective import Terms
 from symphys.transcription.rollout import Rollout
+from symphys.transcription.staged.step_evaluator import StepEvaluator
 from symphys.types import Array
 
 if TYPE_CHECKING:
     from symphys.transcription.simulation import Record
 
-Judge = Callable[..., Assessment]
-"""(z, smoothing = 0) -> verdict."""
 PRICING_CALLS = 5
 """Calls with which a function is timed; the fastest counts."""
 
@@ -37,7 +37,7 @@ class Transcription:
     """A problem, its shooting problem, and the exact rollout that judges and records; compared by identity.
 
     Attributes:
-        backend: the evaluator of the shooting problem.
+        described: describes the evaluator of the shooting problem, and makes it where nobody has asked for it yet.
         build_seconds: until there were expressions; ``backend.seconds`` come on top.
         records_contacts: whether ``record`` has the forces and gaps of contacts.
     """
@@ -48,8 +48,22 @@ class Transcription:
     rollout: Rollout
     functions: ExpressionFunctions
     shooting: ShootingProblem
-    backend: Description
+    described: Callable[[], Description]
     build_seconds: float
+
+    @property
+    def backend(self) -> Description:
+        """Return what evaluates the shooting problem."""
+        return self.described()
+
+    @cached_property
+    def by_steps(self) -> Transcription:
+        """Return the same evaluated by the steps of the staged problem; itself where that cannot be."""
+        evaluator = self.shooting.by_steps
+        if evaluator is None:
+            return self
+        assert isinstance(evaluator, StepEvaluator), "transcribe has made it"
+        return replace(self, shooting=replace(self.shooting, evaluator=evaluator), described=lambda: evaluator.backend)
 
     @property
     def terms(self) -> Terms:
@@ -58,7 +72,9 @@ class Transcription:
 
     def judge(self, z: Array, smoothing: float = 0.0) -> Assessment:
         """Assess ``z`` by the exact rollout, or by a smoothed one."""
-        return self._judge(z, smoothing)
+        found = self._motion_values.call([z, self._simulated(z, smoothing)[0]])
+        _, objective, *parts, _ = (np.array(part).ravel() for part in found)
+        return assessment(self.rollout.problem, float(objective[0]), *parts)
 
     def simulate(self, z: Array, smoothing: float = 0.0) -> Trajectory:
         """Simulate z; NotFinite if a number is not finite."""
@@ -186,36 +202,14 @@ class Transcription:
         return ca.Function("start", [rollout.z], [ca.densify(part) for part in (rollout.x0, rollout.given, rollout.p)])
 
     @cached_property
-    def _judge(self) -> Judge:
-        return judge_of(self.rollout, self._simulated)
+    def _motion_values(self) -> ca.Function:
+        return motion_values(self.rollout)
 
     @cached_property
     def _recorder(self) -> ca.Function:
         from symphys.transcription.simulation import recorder
 
         return recorder(self.rollout)
-
-
-def judge_of(rollout: Rollout, simulated: Callable[[Array, float], list[Array]]) -> Judge:
-    """Return a judge of candidates by the results of ``simulated``: states, inputs, given inputs, parameters, ..."""
-    samples = FormulaSamples(rollout)
-    asked = terms(samples)
-    outputs = [ca.densify(part) for part in (asked.objective, asked.costs, asked.errors, asked.outputs)]
-    numbers = ca.Function("judge", samples.symbols, outputs)
-    states = ca.MX.sym("x", rollout.x0.shape[0], rollout.steps + 1)
-    inputs = ca.MX.sym("u", *rollout.given.shape)
-    motion = [states, inputs, samples.p, samples.z]
-    series = [rollout.sampled_along(*each, *motion) for each in samples.series]
-    values = ca.Function("series", motion, series) if series else None
-
-    def judge(z: Array, smoothing: float = 0.0) -> Assessment:
-        x, u, _, p, *_ = simulated(z, smoothing)
-        moments = [part for k, step in samples.moments for part in (x[:, k], u[:, step])]
-        along = [] if values is None else values.call([x, u, p, z])
-        objective, *parts = (np.array(part).ravel() for part in numbers.call([z, p, *moments, *along]))
-        return assessment(rollout.problem, float(objective[0]), *parts)
-
-    return judge
 
 
 def gradient_prices(

@@ -40,9 +40,8 @@ def known(problem: AnalyticRecordings, options: FitOptions | None = None) -> tup
     ("name", "threshold"),
     [
         ("bounce", math.inf),
-        ("slide", 1.345),
         *(thorough(name, math.inf) for name in ("slide", "projectile", "oscillator")),
-        *(thorough(name, 1.345) for name in ("bounce", "projectile", "oscillator")),
+        *(thorough(name, 1.345) for name in ("bounce", "slide", "projectile", "oscillator")),
     ],
 )
 def test_intervals_cover_the_truth_and_are_narrow(name: str, threshold: float) -> None:

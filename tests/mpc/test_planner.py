@@ -104,10 +104,10 @@ def test_the_feedback_of_a_plan_is_that_of_the_backward_pass() -> None:
     about = LocalExpansion(made.stages, found, made._limits, padded(), np.full(20, 2.0))
     wanted, got = about.policy(0.1), about.policy(0.1, gradient=False)
     assert wanted is not None and got is not None
-    assert wanted.aligned[0] == pytest.approx(got.aligned[0], rel=1e-8, abs=1e-9)
-    assert wanted.aligned[1] == pytest.approx(got.aligned[1], rel=1e-7, abs=1e-8)
+    assert wanted.ahead == pytest.approx(got.ahead, rel=1e-8, abs=1e-9)
+    assert wanted.back == pytest.approx(got.back, rel=1e-7, abs=1e-8)
     assert (wanted.first, wanted.second) == pytest.approx((got.first, got.second), rel=1e-9)
-    held = ~got.aligned[1].any(axis=(1, 2))
+    held = ~got.back.any(axis=(1, 2))
     assert held.any() and not held.all()
 
 
@@ -122,9 +122,7 @@ def test_the_compiled_rollout_is_the_forward_pass(monkeypatch: pytest.MonkeyPatc
     assert policy is not None
     monkeypatch.setattr(stages(), "follow", lambda *_: None)
     wanted = forward_pass(stages(), found, policy, padded(), STEP_LENGTHS)
-    ahead = np.array([gain.ahead for gain in policy.gains if gain is not None])
-    back = np.array([gain.back for gain in policy.gains if gain is not None])
-    about = PlanPolicy(found.x[:-1], plan().v, ahead, back)
+    about = PlanPolicy(found.x[:-1], plan().v, policy.ahead, policy.back)
     x, v, cost = made.follow(found.x[0], about, STEP_LENGTHS, 0.0)
     assert x == pytest.approx(wanted.x, abs=1e-9)
     assert v == pytest.approx(wanted.u, abs=1e-9)

@@ -19,8 +19,7 @@ def test_decisions_at_bounds_do_not_answer_the_state() -> None:
     step = LinearSteps(*(each[None] for each in parts))
     found = riccati_recursion([step], CostToGo(np.zeros(2), np.zeros((2, 2))))
     assert found is not None
-    assert found.feedback[0] is not None
-    ahead, back = found.feedback[0]
+    (ahead,), (back,) = found.feedback[0]
     v, answers = np.clip(-g / h, -1, 1), -c / h[:, None] * np.array([[1.0], [0.0], [1.0]])
     assert ahead == pytest.approx(v)
     assert back == pytest.approx(answers)
@@ -49,12 +48,23 @@ def test_compiled_runs_are_those_of_numpy(n: int, w: int, steps: int, room: floa
     assert own is not None
     assert found is not None
     for one, other in zip(own.feedback, found.feedback, strict=True):
-        assert one is not None
-        assert other is not None
         np.testing.assert_allclose(other.ahead, one.ahead, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(other.back, one.back, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose([*found[1:3], *found.cost.slope], [*own[1:3], *own.cost.slope], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(found.cost.curve, own.cost.curve, rtol=1e-9, atol=1e-12)
+
+
+def test_compiled_costates_are_those_of_numpy() -> None:
+    """Also of matrices that are the first columns of wider ones."""
+    require("simd")
+    compiled, rng = compiled_riccati(), np.random.default_rng(1)
+    assert compiled is not None
+    a, slopes, costate = rng.normal(size=(6, 4, 9))[:, :, :4], rng.normal(size=(6, 4)), rng.normal(size=4)
+    after, first = compiled.costates(a, slopes, costate)
+    for k in reversed(range(6)):
+        np.testing.assert_allclose(after[k], costate, rtol=1e-13)
+        costate = slopes[k] + costate @ a[k]
+    np.testing.assert_allclose(first, costate, rtol=1e-13)
 
 
 def test_a_hessian_that_is_not_positive_definite_is_refused() -> None:

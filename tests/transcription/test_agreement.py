@@ -11,7 +11,6 @@ from worlds.features import FEATURES
 from worlds.toys import require
 
 from symphys.problem import problem_of_tables
-from symphys.shooting import StagedProblem
 from symphys.transcription import Transcription, transcribe
 from symphys.types import Array
 
@@ -56,7 +55,7 @@ def merit_and_slope(name: str, backend: str) -> tuple[Array, Array]:
     return found.merit, found.gradient
 
 
-@every(later=FEATURES.keys() - COMPILED, last=LONGEST | {"soft joint"})
+@every(later=FEATURES.keys() - COMPILED, last=LONGEST | {"soft joint", "a leg that lands", "loop of joints"})
 def test_a_kernel_gives_what_the_virtual_machine_gives(name: str) -> None:
     merit, slope = merit_and_slope(name, "casadi")
     compiled, compiled_slope = merit_and_slope(name, "simd")
@@ -74,28 +73,15 @@ def test_slopes_are_those_of_differences(name: str) -> None:
     assert np.abs(slope).min() > 0
 
 
-def chained(staged: StagedProblem, z: Array) -> tuple[float, Array]:
-    """The objective and its slopes, step by step."""
-    motion = staged.roll_out(z, 0.0)
-    count = len(staged.lower)
-    slopes, costs = staged.linearize(motion), staged.expand(motion, np.zeros(count), np.zeros(count))
-    adjoint, by_inputs, by_statics = costs.x[-1], np.zeros(motion.u.shape), costs.s.copy()
-    for k in reversed(range(staged.steps)):
-        by_inputs[k] = costs.u[k] + slopes.b[k].T @ adjoint
-        by_statics += slopes.c[k].T @ adjoint
-        adjoint = costs.x[k] + slopes.a[k].T @ adjoint
-    gradient = np.asarray(staged.weights.T @ by_inputs.ravel())
-    gradient[staged.statics] += by_statics + slopes.start.T @ adjoint
-    return costs.value, gradient
-
-
 @every(later=HEAVY)
-def test_stages_give_what_the_whole_gives(name: str) -> None:
+def test_steps_give_what_the_whole_gives(name: str) -> None:
     problem, whole = made(name), made(name).shooting
-    assert whole.staged is not None
-    z, nlp = whole.start(0), problem.functions.nlp
-    objective, slope = chained(whole.staged(), z)
-    expected = nlp.factory("g", ["i0", "i1"], ["o0", "grad:o0:i0"])(z, 0.0)
-    assert objective == pytest.approx(float(expected[0]), rel=1e-10)
-    exact = np.array(expected[1]).ravel()
-    np.testing.assert_allclose(slope, exact, rtol=1e-8, atol=1e-8 * np.abs(exact).max())
+    assert whole.by_steps is not None
+    z, smoothing = np.stack([whole.start(0), whole.start(1)]), widest(name)
+    found, expected = whole.by_steps.gradient(z, smoothing), merit_and_slope(name, "casadi")
+    values, wanted = whole.by_steps.value(z, smoothing), problem.shooting.evaluator.value(z, smoothing)
+    for each in ("merit", "objective", "errors", "outputs"):
+        np.testing.assert_allclose(getattr(values, each), getattr(wanted, each), rtol=1e-10, atol=1e-13)
+    assert whole.by_steps.value(z, 0.0).probe == pytest.approx(problem.probe.values(z), rel=1e-10)
+    assert found.gradient is not None
+    np.testing.assert_allclose(found.gradient, expected[1], rtol=1e-8, atol=1e-8 * np.abs(expected[1]).max())

@@ -59,7 +59,7 @@ def test_a_sled_slides_over_ice_then_asphalt() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("dt", [0.02, 0.01, thorough(0.005)])
+@pytest.mark.parametrize("dt", [0.01, *map(thorough, (0.02, 0.005))])
 def test_the_stopping_distance_and_its_slopes(dt: float) -> None:
     """x = v0 t - mu g t^2 / 2 + v1^2 / 2 mu' g; it stops within a step, so that slopes are of first order."""
     made = made_of(SLED, dt=dt)

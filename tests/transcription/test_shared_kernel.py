@@ -81,9 +81,9 @@ def test_functions_for_ipopt_are_those_of_the_point() -> None:
 def test_one_kernel_is_compiled_for_all_points() -> None:
     first, *others = made("simd")
     assert [(each.backend.cached, each.backend.seconds) for each in others] == [(True, 0.0)] * 2
-    kernels = {id(each.shooting.evaluator.evaluator) for each in made("simd")}  # type: ignore[attr-defined]
+    kernels = {id(each.shooting.evaluator.make().evaluator) for each in made("simd")}  # type: ignore[attr-defined]
     assert len(kernels) == 1
-    program = first.shooting.evaluator.evaluator.kernel.program  # type: ignore[attr-defined]
+    program = first.shooting.evaluator.make().evaluator.kernel.program  # type: ignore[attr-defined]
     assert program.z.size == 6 + 6  # mass, friction, radius, gravity
 
 

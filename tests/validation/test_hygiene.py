@@ -149,7 +149,7 @@ def random_impact():
 POINT = [0.9, 0.9, -0.4, 3.0, 1.3, 0.21, 0.4, 0.6]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_gradients_agree_with_central_differences():
     """Also in mass, radius, friction and restitution, through impacts with friction of a turning compound."""
     final = random_impact()

@@ -3,13 +3,14 @@
 ``choose`` takes the one that is asked for, or the best that this machine has.
 """
 
-from symphys.codegen.backends.choose import BACKENDS, NAMES, choose, require_backend
+from symphys.codegen.backends.choose import BACKENDS, INTERPRETED, NAMES, choose, require_backend
 from symphys.codegen.backends.interface import Backend, BackendSource, Description, ProblemFunctions
 from symphys.codegen.backends.kernels import BEST, PRECISIONS, build_kernel, described, require_kernels
 
 __all__ = [
     "BACKENDS",
     "BEST",
+    "INTERPRETED",
     "NAMES",
     "PRECISIONS",
     "Backend",

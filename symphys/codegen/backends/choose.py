@@ -27,6 +27,7 @@ BACKENDS: dict[str, Callable[[BackendSource, int], Backend]] = {
     "casadi": casadi,
 }
 NAMES = tuple(BACKENDS)
+INTERPRETED = "casadi's virtual machine evaluates, which is slower"
 
 
 def require_backend(name: str, valid: Sequence[str] = NAMES) -> None:
@@ -47,6 +48,6 @@ def choose(name: str, source: BackendSource, threads: int | None = None) -> Back
     try:
         return BACKENDS[name](source, count)
     except (KernelUnavailable, ProgramError) as error:
-        note = f"casadi's virtual machine evaluates, which is slower: {error}"
+        note = f"{INTERPRETED}: {error}"
         backend = casadi(source, count)
         return replace(backend, description=replace(backend.description, note=note))

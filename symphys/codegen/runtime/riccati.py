@@ -27,6 +27,20 @@ class CompiledRiccati:
         self._call = library.riccati
         self._call.argtypes, self._call.restype = (*[ctypes.c_int64] * 4, *[ctypes.c_void_p] * 13), ctypes.c_int
 
+        self._costates = library.costates
+        self._costates.argtypes, self._costates.restype = (*[ctypes.c_int64] * 4, *[ctypes.c_void_p] * 5), None
+
+    def costates(self, a: Array, slopes: Array, last: Array) -> tuple[Array, Array]:
+        """Implement ``CompiledRecursion``."""
+        steps, n, _ = a.shape
+        if a.strides[2] != a.itemsize:
+            a = np.ascontiguousarray(a)
+        step, row = (stride // a.itemsize for stride in a.strides[:2])
+        after, first = np.empty((steps, n)), np.empty(n)
+        given = a, np.ascontiguousarray(slopes), np.ascontiguousarray(last)
+        self._costates(steps, n, step, row, *(each.ctypes.data for each in (*given, after, first)))
+        return after, first
+
     def suits(self, through: Array) -> bool:
         """Whether steps of this shape (K, r, c) take less time here than by numpy."""
         return bool(through.shape[1] * through.shape[2] ** 2 <= MAX_WORK)

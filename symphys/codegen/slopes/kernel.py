@@ -173,21 +173,23 @@ class SlopeKernel:
     def jacobians(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None = None) -> Array:
         """(B, n) and (B, p), or (p,) for all points -> (B, outputs, columns): by the first of z; None: by all."""
         z, given, found = self._arguments(Z, parameters, columns)
-        lanes = self.report.lanes
-        blocks = -(-len(z) // lanes)
-        parts = 1 if self.threads == 1 else min(blocks, PARTS_PER_THREAD * self.threads)
-        ends = [min(lanes * (blocks * i // parts), len(z)) for i in range(parts + 1)] if parts else []
-        tasks = [partial(self._run, z, given, found, a, b) for a, b in pairwise(ends)]
-        self._pool.run(tasks, self.threads)
+        parts = self._parts(len(z), 1 if self.threads == 1 else PARTS_PER_THREAD * self.threads)
+        self._pool.run([partial(self._run, z, given, found, a, b) for a, b in parts], self.threads)
         return found
 
     def jacobians_from_end(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None = None) -> Iterator[Array]:
-        """Yield Jacobians in runs of few points, the last run first; all runs start at once."""
+        """Yield Jacobians in a few runs of points, the last run first; all runs start at once."""
         z, given, found = self._arguments(Z, parameters, columns)
-        ends = [*range(0, len(z), self.report.lanes), len(z)]
-        runs = [*pairwise(ends)][::-1]
+        runs = self._parts(len(z), PARTS_PER_THREAD * self.threads)[::-1]
         waits = self._pool.begin([partial(self._run, z, given, found, a, b) for a, b in runs], self.threads)
         return (found[a:b] for (a, b), wait in zip(runs, waits, strict=True) if wait() is None)
+
+    def _parts(self, points: int, most: int) -> list[tuple[int, int]]:
+        """Return first and last of at most so many parts of whole blocks."""
+        lanes = self.report.lanes
+        blocks = -(-points // lanes)
+        parts = min(blocks, most)
+        return [*pairwise(min(lanes * (blocks * i // parts), points) for i in range(parts + 1))] if parts else []
 
     def _arguments(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None) -> tuple[Array, Array, Array]:
         """Check both; return them and the array of the Jacobians."""

@@ -98,8 +98,13 @@ def keep(key: str, write: Callable[[Path], None], cache: Cache) -> None:
         replace(cache, suffix=PLAN_SUFFIX).store(key, path)
 
 
-def kept_function(make: Callable[[], ca.Function], identity: str | None) -> ca.Function:
-    """Return a function of casadi, from the cache where one of this identity was made before; see ``ProgramSource``."""
+def kept_function(
+    make: Callable[[], ca.Function], identity: str | None, least: int = MIN_KEPT_INSTRUCTIONS
+) -> ca.Function:
+    """Return a function of casadi, from the cache where one of this identity was made before; see ``ProgramSource``.
+
+    It is kept from ``least`` instructions on.
+    """
     key = None if identity is None else identity_of(identity, package_stamp())
     try:
         cache = default_cache()
@@ -108,7 +113,7 @@ def kept_function(make: Callable[[], ca.Function], identity: str | None) -> ca.F
     if key is not None and (kept := found(key[:32], _read_function, cache)) is not None:
         return kept
     function = make()
-    if key is not None and function.n_instructions() >= MIN_KEPT_INSTRUCTIONS:
+    if key is not None and function.n_instructions() >= least:
         keep(key[:32], lambda path: _write_function(function, path), cache)
     return function
 

@@ -116,7 +116,9 @@ def transcribe_large(
         output_names=tuple(output.label for output in problem.outputs),
     )
     functions = ExpressionFunctions(context.rollout, context.objectives.terms)
-    return LargeTranscription(problem, context.rollout, functions, shooting, description, built, context=context)
+    return LargeTranscription(
+        problem, context.rollout, functions, shooting, lambda: description, built, context=context
+    )
 
 
 def evaluator_or_plain(

@@ -48,10 +48,13 @@ class Linearization:
         """Return the motion of z (len(z),), from its own first state or another one (nx,)."""
         given = np.asarray(z, float)
         x0, u, p = self.start(given)
-        states = [x0 if start is None else start]
-        for k in range(self.rollout.steps):
-            states.append(self.step.step(k, states[-1][None], u[None, k], p, smoothing)[0])
-        return StagedMotion(given, np.array(states), u, smoothing, gapless=True)
+        states = self.step.roll((x0 if start is None else start)[None], u[None], p[None], smoothing)[0]
+        return StagedMotion(given, states, u, smoothing, gapless=True)
+
+    def states(self, Z: Array, smoothing: float) -> Array:
+        """Return the states (B, N + 1, nx) of Z (B, len(z))."""
+        x0, u, p = (np.array(part) for part in zip(*map(self.start, Z), strict=True))
+        return self.step.roll(x0, u, p, smoothing)
 
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Return the derivatives of all steps about a motion.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import field
 from functools import cached_property
+from time import perf_counter
 from typing import Any
 
 import casadi as ca
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symphys.codegen import FixedBatch, Kernel, KernelUnavailable, ProcessorKernel, Program, ProgramError, processors
-from symphys.codegen.backends import BEST, PRECISIONS, build_kernel
+from symphys.codegen.backends import BEST, INTERPRETED, PRECISIONS, Description, build_kernel, described
 from symphys.codegen.slopes import SlopeKernel, compile_slopes
 from symphys.codegen.toolchain.identity import identity_of
 from symphys.codegen.toolchain.warm_start import ProgramSource
@@ -62,6 +63,7 @@ class LinearizedStep:
     clock: float = 0.0
     wait: bool = False
     _note: str = field(default="", init=False)
+    _step_note: str = field(default="", init=False)
 
     @cached_property
     def arguments(self) -> StepArguments:
@@ -75,6 +77,29 @@ class LinearizedStep:
             return self._step.lend(len(states), lambda batch: self._few(batch, k, states, U, P, smoothing))
         varying, given = self.rows(k, states, states, U, P, smoothing)
         return self._step.values(varying, given)
+
+    def roll(self, first: Array, U: Array, P: Array, smoothing: float) -> Array:
+        """Return the states (B, N + 1, nx) of rollouts from first states (B, nx), U (B, N, m) and P (B, np)."""
+        count, steps = U.shape[:2]
+        X = np.empty((count, steps + 1, first.shape[1]))
+        X[:, 0] = first
+        if not (isinstance(self._step, _ByKernel) and self._step.lends(count)):
+            for k in range(steps):
+                X[:, k + 1] = self.step(k, X[:, k], U[:, k], P, smoothing)
+            return X
+
+        def put(batch: FixedBatch) -> None:
+            """Take all steps but the last, and prepare that."""
+            self._few(batch, 0, first, U[:, 0], P, smoothing)
+            (nx, n, m, _), ticks = self.arguments.sizes, self._ticks(np.arange(steps))
+            state, given, tick = batch.parameters[:, :nx], batch.z[:, n : n + m], batch.parameters[:, 2 * nx]
+            for k in range(1, steps):
+                batch.run()
+                X[:, k] = batch.outputs
+                state[:], given[:], tick[:] = batch.outputs, U[:, k], ticks[k]
+
+        X[:, steps] = self._step.lend(count, put)
+        return X
 
     def difference(self, X: ArrayLike, Y: ArrayLike) -> Array:
         """Return ``Tangent.difference`` of (B, nx), (B, nx) as (B, n), with the parameters of the guess."""
@@ -174,6 +199,14 @@ class LinearizedStep:
         return f"{report.precision} precision, lanes {report.lanes}, threads {self._off.kernel.threads}"
 
     @cached_property
+    def evaluator(self) -> Description:
+        """Describe the evaluator of next states."""
+        began, step = perf_counter(), self._step
+        if isinstance(step, _ByKernel):
+            return described(step.kernel, perf_counter() - began)
+        return Description("casadi", threads=self._count, note=self._step_note)
+
+    @cached_property
     def _count(self) -> int:
         return processors() if self.threads is None else self.threads
 
@@ -182,7 +215,8 @@ class LinearizedStep:
         """Return the evaluator of next states."""
         try:
             return _ByKernel(self._kernel(self.source("step", lambda: step_program(self.arguments, self.exact, False))))
-        except (KernelUnavailable, ProgramError):
+        except (KernelUnavailable, ProgramError) as error:
+            self._step_note = f"{INTERPRETED}: {error}" if self.backend in PRECISIONS else ""
             return _ByCasadi(step_functions(self.arguments)[0])
 
     @cached_property

@@ -27,7 +27,7 @@ from symphys.codegen import (
     ProgramError,
 )
 from symphys.codegen.backends import PRECISIONS
-from symphys.codegen.toolchain.warm_start import compile_source
+from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
 from symphys.records import dataclass
 from symphys.shooting import AffinePolicy
 from symphys.transcription.program import program_identity, step_calls
@@ -115,12 +115,16 @@ class PolicyRollout:
         if self.step.backend not in PRECISIONS:
             return None
         try:
-            make = partial(policy_program, self.step, self.sizes, self.costs)
-            whole = program_identity(self.step.rollout.problem, self.step.exact)
-            source = self.step.source("policy", make, *self.sizes, self.costs is None, whole)
-            return compile_source(source, (), self.threads, wait=self.step.wait)
+            return compile_source(self.source, (), self.threads, wait=self.step.wait)
         except (KernelUnavailable, ProgramError):
             return None
+
+    @property
+    def source(self) -> ProgramSource:
+        """Return the program; without costs only the number of steps of the problem's horizon is part of it."""
+        make, rollout = partial(policy_program, self.step, self.sizes, self.costs), self.step.rollout
+        asked = "" if self.costs is None else program_identity(rollout.problem, self.step.exact)
+        return self.step.source("policy", make, *self.sizes, rollout.steps, asked)
 
     def __call__(
         self,

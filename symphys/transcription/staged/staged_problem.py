@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from symphys.codegen.backends import BEST, PRECISIONS
+from symphys.codegen.backends import BEST, PRECISIONS, Description
 from symphys.dynamics.observation import SensedState, joint_turn, named_sensors, sensor_readings
 from symphys.model.state_layout import Layout
 from symphys.problem import DURATION, Constraint, GuessedMotion
@@ -107,6 +107,11 @@ class RolloutStages:
         """Describe the evaluator of the derivatives."""
         return self._linearization.step.description
 
+    @property
+    def backend(self) -> Description:
+        """Describe the evaluator of the steps."""
+        return self._linearization.step.evaluator
+
     def start(self, Z: Array) -> Array:
         """Return first states (B, nx)."""
         return self._begun(Z)[0]
@@ -158,6 +163,10 @@ class RolloutStages:
         _, p, starts = self._begun(Z)
         constants = np.concatenate([p, Z[:, self._groups.symbols.named], starts], axis=1)
         return self._groups.summed(StepRows(X, after, U[:, : self._given], constants, ticks))
+
+    def states(self, Z: Array, smoothing: float) -> Array:
+        """Return the states (B, N + 1, nx) of Z (B, len(z)), without sums."""
+        return self._linearization.states(Z, smoothing)
 
     def roll_out(self, z: Array, smoothing: float) -> StagedMotion:
         """Return the motion of z."""

@@ -185,7 +185,7 @@ def test_several_turns_in_a_step_count(spin: float) -> None:
     np.testing.assert_allclose(found["axle.angle"], spin * found.time, rtol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_angles_wind_where_impacts_cut_steps() -> None:
     """A wheel that may meet two others, of which one falls onto the other: steps are cut at impacts."""
     below = [ball(name, position=(2, 0, z)) for name, z in (("first", 0.2), ("second", 0.7))]

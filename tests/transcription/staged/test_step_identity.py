@@ -10,6 +10,7 @@ import pytest
 import symphys
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.staged.linearization import Linearization
+from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes
 from symphys.transcription.staged.step_program import step_program
 
 Tables = dict[str, Any]
@@ -102,3 +103,13 @@ def test_what_is_varied_has_a_key_of_its_own() -> None:
     steps = Linearization(symbolic_rollout(symphys.load(longer)), "casadi", 1)
     found = [tuple(keys(each)) for each in (made, heavy, timed, steps)]
     assert len(set(found)) == 4, "a free duration is divided by the number of steps"
+
+
+def policy_key(made: Linearization) -> str | None:
+    return PolicyRollout(made.step, PolicySizes(0, 1, 1)).source.identity
+
+
+@pytest.mark.parametrize("name", LEFT)
+def test_of_the_horizon_a_policy_knows_the_number_of_steps(name: str) -> None:
+    made, other = policy_key(changed(*ORIGINAL)), policy_key(changed(*LEFT[name]))
+    assert None not in (made, other) and (made == other) == (name != "duration")
