@@ -291,7 +291,11 @@ def judge(
         taken = transcription.record(outcome.z)
         examined: dict[str, Any] | None = None
         if outcome.status is not Status.INTERRUPTED:
-            examined = trust.examine(transcription, taken.z, tell) if examine else trust.survey(transcription, taken)
+            examined = (
+                trust.examine(transcription, taken.z, tell, whole=False)
+                if examine
+                else trust.survey(transcription, taken)
+            )
     except SymphysError as error:
         return Judgement(None, None, None, f"{outcome.advice} {error}".strip())
     smoothed = outcome.status is Status.MET and not verdict.solved and outcome.trace[-1].smoothing > 0

@@ -129,12 +129,20 @@ def _beside(value: Values, z: Array, directions: Array, steps: Sequence[float], 
 
 
 @np.errstate(invalid="ignore", over="ignore")  # numbers that are not finite are reported as such
-def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: None) -> dict[str, Any]:
+def examine(
+    transcription: Transcription, z: Array, tell: Tell = lambda what: None, whole: bool = True
+) -> dict[str, Any]:
     """Return the "trust" object of a result, for the exact rollout of ``z`` (n,).
 
     Each module of this room says what its numbers are. "fault" is a clause on the first number or derivative that is
-    not finite, empty if all are. ``tell`` is called with a few words before each part that takes time. Where contacts
-    are not recorded there are "gradient", "refined", "order" and "bounds" alone.
+    not finite, empty if all are. Where contacts are not recorded there are "gradient", "refined", "order" and "bounds"
+    alone.
+
+    Args:
+        transcription: of a problem.
+        z: (n,).
+        tell: called with a few words before each part that takes time.
+        whole: whether refinements are simulated that hardly say more; see ``refinement.refine``.
 
     Raises:
         NotFinite: there is no such motion; says where it ends and why.
@@ -143,11 +151,14 @@ def examine(transcription: Transcription, z: Array, tell: Tell = lambda what: No
     record = transcription.record(z)
     tell(COMPARING)
     compared = compare_gradient(transcription, z)
-    finer = refinement.refine(transcription, z, tell)
     if not transcription.records_contacts:
+        finer = refinement.refine(transcription, z, tell, whole)
         return {"gradient": compared, **finer, "bounds": held_bounds(transcription, z)}
-    tell(SWEEPING)
     timed = transcription.timed(record)
+    resolved = contacts(timed.rollout, record)
+    settled = not resolved["residual"] > refinement.SETTLED * resolved["impulse"]
+    finer = refinement.refine(transcription, z, tell, whole, settled)
+    tell(SWEEPING)
     grown = sensitivity_growth(timed, record)
     tell(NEAR)
     near = near_misses(timed, record)

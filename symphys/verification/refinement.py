@@ -13,13 +13,17 @@ from numpy.typing import ArrayLike
 from symphys.model.state_layout import Layout
 from symphys.shooting import VariableBlock
 from symphys.trajectory import NotFinite
-from symphys.transcription import Record, Rollout, Transcription, transcribe
+from symphys.transcription import Assessment, Record, Rollout, Transcription, transcribe
 from symphys.types import Array
 from symphys.verification.bodies import Bodies, bodies, floating
 
 FINER_DT, FINEST_DT, MORE_SWEEPS, ONE_MORE = "dt / 2", "dt / 4", "sweeps x 2", "sweeps + 1"
 TOLD = {what: f"simulating with {what}" for what in (FINER_DT, FINEST_DT, MORE_SWEEPS)}
 """The message that announces each refinement, in order."""
+MOST_CHANGE = 1.5
+"""The change by dt / 4 in units of that by dt / 2, of an error of first order."""
+SURE_SLOPE, SURE_OBJECTIVE = 0.1, 0.05
+"""Relative changes by dt / 4 up to which a gradient and an objective are good; see ``symphys.findings.numerics``."""
 SETTLED = 1e-3
 """Residuals below this share of the largest impulse are negligible."""
 UNSETTLED = 5e-2
@@ -38,8 +42,22 @@ TRIED_SMOOTHING = (1e-3, 1e-2, 1e-1)
 """[m/s] Smoothings that are tried where the problem itself has none."""
 
 
-def refine(transcription: Transcription, z: Array, tell: Callable[[str], None] = lambda what: None) -> dict[str, Any]:
+def refine(
+    transcription: Transcription,
+    z: Array,
+    tell: Callable[[str], None] = lambda what: None,
+    whole: bool = True,
+    settled: bool = False,
+) -> dict[str, Any]:
     """Judge ``z`` in finer discretisations; ``tell`` is called with the name of each before it is simulated.
+
+    Args:
+        transcription: of a problem.
+        z: (n,).
+        tell: see above.
+        whole: whether all are done. Else dt / 4 is left out where it follows from dt / 2, see ``follows``, and twice
+            the sweeps where impulses have settled.
+        settled: whether they have.
 
     Returns:
         "refined": for dt / 2, dt / 4 and twice the sweeps the "objective", the "worst" error / tolerance, and
@@ -47,18 +65,33 @@ def refine(transcription: Transcription, z: Array, tell: Callable[[str], None] =
         None where it is flat.
         "order": of convergence in dt, of the "objective" and of the "gradient"; None where it cannot be seen.
     """
-    slopes = [transcription.probe.gradient(z)]
-    objectives = [transcription.judge(z).objective]
-    rows = []
+    judged = transcription.judge(z)
+    slopes, objectives, rows = [transcription.probe.gradient(z)], [judged.objective], list[dict[str, Any]]()
     for what in TOLD:
+        if not whole and (settled if what == MORE_SWEEPS else what == FINEST_DT and follows(judged, rows[0])):
+            continue
         tell(TOLD[what])
         finer = finer_problem(transcription, what)
         verdict, slope = finer.judge(z), finer.probe.gradient(z)
         changes = {block.name: change(block, slopes[0], slope) for block in transcription.shooting.blocks}
         rows.append({"what": what, "objective": verdict.objective, "worst": verdict.worst, "gradient": changes})
-        objectives.append(verdict.objective)
-        slopes.append(slope)
-    return {"refined": rows, "order": {"objective": order(objectives[:3]), "gradient": order(slopes[:3])}}
+        if what != MORE_SWEEPS:
+            objectives.append(verdict.objective)
+            slopes.append(slope)
+    return {"refined": rows, "order": {"objective": order(objectives), "gradient": order(slopes)}}
+
+
+def follows(judged: Assessment, row: dict[str, Any]) -> bool:
+    """Whether dt / 4 agrees if dt / 2, the ``row`` of ``refine``, does: where errors shrink like dt or faster.
+
+    The change by dt / 4 is then at most one and a half times that by dt / 2.
+    """
+    slopes = [each for each in row["gradient"].values() if each is not None]
+    if not all(MOST_CHANGE * each <= SURE_SLOPE for each in slopes):
+        return False
+    if judged.solved and judged.checks:
+        return bool(judged.worst + MOST_CHANGE * max(row["worst"] - judged.worst, 0.0) <= 1)
+    return bool(MOST_CHANGE * abs(row["objective"] - judged.objective) <= SURE_OBJECTIVE * abs(judged.objective))
 
 
 def settling(transcription: Transcription, z: Array, residual: float, impulse: float) -> dict[str, float]:
@@ -154,7 +187,9 @@ def change(block: VariableBlock, before: Array, after: Array) -> float | None:
 
 
 def order(values: Sequence[ArrayLike]) -> float | None:
-    """Return p of an error like dt^p, from values at dt, dt / 2 and dt / 4; None within rounding."""
+    """Return p of an error like dt^p, from values at dt, dt / 2 and dt / 4; None within rounding, or without these."""
+    if len(values) < 3:
+        return None
     coarse, middle, fine = (np.asarray(value, float) for value in values)
     first, second = float(np.linalg.norm(coarse - middle)), float(np.linalg.norm(middle - fine))
     least = ROUNDING * float(np.linalg.norm(fine))

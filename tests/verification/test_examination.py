@@ -10,9 +10,10 @@ from symphys.problem import load_problem
 from symphys.problems import find
 from symphys.shooting import VariableBlock
 from symphys.transcription import transcribe
+from symphys.transcription.judge import Assessment, Criterion
 from symphys.verification import examine
 from symphys.verification.examination import _compare_block, compare_gradient
-from symphys.verification.refinement import order
+from symphys.verification.refinement import follows, order
 
 THROW = np.array([3.0, 0.1, 3.0, 0.0, -9.0, 0.5])
 
@@ -127,3 +128,34 @@ def test_smoothed_answers_are_those_of_the_smoothed_rollout(throw):
     assert rows[2]["objective"] != pytest.approx(throw.judge(THROW).objective, rel=1e-6)
     own = transcribe(load_problem(find("ball_throw"), {"simulation.smoothing": 0.02}), backend="casadi")
     assert [(row["smoothing"], row["own"]) for row in examine(own, THROW)["smoothed"]] == [(0.02, True)]
+
+
+def test_a_run_leaves_out_what_hardly_says_more(coarse, throw):
+    """A ball that flies changes little by dt / 2; the coarse shot changes much, and its impulses settle."""
+    whole, short = examine(throw, THROW), examine(throw, THROW, whole=False)
+    assert [row["what"] for row in whole["refined"]] == ["dt / 2", "dt / 4", "sweeps x 2"]
+    assert short["refined"] == whole["refined"][:1] and short["order"] == {"objective": None, "gradient": None}
+    assert {**short, "refined": 0, "order": 0} == {**whole, "refined": 0, "order": 0}
+    made, z, rows = coarse
+    found = examine(made, z, whole=False)
+    assert [row["what"] for row in found["refined"]][:2] == ["dt / 2", "dt / 4"]
+    assert all(row in rows for row in found["refined"])
+
+
+@pytest.mark.parametrize(
+    ("ratio", "worst", "objective", "slope", "expected"),
+    [
+        (0.5, 0.8, 9.0, 0.06, True),  # 0.5 + 1.5 * 0.3 of a tolerance
+        (0.5, 0.9, 1.0, 0.0, False),
+        (0.5, 0.2, 1.0, None, True),
+        (0.5, 0.5, 1.0, 0.07, False),
+        (0.5, 0.5, 1.0, np.nan, False),
+        (0.5, np.nan, 1.0, 0.0, False),
+        (2.0, 2.0, 1.03, 0.0, True),  # not met: by the objective
+        (2.0, 2.0, 1.04, 0.0, False),
+        (2.0, 2.0, np.nan, 0.0, False),
+    ],
+)
+def test_what_follows_from_half_the_step(ratio, worst, objective, slope, expected):
+    judged = Assessment(1.0, {}, (Criterion("target", "there", ratio, 1.0, ratio),), {})
+    assert follows(judged, {"worst": worst, "objective": objective, "gradient": {"throw": slope}}) is expected
