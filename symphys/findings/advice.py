@@ -60,10 +60,11 @@ def findings(trust: Examination, judged: Judged) -> list[Finding]:
 
 def slopes(trust: Examination) -> tuple[list[str], list[list[str]]]:
     """Header and rows of a table of gradients: against differences, and by how much refinements change them."""
-    header = ["gradient of", "norm", "differs by", "", *(row.what for row in trust.refined)]
+    finer = [row for row in trust.refined if row.gradient]
+    header = ["gradient of", "norm", "differs by", "", *(row.what for row in finer)]
     rows = []
     for check in trust.gradient:
-        changes = [percent(row.gradient.get(check.variable, math.nan)) for row in trust.refined]
+        changes = [percent(row.gradient.get(check.variable, math.nan)) for row in finer]
         verdict = NO_SLOPE if unfelt(check) else VERDICTS[gradient_finding(check).level]
         rows.append([check.variable, show(check.scale), show(check.error, 2), verdict, *changes])
     return header, rows

@@ -55,8 +55,8 @@ def refine(
         transcription: of a problem.
         z: (n,).
         tell: see above.
-        whole: whether all are done. Else dt / 4 is left out where it follows from dt / 2, see ``follows``, and twice
-            the sweeps where impulses have settled.
+        whole: whether all are done. Else dt / 4 is left out where it follows from dt / 2, see ``follows``, twice the
+            sweeps where impulses have settled, and all gradients but that of dt / 2, which take longest.
         settled: whether they have.
 
     Returns:
@@ -71,13 +71,14 @@ def refine(
         if not whole and (settled if what == MORE_SWEEPS else what == FINEST_DT and follows(judged, rows[0])):
             continue
         tell(TOLD[what])
-        finer = finer_problem(transcription, what)
-        verdict, slope = finer.judge(z), finer.probe.gradient(z)
-        changes = {block.name: change(block, slopes[0], slope) for block in transcription.shooting.blocks}
+        finer, changes = finer_problem(transcription, what), dict[str, float | None]()
+        verdict = finer.judge(z)
+        if whole or what == FINER_DT:
+            slope = finer.probe.gradient(z)
+            changes = {block.name: change(block, slopes[0], slope) for block in transcription.shooting.blocks}
+            slopes += [slope] * (what != MORE_SWEEPS)
+        objectives += [verdict.objective] * (what != MORE_SWEEPS)
         rows.append({"what": what, "objective": verdict.objective, "worst": verdict.worst, "gradient": changes})
-        if what != MORE_SWEEPS:
-            objectives.append(verdict.objective)
-            slopes.append(slope)
     return {"refined": rows, "order": {"objective": order(objectives), "gradient": order(slopes)}}
 
 

@@ -292,7 +292,7 @@ def refined(trust: Examination, judged: Judged) -> Html:
         "details",
         tag("summary", "Refined and smoothed, as numbers"),
         table(header, rows, "tnnt", "Answers"),
-        table(gradients, changes, "tnnt" + "n" * len(trust.refined), "Gradients"),
+        table(gradients, changes, "tnnt" + "n" * (len(gradients) - 4), "Gradients"),
         tag("p", HOW_REFINED, class_="caption"),
     )
 
