@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.records import dataclass
-from symphys.shooting import CompiledRecursion, Expansion, Linearized
+from symphys.shooting import CompiledRecursion, Expansion, Linearized, costates
 from symphys.solvers.ddp.box_qp import solve_box_qp
 from symphys.solvers.ddp.knots import KnotSteps
 from symphys.solvers.ddp.riccati import CostToGo, Feedback, LinearSteps, riccati_recursion
@@ -251,14 +251,7 @@ class _Steps:
     def _by_costate(self, first: int, run: Linearized) -> tuple[Array, Array]:
         """Return slopes (K, m) by inputs and (K, s) by static entries of the objective, and move on the costate."""
         steps = slice(first, first + len(run.a))
-        slopes = self.costs.x[steps]
-        if self._compiled is not None:
-            after, self._costate = self._compiled.costates(run.a, slopes, self._costate)
-        else:
-            after = np.empty_like(slopes)
-            for k in reversed(range(len(run.a))):
-                after[k] = self._costate
-                self._costate = slopes[k] + self._costate @ run.a[k]
+        after, self._costate = costates(run.a, self.costs.x[steps], self._costate, self._compiled)
         return self.costs.u[steps] + (after[:, None] @ run.b)[:, 0], (after[:, None] @ run.c)[:, 0]
 
 

@@ -23,6 +23,7 @@ from symphys.shooting.staged_problem import (
     Linearized,
     StagedMotion,
     StagedProblem,
+    costates,
 )
 
 __all__ = [
@@ -46,4 +47,5 @@ __all__ = [
     "Values",
     "VariableBlock",
     "WithoutResiduals",
+    "costates",
 ]

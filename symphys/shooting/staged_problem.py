@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Protocol
 
+import numpy as np
+
 from symphys.records import dataclass
 from symphys.types import Array, Ints
 
@@ -154,6 +156,17 @@ class CompiledRecursion(Protocol):
             slope (r,) and curvature (r, r) of the cost to go before the run.
         """
         ...
+
+
+def costates(a: Array, slopes: Array, last: Array, compiled: CompiledRecursion | None) -> tuple[Array, Array]:
+    """Return ``CompiledRecursion.costates``, step by step where that is not compiled."""
+    if compiled is not None:
+        return compiled.costates(a, slopes, last)
+    after = np.empty_like(slopes)
+    for k in reversed(range(len(a))):
+        after[k] = last
+        last = slopes[k] + last @ a[k]
+    return after, last
 
 
 class StagedProblem(Protocol):

@@ -83,5 +83,9 @@ def test_steps_give_what_the_whole_gives(name: str) -> None:
     for each in ("merit", "objective", "errors", "outputs"):
         np.testing.assert_allclose(getattr(values, each), getattr(wanted, each), rtol=1e-10, atol=1e-13)
     assert whole.by_steps.value(z, 0.0).probe == pytest.approx(problem.probe.values(z), rel=1e-10)
+    assert whole.staged is not None
+    staged, nothing = whole.staged(), np.zeros(len(whole.constraint_lower))
+    plain = staged.expand(staged.roll_out(z[0], smoothing), nothing, nothing)
+    assert plain.value == pytest.approx(wanted.objective[0], rel=1e-10)
     assert found.gradient is not None
     np.testing.assert_allclose(found.gradient, expected[1], rtol=1e-8, atol=1e-8 * np.abs(expected[1]).max())

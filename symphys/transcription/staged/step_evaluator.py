@@ -13,7 +13,7 @@ import numpy as np
 from symphys.codegen.backends import Description
 from symphys.codegen.backends.calls import row_by_row
 from symphys.problem import Problem
-from symphys.shooting import StagedMotion, Values, WithoutResiduals
+from symphys.shooting import StagedMotion, Values, WithoutResiduals, costates
 from symphys.transcription.motion_values import motion_values
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
@@ -59,13 +59,10 @@ class StepEvaluator(WithoutResiduals):
         staged = self.staged()
         slopes = staged.linearize(motion)
         costs = staged.expand(motion, np.zeros_like(staged.penalties), 2 * staged.penalties)
-        adjoint, by_inputs, by_statics = costs.x[-1], np.empty(motion.u.shape), costs.s.copy()
-        for k in reversed(range(staged.steps)):
-            by_inputs[k] = costs.u[k] + slopes.b[k].T @ adjoint
-            by_statics += slopes.c[k].T @ adjoint
-            adjoint = costs.x[k] + slopes.a[k].T @ adjoint
+        after, first = costates(slopes.a, costs.x[:-1], costs.x[-1], staged.recursion)
+        by_inputs = costs.u + (after[:, None] @ slopes.b)[:, 0]
         slope = np.asarray(staged.weights.T @ by_inputs.ravel())
-        slope[staged.statics] += by_statics + slopes.start.T @ adjoint
+        slope[staged.statics] += costs.s + (after[:, None] @ slopes.c)[:, 0].sum(axis=0) + slopes.start.T @ first
         return slope
 
     @cached_property
