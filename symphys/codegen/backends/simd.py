@@ -24,7 +24,7 @@ from symphys.codegen.backends.casadi_ import squared
 from symphys.codegen.backends.interface import Backend, BackendSource, Function, joined
 from symphys.codegen.backends.kernels import build_kernel, described
 from symphys.codegen.runtime.kernel import Outputs
-from symphys.codegen.toolchain.build import temporary_folder
+from symphys.codegen.toolchain.libraries import temporary_folder
 from symphys.codegen.toolchain.processes import ELSEWHERE
 from symphys.codegen.toolchain.warm_start import ProgramSource
 from symphys.records import dataclass

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from symphys.codegen.errors import KernelUnavailable
-from symphys.codegen.toolchain.build import temporary_folder
 from symphys.codegen.toolchain.cache import KINDS, Cache, default_cache
 from symphys.codegen.toolchain.compiler import processors
+from symphys.codegen.toolchain.libraries import temporary_folder
 from symphys.codegen.toolchain.processes import ELSEWHERE
 from symphys.records import dataclass
 

@@ -36,6 +36,7 @@ from symphys.codegen.program.program import FunctionCall, Program
 from symphys.codegen.runtime.batch import RolloutBatch
 from symphys.codegen.runtime.kernel import BuildReport, Kernel
 from symphys.codegen.runtime.library import TABLES, WORD, List, RowSource, data_places, program_fields, strided
+from symphys.codegen.toolchain import source_file
 from symphys.codegen.toolchain.build import names_of
 from symphys.records import dataclass
 from symphys.types import Ints
@@ -136,7 +137,7 @@ def _calls(planned: Plan, program: Program, phase: str) -> Iterator[_Call]:
         number, length = int(table[at]), int(table[at + 1])
         graph, form = planned.functions[number]
         pairs = table[at + 2 : at + length].reshape(-1, 2).tolist()
-        sizes = [*graph.sizes, *map(len, graph.results)]
+        sizes = [*graph.sizes, *graph.result_sizes]
         spans = [Span(offset, stride, size) for (offset, stride), size in zip(pairs, sizes, strict=True)]
         own, given = spans[: form.primal], spans[form.primal : len(graph.sizes)]
         results = spans[len(graph.sizes) :]
@@ -147,7 +148,7 @@ def _calls(planned: Plan, program: Program, phase: str) -> Iterator[_Call]:
         if form.backward:
             given, results = ([span._replace(offset=span.offset + far) for span in each] for each in (given, results))
         if number not in costs:
-            costs[number] = CALL_COST + sum(graph.nodes[x].op not in ("const", "input") for x in graph.needed())
+            costs[number] = CALL_COST + graph.operations
         yield _Call(
             entry=table[at : at + length].tolist(),
             cost=costs[number],
@@ -298,7 +299,7 @@ def results_apart(planned: Plan, steps: int) -> list[set[int]]:
     found = []
     for (graph, _), own in zip(planned.functions, calls, strict=True):
         met: set[int] = set()
-        sizes = [len(result) for result in graph.results]
+        sizes = graph.result_sizes
         places = np.array([call[len(graph.sizes) :] for call in own]).reshape(len(own), len(sizes), 2)
         for a, b in zip(*np.triu_indices(len(sizes), 1), strict=True):
             if sizes[a] and sizes[b] and _meet(places[:, a], sizes[a], places[:, b], sizes[b], steps):
@@ -323,7 +324,7 @@ def device_sources(planned: Plan, steps: int, lanes: int, warps: int, single: bo
         write(f"f{number}", graph, form, DEVICE, apart=apart[number] if form.adds else ())
         for number, (graph, form) in enumerate(planned.functions)
     ]
-    work = [len(graph.nodes) for graph, _ in planned.functions]
+    work = [len(graph) for graph, _ in planned.functions]
     names = [f"f{number}" for number in range(len(texts))]
     declared = "".join(f"{DEVICE.entry} {name}{SIGNATURE};\n" for name in names)
     cases = "".join(f"    case {number}: {name}(m, b, t, k); break;\n" for number, name in enumerate(names))
@@ -331,7 +332,7 @@ def device_sources(planned: Plan, steps: int, lanes: int, warps: int, single: bo
         "static __device__ __forceinline__ void call(word number, V *m, V *b, const word *t, word k) {\n"
         f"  switch (number) {{\n{cases}  }}\n}}\n"
     )
-    driver = "\n".join([head, declared, call, source.resource("program.h"), resource("driver.cu")])
+    driver = "\n".join([head, declared, call, source_file.resource("program.h"), resource("driver.cu")])
     return [*("\n".join([head, *group]) for group in source.spread(texts, work, MAX_FILES)), driver]
 
 
@@ -445,7 +446,7 @@ def compile_on(
         lanes=device.lanes,
         precision=precision,
         functions=len(planned.functions),
-        operations=sum(len(graph.nodes) for graph, _ in planned.functions),
+        operations=sum(len(graph) for graph, _ in planned.functions),
         bytes_per_lane=(2 * program.size + planned.tape) * (4 if single else 8),
         cached=cached,
         seconds=time.perf_counter() - began,

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field
-from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.codegen.emit.pieces import Form
-from symphys.codegen.graph.adjoint import Mask, adjoint_graph
-from symphys.codegen.graph.graph import Graph
-from symphys.codegen.graph.instructions import graph_of
-from symphys.codegen.graph.rewrite import Taped, taped
+from symphys.codegen.emit.form import Form
+from symphys.codegen.graph.graph import Graph, Instructions, Mask, Taped, taped
+from symphys.codegen.graph.instructions import instructions_of
 from symphys.codegen.program.program import Function, Place
 from symphys.records import dataclass
-
-Key = tuple[object, ...]
 
 
 @dataclass
@@ -26,34 +21,20 @@ class FunctionGraphs:
     """The graphs of a casadi Function and of its adjoints, which all plans share.
 
     Attributes:
+        instructions: what they are made from.
         forward: its own graph.
     """
 
+    instructions: Instructions
     forward: Graph
-    _adjoints: dict[Key, Graph] = field(default_factory=dict)
+    _adjoints: dict[tuple[Mask, Mask, bool], Graph] = field(default_factory=dict)
     _taped: dict[int, Taped | None] = field(default_factory=dict)
 
-    @cached_property
-    def key(self) -> Key:
-        """Equal for equal functions."""
-        return self.forward.key()
-
-    @cached_property
-    def dependence(self) -> list[NDArray[np.bool_]]:
-        """Return for each result the matrix (size, arguments) of dependencies."""
-        bits, arguments = self.forward.origins(), range(len(self.forward.sizes))
-        return [
-            np.array([[bits[x] >> i & 1 for i in arguments] for x in result], dtype=bool).reshape(
-                len(result), len(arguments)
-            )
-            for result in self.forward.results
-        ]
-
-    def adjoint(self, function: Function, inputs: Mask, outputs: Mask, tabled: bool) -> Graph:
-        """Return the adjoint graph for these arguments and results; ``function``: this one or an equal one."""
+    def adjoint(self, inputs: Mask, outputs: Mask, tabled: bool) -> Graph:
+        """Return the adjoint graph for these arguments and results; ``tabled`` as in ``Instructions.adjoint``."""
         key = inputs, outputs, tabled
         if key not in self._adjoints:
-            self._adjoints[key] = adjoint_graph(function, self.forward, inputs, outputs, tabled)
+            self._adjoints[key] = self.instructions.adjoint(*key)
         return self._adjoints[key]
 
     def taped(self, adjoint: Graph) -> Taped | None:
@@ -70,7 +51,8 @@ _KNOWN: WeakKeyDictionary[Function, FunctionGraphs] = WeakKeyDictionary()
 def graphs_of(function: Function) -> FunctionGraphs:
     """Return the graphs of a function."""
     if function not in _KNOWN:
-        _KNOWN[function] = FunctionGraphs(graph_of(function))
+        instructions = instructions_of(function)
+        _KNOWN[function] = FunctionGraphs(instructions, instructions.graph())
     return _KNOWN[function]
 
 
@@ -79,12 +61,9 @@ class DistinctFunctions:
     """The functions to compile, in the order of their numbers, and the graphs of each casadi Function."""
 
     listed: list[tuple[Graph, Form]] = field(default_factory=list)
-    _numbers: dict[Key, int] = field(default_factory=dict)
+    _numbers: dict[tuple[bytes, Form], int] = field(default_factory=dict)
     _graphs: dict[int, FunctionGraphs] = field(default_factory=dict)
-    _equal: dict[Key, FunctionGraphs] = field(default_factory=dict)
-    _identities: dict[int, int] = field(default_factory=dict)
-    _distinct: dict[Key, int] = field(default_factory=dict)
-    _arguments: dict[int, frozenset[int]] = field(default_factory=dict)
+    _equal: dict[bytes, FunctionGraphs] = field(default_factory=dict)
 
     def entry(self, graph: Graph, form: Form, places: Sequence[Place]) -> list[int]:
         """Return the table entry of a call: number, length, then offset and stride of each place."""
@@ -93,7 +72,7 @@ class DistinctFunctions:
 
     def number(self, graph: Graph, form: Form) -> int:
         """Return the number of a function, a new one where it is met first."""
-        key = (self._identity(graph), form)
+        key = (graph.key, form)
         if key not in self._numbers:
             self._numbers[key] = len(self.listed)
             self.listed.append((graph, form))
@@ -104,8 +83,8 @@ class DistinctFunctions:
         return self._of(function).forward
 
     def adjoint(self, function: Function, inputs: Mask, outputs: Mask, tabled: bool = False) -> Graph:
-        """Return the adjoint graph for these arguments and results; ``tabled``: as ``adjoint_graph`` has it."""
-        return self._of(function).adjoint(function, inputs, outputs, tabled)
+        """Return the adjoint graph for these arguments and results; ``tabled`` as in ``Instructions.adjoint``."""
+        return self._of(function).adjoint(inputs, outputs, tabled)
 
     def taped(self, function: Function, adjoint: Graph) -> Taped | None:
         """Return a function and its adjoint with a tape between them; None if nothing is worth it."""
@@ -113,24 +92,12 @@ class DistinctFunctions:
 
     def dependence(self, function: Function) -> list[NDArray[np.bool_]]:
         """Return for each result the matrix (size, arguments) of dependencies."""
-        return self._of(function).dependence
-
-    def arguments(self, graph: Graph) -> frozenset[int]:
-        """Return the arguments that a graph reads."""
-        if id(graph) not in self._arguments:
-            self._arguments[id(graph)] = frozenset(graph.nodes[x].at[0] for x in graph.needed())
-        return self._arguments[id(graph)]
+        return self._of(function).forward.dependence
 
     def _of(self, function: Function) -> FunctionGraphs:
         """Return the graphs of a function, which equal functions share."""
         identity = function.__hash__()
         if identity not in self._graphs:
             found = graphs_of(function)
-            self._graphs[identity] = self._equal.setdefault(found.key, found)
+            self._graphs[identity] = self._equal.setdefault(found.forward.key, found)
         return self._graphs[identity]
-
-    def _identity(self, graph: Graph) -> int:
-        """Return a number that equal graphs share; graphs live as long as this object, so that addresses name them."""
-        if id(graph) not in self._identities:
-            self._identities[id(graph)] = self._distinct.setdefault(graph.key(), len(self._distinct))
-        return self._identities[id(graph)]

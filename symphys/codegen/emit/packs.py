@@ -302,7 +302,7 @@ class _Layout:
             graph, form = planned.functions[again[k].number]
             offset = again[k].pairs[-1][0]
             if offset >= self._program.size and form.primal == len(graph.sizes):
-                size = len(graph.results[-1])
+                size = graph.result_sizes[-1]
                 offsets = np.array([again[k + lane].pairs[-1][0] for lane in range(lanes)])
                 at = -(-at // lanes) * lanes
                 self.to[offsets[:, None] + np.arange(size)] = at + np.arange(size * lanes).reshape(size, lanes).T
@@ -365,7 +365,7 @@ class _Tables:
 
     def _sizes(self, number: int) -> list[int]:
         graph, _ = self._planned.functions[number]
-        return [*graph.sizes, *map(len, graph.results)]
+        return [*graph.sizes, *graph.result_sizes]
 
     def _single(self, entry: _Entry) -> _Entry:
         pairs, accesses = [], []
@@ -404,10 +404,10 @@ class _Tables:
             return True
         arguments = len(graph.sizes)
         seen: dict[int, set[tuple[int, int, int]]] = {}
-        for r, result in enumerate(graph.results):
+        for r, size in enumerate(graph.result_sizes):
             for lane, entry in enumerate(own):
                 offset, _ = entry.pairs[arguments + r]
-                for j in range(len(result)):
+                for j in range(size):
                     seen.setdefault(offset + j, set()).add((r, lane, j))
         for touched in seen.values():
             one_result = len({(r, j) for r, _, j in touched}) == 1

@@ -6,14 +6,15 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
 from symphys.codegen.emit.dialect import NUMBERS
+from symphys.codegen.emit.form import Form
 from symphys.codegen.emit.guarding import Guarding
-from symphys.codegen.emit.pieces import Form
 from symphys.codegen.emit.plan import plan
-from symphys.codegen.emit.source import DRIVER, resource
+from symphys.codegen.emit.source import DRIVER
 from symphys.codegen.emit.writer import write
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.program.program import Function, Place, Program
 from symphys.codegen.runtime.library import data_places
+from symphys.codegen.toolchain.source_file import resource
 from symphys.records import dataclass
 
 RANGES = ("z", "parameters", "zeroed", "constants", "outputs", "seeded")

@@ -8,16 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.codegen.emit.form import Form
 from symphys.codegen.emit.functions import DistinctFunctions
 from symphys.codegen.emit.guarding import TABLES, guarding_of
 from symphys.codegen.emit.packs import pack_calls
-from symphys.codegen.emit.pieces import Form
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.tables import Recipe, Table, table_of
 from symphys.codegen.graph.activity import AnnotatedCalls, LivenessGraph
-from symphys.codegen.graph.adjoint import Mask
-from symphys.codegen.graph.graph import Graph
-from symphys.codegen.graph.rewrite import Taped
+from symphys.codegen.graph.graph import Graph, Mask, Taped
 from symphys.codegen.program.phase_calls import PhaseCalls, grouped, rows_of
 from symphys.codegen.program.program import Function, Place, Program
 from symphys.codegen.program.spans import Spans
@@ -47,7 +45,7 @@ def plan(program: Program, seeded: Sequence[str], word: int = 64, noted: bool = 
     body = parts[1]
     # calls that are run again before the adjoints of a step, and what a tape spares them
     at_once = noted and _taped_at_once(program)
-    again = np.ones(len(body.calls), bool) if at_once else _again(program, body, reach, functions, noted)
+    again = np.ones(len(body.calls), bool) if at_once else _again(program, body, reach, noted)
     tape = _put_on_tape(program, body, again, functions, FAST_MEMORY // word)
     # tables of calls forward, again and backward, and of calls that may be skipped
     tables = {name: part.pushes(functions) for name, part in zip(("prologue", "body", "epilogue"), parts, strict=True)}
@@ -205,12 +203,10 @@ def _taped_at_once(program: Program) -> bool:
     return program.steps == 1 and not any(call.guard is not None or call.section is not None for call in program.body)
 
 
-def _again(
-    program: Program, body: PlannedPhase, reach: LivenessGraph, functions: DistinctFunctions, noted: bool
-) -> NDArray[np.bool_]:
+def _again(program: Program, body: PlannedPhase, reach: LivenessGraph, noted: bool) -> NDArray[np.bool_]:
     """Return flags (calls,) of those to run again before the adjoints of a step: those whose scratch is read."""
     spans = body.calls.inputs
-    used = [[i for i in range(kind.function.n_in()) if i in functions.arguments(kind.graph)] for kind in body.kinds]
+    used = [[i for i in range(kind.function.n_in()) if i in kind.graph.reads] for kind in body.kinds]
     read = [np.zeros(0, np.int64)]
     for kind, calls in enumerate(grouped(body.kind + 1, len(body.kinds) + 1)[1:]):
         read.append((spans.starts[calls][:, None] + np.array(used[kind], np.int64)).ravel())

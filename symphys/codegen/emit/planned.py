@@ -13,7 +13,7 @@ from symphys.records import dataclass
 from symphys.types import Ints
 
 if TYPE_CHECKING:
-    from symphys.codegen.emit.pieces import Form
+    from symphys.codegen.emit.form import Form
     from symphys.codegen.emit.shapes import Shape
     from symphys.codegen.graph.graph import Graph
     from symphys.codegen.program.program import Program

@@ -3,36 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.resources import files
 
 from symphys.codegen.emit.dialect import ONE_LANE, PACK, VECTORS, Dialect
 from symphys.codegen.emit.planned import Plan
 from symphys.codegen.emit.writer import write
-from symphys.records import dataclass
+from symphys.codegen.toolchain.source_file import SourceFile, resource
 
-ROOM = "symphys.codegen"
 DRIVER = ("program.h", "guards.c", "driver.c")
 NUMBERS = "#define NUMBERS\n"
 UNALIGNED = "typedef V U __attribute__((aligned(sizeof(R)), may_alias));\n"
 MAX_FILES, NODES_PER_FILE = 4, 400
 """Most files of values and most of adjoints; nodes for which another file is begun."""
-
-
-@dataclass(frozen=True)
-class SourceFile:
-    """A C file.
-
-    Attributes:
-        text: C.
-        narrow: whether it is for fewer lanes than a vector register has.
-        straight: whether functions are straight lines of values, each computed once.
-        broadcasts: whether functions read numbers into all lanes of a vector.
-    """
-
-    text: str
-    narrow: bool = False
-    straight: bool = False
-    broadcasts: bool = False
 
 
 def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[SourceFile]:
@@ -46,7 +27,7 @@ def sources(plan: Plan, lanes: int, single: bool, narrow: bool = False) -> list[
     for i, ((_, form), shape) in enumerate(zip(plan.functions, shapes, strict=True)):
         kinds.setdefault((form.backward, shape.lanes if shape else 1), []).append(i)
     for (_, calls), mine in sorted(kinds.items()):
-        work = [len(plan.functions[i][0].nodes) for i in mine]
+        work = [len(plan.functions[i][0]) for i in mine]
         dialect = PACK if calls > 1 else forms_of(lanes)
         texts = [write(f"f{i}", *plan.functions[i], dialect, moving[i], shapes[i]) for i in mine]
         start = pack_head(calls, single) if calls > 1 else head_of(lanes, single, dialect)
@@ -92,8 +73,3 @@ def spread(texts: Sequence[str], work: Sequence[int], most: int) -> list[list[st
         groups[least].append(texts[i])
         loads[least] += work[i]
     return [group for group in groups if group]
-
-
-def resource(name: str) -> str:
-    """Return the text of a C file of this room."""
-    return files(ROOM).joinpath(name).read_text(encoding="utf-8")

@@ -1,150 +1,236 @@
-"""A function as a graph of operations, each distinct value once; masks apart from numbers.
+"""Functions as graphs of operations, each distinct value once; masks apart from numbers.
 
-Comparisons and logic give masks, integers of all ones or all zeros in each lane, which selects take as they are.
+Comparisons and logic give masks, integers of all ones or all zeros in each lane, which selects take as they are. The
+graphs of a robot have hundreds of thousands of nodes, so ``graphs.c`` makes and rewrites them; it is compiled once.
 """
 
 from __future__ import annotations
 
-from dataclasses import field
-from itertools import compress
-from math import frexp
-from typing import NamedTuple
+import ctypes
+import weakref
+from collections.abc import Sequence
+from functools import cache, cached_property
+from typing import Any, NamedTuple
 
-from symphys.codegen.graph.operations import MASKS
-from symphys.records import dataclass
+import numpy as np
+from numpy.typing import NDArray
 
-MAX_EXPONENT = 100
-"""Exponents for which powers of two have reciprocals, in single precision too."""
-COMMUTE = frozenset({"add", "mul", "eq", "ne", "and", "or", "hypot"})
+from symphys.codegen.toolchain.libraries import own_library
+from symphys.types import Array, Bools
+
+POINTER, COUNT, INT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int32
+SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "operation_names": (ctypes.c_char_p, ()),
+    "foreign_names": (ctypes.c_char_p, ()),
+    "graph_free": (None, (POINTER,)),
+    "graph_count": (COUNT, (POINTER,)),
+    "graph_arguments": (INT, (POINTER,)),
+    "graph_outputs": (INT, (POINTER,)),
+    "graph_sizes": (None, (POINTER, POINTER)),
+    "graph_nodes": (None, (POINTER, POINTER, POINTER, POINTER)),
+    "graph_needed": (None, (POINTER, POINTER)),
+    "graph_operations": (COUNT, (POINTER,)),
+    "graph_reads": (None, (POINTER, POINTER)),
+    "graph_key": (None, (POINTER, POINTER)),
+    "graph_dependence": (None, (POINTER, INT, POINTER)),
+    "graph_fused": (POINTER, (POINTER, INT)),
+    "graph_early_sums": (POINTER, (POINTER, INT)),
+    "graph_taped": (INT, (POINTER, POINTER, POINTER, POINTER)),
+    "graph_write": (POINTER, (POINTER, POINTER, *[INT] * 5, POINTER, POINTER)),
+    "text_free": (None, (POINTER,)),
+    "function_new": (POINTER, (COUNT, *[POINTER] * 4, INT, INT, POINTER, INT, POINTER)),
+    "function_free": (None, (POINTER,)),
+    "function_graph": (POINTER, (POINTER,)),
+    "function_adjoint": (POINTER, (POINTER, POINTER, POINTER)),
+    "function_tabled": (POINTER, (POINTER, POINTER, POINTER)),
+    "codes_new": (POINTER, ()),
+    "codes_free": (None, (POINTER,)),
+    "codes_add": (INT, (POINTER, POINTER, *[INT] * 5)),
+    "codes_count": (COUNT, (POINTER,)),
+    "codes_constants": (COUNT, (POINTER,)),
+    "codes_read": (None, (POINTER, POINTER, POINTER)),
+}
+"""Result and arguments of the functions of ``graphs.c``."""
+Mask = tuple[bool, ...]
 
 
-def _reciprocal(x: float) -> float | None:
-    """Return 1 / x of a power of two, whose product is the division to the last bit; None for other numbers."""
-    return 1 / x if abs(frexp(x)[0]) == 0.5 and abs(frexp(x)[1]) < MAX_EXPONENT else None
+@cache
+def library() -> Any:
+    """Return the compiled ``graphs.c``; KernelUnavailable without a compiler."""
+    found = own_library("graphs.c")
+    for name, (result, arguments) in SIGNATURES.items():
+        function = getattr(found, name)
+        function.restype, function.argtypes = result, arguments
+    return found
 
 
-def ordered(op: str, operands: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the operands as equal values have them, whichever way round they were written."""
-    return operands[::-1] if op in COMMUTE and operands[0] > operands[1] else operands
+@cache
+def operations() -> tuple[str, ...]:
+    """Return the names of all operations in the order of their numbers; the first two are ``input`` and ``const``."""
+    return tuple(library().operation_names().decode().split())
+
+
+class Handle:
+    """What ``graphs.c`` has made, for as long as this object lives."""
+
+    def __init__(self, address: int, free: str) -> None:
+        """Keep an address; ``free``: the name of the function that ends its life."""
+        self.address = address
+        weakref.finalize(self, getattr(library(), free), address)
 
 
 class Node(NamedTuple):
-    """One value: a tuple, since millions are made and looked up.
+    """One value, for who looks at a graph.
 
     Attributes:
-        op: ``input``, ``const`` or a name in ``operations.FORMS``.
+        op: ``input``, ``const`` or another of ``operations``.
         operands: numbers of the nodes that it is made from.
         at: (argument, word) of an input.
-        value: of a constant, exact, as text.
+        value: of a constant.
     """
 
     op: str
     operands: tuple[int, ...] = ()
     at: tuple[int, int] = (-1, -1)
-    value: str = ""
+    value: float = 0.0
 
 
-def made(op: str, operands: tuple[int, ...], at: tuple[int, int] = (-1, -1), value: str = "") -> Node:
-    """Return a node as ``Node`` makes it, in a third of the time."""
-    return tuple.__new__(Node, (op, operands, at, value))
+class Graph(Handle):
+    """Nodes in an order in which they can be computed, and for each result the nodes of its words.
 
+    Attributes:
+        sizes: of the arguments.
+        result_sizes: of the results.
+    """
 
-@dataclass
-class Graph:
-    """Nodes in an order in which they can be computed, and for each result the nodes of its words."""
+    def __init__(self, address: int) -> None:
+        """Take over a graph of ``graphs.c``."""
+        super().__init__(address, "graph_free")
+        c = library()
+        arguments, outputs = c.graph_arguments(address), c.graph_outputs(address)
+        sizes = (INT * max(arguments + outputs, 1))()
+        c.graph_sizes(address, sizes)
+        self.sizes = tuple(sizes[:arguments])
+        self.result_sizes = tuple(sizes[arguments : arguments + outputs])
 
-    sizes: tuple[int, ...]
-    nodes: list[Node] = field(default_factory=list)
-    results: list[list[int]] = field(default_factory=list)
-    numbers: dict[Node, int] = field(default_factory=dict)
+    def __len__(self) -> int:
+        """Return the number of nodes."""
+        return int(library().graph_count(self.address))
 
-    def put(self, node: Node) -> int:
-        """Return the number of a node, a new one if there is none like it."""
-        number, count = self.numbers.setdefault(node, len(self.nodes)), len(self.nodes)
-        if number == count:
-            self.nodes.append(node)
-        return number
+    @cached_property
+    def operations(self) -> int:
+        """The number of operations that results need."""
+        return int(library().graph_operations(self.address))
 
-    def constant(self, value: float) -> int:
-        """Return a constant."""
-        return self.put(Node("const", value=float(value).hex()))
+    @cached_property
+    def key(self) -> bytes:
+        """128 bits that are equal for equal functions."""
+        found = np.zeros(2, np.uint64)
+        library().graph_key(self.address, found.ctypes.data)
+        return found.tobytes()
 
-    def add(self, op: str, *operands: int) -> int:
-        """Return a value, simplified where that is cheap; operands are cast to what the operation takes."""
-        if op in ("and", "or", "not"):
-            operands = tuple(self.mask(x) for x in operands)
-        elif op == "iez":
-            operands = (self.mask(operands[0]), self.number(operands[1]))
-        elif op == "select":
-            operands = (operands[0], self.number(operands[1]), self.number(operands[2]))
-        else:
-            operands = tuple(self.number(x) for x in operands)
-        operands = ordered(op, operands)
-        simpler = self._simpler(op, operands)
-        return self.put(made(op, operands)) if simpler is None else simpler
+    @cached_property
+    def reads(self) -> frozenset[int]:
+        """The arguments that results depend on."""
+        found: Bools = np.zeros(len(self.sizes), bool)
+        library().graph_reads(self.address, found.ctypes.data)
+        return frozenset(np.flatnonzero(found).tolist())
 
-    def mask(self, x: int) -> int:
-        """Return the node as a mask: itself, what it was made from, or x != 0."""
-        node = self.nodes[x]
-        if node.op in MASKS:
-            return x
-        return node.operands[0] if node.op == "one" else self.put(Node("isnt0", (x,)))
+    @cached_property
+    def dependence(self) -> list[Bools]:
+        """For each result the matrix (size, arguments) of dependencies."""
+        flags = self._dependence(False, len(self.sizes))
+        return np.split(flags, np.cumsum(self.result_sizes)[:-1]) if self.result_sizes else []
 
-    def number(self, x: int) -> int:
-        """Return the node as a number: a mask becomes 0 or 1."""
-        return self.put(Node("one", (x,))) if self.nodes[x].op in MASKS else x
+    def sparsity(self) -> Bools:
+        """Return the matrix (words of all results, words of all arguments) of dependencies."""
+        return self._dependence(True, sum(self.sizes))
 
-    def _simpler(self, op: str, operands: tuple[int, ...]) -> int | None:
-        nodes = [self.nodes[x] for x in operands]
-        if op == "not" and nodes[0].op == "not":
-            return nodes[0].operands[0]
-        if op == "add" and nodes[0].op == nodes[1].op == "iez":
-            return self._select(*nodes)
-        if op == "div" and nodes[1].op == "const" and (power := _reciprocal(float.fromhex(nodes[1].value))) is not None:
-            return self.add("mul", operands[0], self.constant(power))
-        if op == "div" and nodes[0].op == "one" and nodes[1].op == "add" and operands[0] in nodes[1].operands:
-            return self._share(operands[0], nodes[1])
-        return None
+    def _dependence(self, by_word: bool, columns: int) -> Bools:
+        flags: Bools = np.zeros((sum(self.result_sizes), columns), bool)
+        library().graph_dependence(self.address, by_word, flags.ctypes.data)
+        return flags
 
-    def _select(self, a: Node, b: Node) -> int | None:
-        """Simplify (c ? x : 0) + (not c ? y : 0) to one select."""
-        if self.nodes[b.operands[0]] == Node("not", (a.operands[0],)):
-            return self.add("select", a.operands[0], a.operands[1], b.operands[1])
-        if self.nodes[a.operands[0]] == Node("not", (b.operands[0],)):
-            return self.add("select", b.operands[0], b.operands[1], a.operands[1])
-        return None
+    @property
+    def nodes(self) -> list[Node]:
+        """All nodes."""
+        nodes, values, _ = self._arrays()
+        names = operations()
+        found = []
+        for (op, *rest), value in zip(nodes.tolist(), values.tolist(), strict=True):
+            given = names[op] == "input"
+            operands = () if given else tuple(y for y in rest if y >= 0)
+            found.append(Node(names[op], operands, (rest[0], rest[1]) if given else (-1, -1), value))
+        return found
 
-    def _share(self, p: int, total: Node) -> int | None:
-        """Simplify p / (p + q) of truth values, as in derivatives of fmin and fmax, without the division."""
-        q = total.operands[1] if total.operands[0] == p else total.operands[0]
-        if self.nodes[q].op != "one":
-            return None
-        share = self.add("select", self.mask(q), self.constant(0.5), self.constant(1.0))
-        other = self.add("select", self.mask(q), self.constant(0.0), self.constant(float("nan")))
-        return self.add("select", self.mask(p), share, other)
+    @property
+    def results(self) -> list[NDArray[np.int32]]:
+        """For each result the numbers of the nodes of its words."""
+        words = self._arrays()[2]
+        return np.split(words, np.cumsum(self.result_sizes)[:-1]) if self.result_sizes else []
 
     def needed(self) -> list[int]:
         """Return the nodes that results are made from, in order."""
-        wanted, nodes = bytearray(len(self.nodes)), self.nodes
-        for result in self.results:
-            for x in result:
-                wanted[x] = 1
-        for x in range(len(nodes) - 1, -1, -1):
-            if wanted[x]:
-                for y in nodes[x][1]:
-                    wanted[y] = 1
-        return list(compress(range(len(nodes)), wanted))
+        flags: Bools = np.zeros(len(self), bool)
+        library().graph_needed(self.address, flags.ctypes.data)
+        return [int(x) for x in np.flatnonzero(flags)]
 
-    def origins(self) -> list[int]:
-        """Return for each node the arguments that it depends on, as bits."""
-        bits: list[int] = []
-        for node in self.nodes:
-            own = 1 << node.at[0] if node.op == "input" else 0
-            for x in node.operands:
-                own |= bits[x]
-            bits.append(own)
-        return bits
+    def fused(self, adds: bool) -> Graph:
+        """Return it with products that are only added or subtracted fused with their sums: fma, fms and fnma.
 
-    def key(self) -> tuple[object, ...]:
-        """Equal for equal functions."""
-        return (self.sizes, tuple(self.nodes), tuple(tuple(r) for r in self.results))
+        Nodes keep their numbers. ``adds``: results are added to what is there, so that products among them are fused
+        there.
+        """
+        return Graph(library().graph_fused(self.address, adds))
+
+    def with_early_sums(self, primal: int) -> Graph:
+        """Return it with sums of what depends on arguments from ``primal`` on in an order that waits for less."""
+        return Graph(library().graph_early_sums(self.address, primal))
+
+    def _arrays(self) -> tuple[NDArray[np.int32], Array, NDArray[np.int32]]:
+        nodes, values = np.zeros((len(self), 4), np.int32), np.zeros(len(self))
+        results = np.zeros(max(sum(self.result_sizes), 1), np.int32)
+        library().graph_nodes(self.address, nodes.ctypes.data, values.ctypes.data, results.ctypes.data)
+        return nodes, values, results[: sum(self.result_sizes)]
+
+
+class Taped(NamedTuple):
+    """A call's two functions, with values that the first stores and the second needs not compute again.
+
+    Attributes:
+        forward: has the tape as its last result.
+        adjoint: has the tape as an argument between those of the call and the adjoints of its results.
+        size: words of the tape.
+    """
+
+    forward: Graph
+    adjoint: Graph
+    size: int
+
+
+def taped(forward: Graph, adjoint: Graph) -> Taped | None:
+    """Put all that depends on the call's arguments only on a tape; None if there is nothing."""
+    push, pull = POINTER(), POINTER()
+    size = library().graph_taped(forward.address, adjoint.address, ctypes.byref(push), ctypes.byref(pull))
+    return Taped(Graph(push.value or 0), Graph(pull.value or 0), size) if size else None
+
+
+class Instructions(Handle):
+    """The instructions of a function, from which its graph and those of its adjoints are made."""
+
+    def graph(self) -> Graph:
+        """Return the graph of the function itself."""
+        return Graph(library().function_graph(self.address))
+
+    def adjoint(self, inputs: Mask, outputs: Mask, tabled: bool = False) -> Graph:
+        """Return a graph of the arguments, then the adjoints of the marked results; a result for each marked argument.
+
+        ``tabled``: all slopes are computed, then multiplied with the adjoints: more to compute, but of it only the
+        products depend on the adjoints.
+        """
+        make = library().function_tabled if tabled else library().function_adjoint
+        return Graph(make(self.address, _flags(inputs), _flags(outputs)))
+
+
+def _flags(marks: Sequence[bool]) -> Any:
+    return (ctypes.c_uint8 * max(len(marks), 1))(*marks)

@@ -1,21 +1,9 @@
-"""Names of the operations of SX Functions, and their forms in C."""
+"""The operations of graphs in C."""
 
 from __future__ import annotations
 
-import casadi as ca
-
-UNARY = "neg exp log sqrt sin cos tan asin acos atan floor ceil erf sinh cosh tanh asinh acosh atanh log1p expm1"
-BINARY = "add sub mul div pow lt le eq ne fmod remainder copysign atan2 hypot"
-NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in f"{UNARY} {BINARY} and or not".split()} | {
-    ca.OP_CONSTPOW: "pow",
-    ca.OP_IF_ELSE_ZERO: "iez",
-}
-"""Operations that become one node of the same operands."""
-
-MASKS = frozenset({"lt", "le", "eq", "ne", "not", "and", "or", "isnt0"})
-"""Operations that give a mask."""
-
-LIBRARY = tuple(name for name in UNARY.split() if name != "neg")
+UNARY = "exp log sqrt sin cos tan asin acos atan floor ceil erf sinh cosh tanh asinh acosh atanh log1p expm1"
+LIBRARY = tuple(UNARY.split())
 LIBRARY_OF_TWO = ("pow", "fmod", "remainder", "copysign", "atan2", "hypot")
 """Functions of the C library."""
 INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}

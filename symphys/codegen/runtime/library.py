@@ -11,8 +11,8 @@ import numpy as np
 
 from symphys.codegen.emit.guarding import WIDTHS
 from symphys.codegen.emit.planned import Plan
-from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Place, Program
+from symphys.codegen.toolchain.libraries import loaded
 from symphys.types import Ints
 
 if TYPE_CHECKING:
@@ -97,14 +97,6 @@ class LinkedCodes:
                 found[at] = self._addresses[found[at]]
             at += int(found[at + 1])
         return found
-
-
-def loaded(path: Path) -> ctypes.CDLL:
-    """Load a compiled library; KernelUnavailable if the system refuses."""
-    try:
-        return ctypes.CDLL(str(path))
-    except OSError as error:
-        raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
 
 
 class Loaded:

@@ -7,11 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from symphys.codegen.emit.source import SourceFile, resource
 from symphys.codegen.errors import KernelUnavailable
-from symphys.codegen.runtime.library import loaded
-from symphys.codegen.toolchain.build import shared_library
-from symphys.codegen.toolchain.cache import default_cache
+from symphys.codegen.toolchain.libraries import own_library
 from symphys.types import Array
 
 MAX_WORK = 64**3
@@ -70,7 +67,6 @@ class CompiledRiccati:
 def compiled_riccati() -> CompiledRiccati | None:
     """Return the compiled recursion; None without a compiler. It is built once for a machine."""
     try:
-        with shared_library([SourceFile(resource("riccati.c"))], default_cache()) as built:
-            return CompiledRiccati(loaded(built.path))
+        return CompiledRiccati(own_library("riccati.c"))
     except KernelUnavailable:
         return None

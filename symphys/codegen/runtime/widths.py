@@ -24,7 +24,7 @@ from symphys.codegen.toolchain.processes import Background
 from symphys.records import dataclass
 
 if TYPE_CHECKING:
-    from symphys.codegen.emit.source import SourceFile
+    from symphys.codegen.toolchain.source_file import SourceFile
 
 COMPILE_TIME = 2.0, 1e-4
 """Estimate of the time of compiling: [s], and [s] for each operation of the kernel."""

@@ -17,20 +17,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symphys.codegen.emit.codes import codes_of, interpreter
-from symphys.codegen.emit.source import MAX_FILES, SourceFile, listed, resource, spread
+from symphys.codegen.emit.source import MAX_FILES, listed, spread
 from symphys.codegen.emit.writer import write
 from symphys.codegen.errors import KernelUnavailable, ProgramError
 from symphys.codegen.program.collection import uncollected
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import BuildReport
-from symphys.codegen.runtime.library import LinkedCodes, loaded
+from symphys.codegen.runtime.library import LinkedCodes
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.slopes.kept import KeptSlopes
 from symphys.codegen.slopes.plan import SlopePlan, slope_plan
-from symphys.codegen.toolchain.build import Built, kept_library, shared_library, texts_of, waits
+from symphys.codegen.toolchain.build import waits
 from symphys.codegen.toolchain.cache import Cache, default_cache
 from symphys.codegen.toolchain.compiler import processor, processors
+from symphys.codegen.toolchain.libraries import Built, kept_library, loaded, shared_library, texts_of
 from symphys.codegen.toolchain.processes import Background
+from symphys.codegen.toolchain.source_file import SourceFile, resource
 from symphys.codegen.toolchain.warm_start import ProgramSource, found, keep
 from symphys.types import Array, Ints
 
@@ -246,7 +248,7 @@ def compile_slopes(
         if whole.zeroed or whole.constants:
             raise ProgramError("slopes are of programs without constants")
         parts = _sources(planned, lanes)
-    operations = sum(len(graph.nodes) for graph, _ in planned.functions)
+    operations = sum(len(graph) for graph, _ in planned.functions)
     kept = KeptSlopes(whole, planned, texts_of(parts), len(planned.functions), operations)
     if key is not None:
         keep(key, kept.write, cache)
@@ -293,7 +295,7 @@ def _sources(planned: SlopePlan, lanes: int) -> list[SourceFile]:
     found = []
     for backward in (False, True):
         mine = [i for i, (_, form) in enumerate(planned.functions) if form.backward == backward]
-        work = [len(planned.functions[i][0].nodes) for i in mine]
+        work = [len(planned.functions[i][0]) for i in mine]
         for group in spread([texts[i] for i in mine], work, MAX_FILES):
             found.append(SourceFile("\n".join([head, *group]), straight=True, broadcasts=True))
     return [*found, SourceFile(head + listed(len(planned.functions)) + resource("slopes.c"))]

@@ -12,6 +12,7 @@ left out stay by themselves.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import groupby, pairwise
 from typing import Literal
 
@@ -20,13 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symphys.codegen.emit.alternatives import ALWAYS, NONE, Alternatives, Span, entries_of, of_adjoint, of_call, word_of
+from symphys.codegen.emit.form import Form
 from symphys.codegen.emit.functions import DistinctFunctions
-from symphys.codegen.emit.pieces import Form
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.graph.activity import Activity, CallActivity
-from symphys.codegen.graph.adjoint import Mask
-from symphys.codegen.graph.graph import Graph
-from symphys.codegen.graph.rewrite import Taped
+from symphys.codegen.graph.graph import Graph, Mask, Taped
 from symphys.codegen.program.program import Function, FunctionCall, Place, Program
 from symphys.records import dataclass
 from symphys.types import Bools, Ints
@@ -42,6 +41,10 @@ COUNT_CORRECTION = 0.95
 """Correction of the operations counted for a slope: products with 1 are none. Measured in large calls: 0.99."""
 MAX_SLOPES = 6000
 """Slopes of a call beyond which it is not asked whether a table of them is less."""
+
+
+Key = tuple[int, int]
+"""Offset and size of a place."""
 
 
 @dataclass
@@ -64,6 +67,11 @@ class Pull:
     taped: Taped | None
     tape: Place
     alternatives: Alternatives = ALWAYS
+
+    @cached_property
+    def written(self) -> list[Key]:
+        """The places whose adjoints it writes."""
+        return [_key(place) for place in self.marked("inputs")]
 
     def marked(self, side: Literal["inputs", "outputs"]) -> list[Place]:
         """Return the places whose adjoints it writes, or reads and zeroes."""
@@ -109,24 +117,9 @@ class Pulls:
         return found
 
 
-def sparsity(graph: Graph) -> NDArray[np.float32]:
-    """Return the matrix (words of all results, words of all arguments): 1 where one depends on the other."""
-    starts = np.cumsum([0, *graph.sizes]).tolist()
-    bits: list[int] = []
-    for node in graph.nodes:
-        own = 1 << (starts[node.at[0]] + node.at[1]) if node.op == "input" else 0
-        for x in node.operands:
-            own |= bits[x]
-        bits.append(own)
-    rows = [bits[x].to_bytes(starts[-1] // 8 + 1, "little") for result in graph.results for x in result]
-    flags = np.frombuffer(b"".join(rows), np.uint8).reshape(len(rows), -1)
-    return np.unpackbits(flags, axis=1, count=starts[-1], bitorder="little").astype(np.float32)
-
-
 def _operations(graph: Graph, taped: Taped | None) -> int:
-    """Write the adjoint of a call for a block of rows."""
-    found = taped.adjoint if taped else graph
-    return sum(found.nodes[x].op not in ("input", "const") for x in found.needed())
+    """Return the operations of the adjoint of a call for a block of rows."""
+    return (taped.adjoint if taped else graph).operations
 
 
 def _cheaper(
@@ -136,7 +129,7 @@ def _cheaper(
     forward = functions.forward(function)
     graph = functions.adjoint(function, inputs, outputs)
     taped = functions.taped(function, graph)
-    most, slopes = TABLE_COST * _operations(graph, taped), sparsity(forward)
+    most, slopes = TABLE_COST * _operations(graph, taped), forward.sparsity()
     if slopes.sum() > MAX_SLOPES or _products(forward, slopes, inputs, outputs) > most:
         return graph, taped
     table = functions.adjoint(function, inputs, outputs, tabled=True)
@@ -144,19 +137,17 @@ def _cheaper(
     return (table, other) if _operations(table, other) < most else (graph, taped)
 
 
-def _products(forward: Graph, slopes: NDArray[np.float32], inputs: Mask, outputs: Mask) -> float:
+def _products(forward: Graph, slopes: Bools, inputs: Mask, outputs: Mask) -> float:
     """Return operations of products with a table of that many slopes, which takes long to make.
 
     0 where it is soon made.
     """
     by = np.repeat(inputs, forward.sizes)
-    of = np.repeat(outputs, [len(result) for result in forward.results])
+    of = np.repeat(outputs, forward.result_sizes)
     counts = slopes[of][:, by].sum(axis=0)
     return float(COUNT_CORRECTION * (counts + np.maximum(counts - 1, 0)).sum()) if counts.sum() > ALWAYS_TRIED else 0.0
 
 
-Key = tuple[int, int]
-"""Offset and size of a place."""
 Guards = tuple[int, int]
 """The words of a section and of a guard; -1: none."""
 
@@ -509,8 +500,8 @@ def _left(program: Program, pulls: Sequence[Pull]) -> list[Place]:
     for pull in pulls:
         for place in pull.marked("outputs"):
             read[place.offset : place.offset + place.size] = True
-    written = dict.fromkeys(Place(place.offset, place.size) for pull in pulls for place in pull.marked("inputs"))
-    return [place for place in written if not read[place.offset : place.offset + place.size].all()]
+    written = dict.fromkeys(key for pull in pulls for key in pull.written)
+    return [Place(*key) for key in written if not read[key[0] : sum(key)].all()]
 
 
 def _push(call: FunctionCall, pull: Pull | None, functions: DistinctFunctions) -> list[int]:
@@ -522,7 +513,7 @@ def _push(call: FunctionCall, pull: Pull | None, functions: DistinctFunctions) -
 
 def _entry(pull: Pull, places: AdjointPlaces, values: PointPlaces, functions: DistinctFunctions) -> list[int]:
     call, taped = pull.reach.call, pull.taped
-    used = functions.arguments(taped.adjoint if taped else pull.graph)
+    used = (taped.adjoint if taped else pull.graph).reads
     whole = enumerate([*call.inputs, *([pull.tape] if taped else [])])
     section, guard = map(word_of, pull.alternatives)
     primal = [Place(values.of(place, (section, guard)) if i in used else 0, place.size) for i, place in whole]
@@ -560,7 +551,7 @@ def _taken(program: Program, target: Place, backward: Sequence[Pull], functions:
         inputs = np.concatenate([place.words(1)[0] for place in reach.call.inputs])
         graph = functions.forward(reach.call.function)
         if id(graph) not in known:
-            known[id(graph)] = sparsity(graph)
+            known[id(graph)] = graph.sparsity().astype(np.float32)
         on = np.concatenate(
             [np.full(place.size, mark) for place, mark in zip(reach.call.outputs, pull.outputs, strict=True)]
         )

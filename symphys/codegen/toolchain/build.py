@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import logging
 import os
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, suppress
 from functools import partial
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -22,15 +20,14 @@ from symphys.codegen.runtime.kernel import BuildReport, ProcessorKernel
 from symphys.codegen.runtime.library import LinkedCodes, Loaded
 from symphys.codegen.runtime.widths import COMPILE_TIME, Widths, suited
 from symphys.codegen.toolchain.cache import Cache, default_cache
-from symphys.codegen.toolchain.compiler import Compiler, find_compiler, processor
+from symphys.codegen.toolchain.compiler import find_compiler, processor
+from symphys.codegen.toolchain.libraries import Built, library_key, shared_library, texts_of
 from symphys.codegen.toolchain.plans import KeptPlan
-from symphys.codegen.toolchain.processes import ELSEWHERE
-from symphys.codegen.toolchain.temporary import TemporaryFolder
+from symphys.codegen.toolchain.source_file import SourceFile
 from symphys.records import dataclass
 
 if TYPE_CHECKING:  # what writes C is imported where it is called: a second start writes none
     from symphys.codegen.emit.planned import Plan
-    from symphys.codegen.emit.source import SourceFile
 
 MIN_LONG_OPERATIONS = 2_000
 """Operations from which a kernel takes half a second or more to compile, and begins with an interpreter."""
@@ -113,7 +110,7 @@ def compiled(
         planned = plan(program, names, width.lanes * width.real)
         parts = sources(planned, width.lanes, width.single)
         own = single_lane_plan(planned) if width.several and width.lanes > 1 else None
-    operations = sum(len(graph.nodes) for graph, _ in planned.functions)
+    operations = sum(len(graph) for graph, _ in planned.functions)
     kept = KeptPlan(program, planned, names, texts_of(parts), len(planned.functions), operations, own)
     libraries = KeptLibraries(kept, width, cache)
     lanes = suited(rows, width.lanes) if rows is not None and width.several else width.lanes
@@ -147,7 +144,7 @@ def double_reference(program: Program, names: tuple[str, ...]) -> ProcessorKerne
     started, cache, width = time.perf_counter(), default_cache(), BlockWidth(width_of("auto", False), False, False)
     with uncollected():
         planned = plan(program, names, width.lanes * width.real)
-    operations = sum(len(graph.nodes) for graph, _ in planned.functions)
+    operations = sum(len(graph) for graph, _ in planned.functions)
     if operations < MIN_LONG_OPERATIONS:
         return compiled(program, names, width, cache, 1)[0]
     kept = KeptPlan(program, planned, names, "", len(planned.functions), operations, None)
@@ -271,87 +268,3 @@ def width_of(lanes: int | Literal["auto"], single: bool) -> int:
     if lanes not in range(1, 65) or lanes & (lanes - 1):
         raise ProgramError(f"lanes must be a power of two from 1 to 64, not {lanes}")
     return lanes
-
-
-@dataclass(frozen=True)
-class Built:
-    """A library on disk, and how it came there."""
-
-    path: Path
-    compiler: Compiler
-    flags: tuple[str, ...]
-    cached: bool
-    note: str = ""
-
-
-@contextmanager
-def shared_library(parts: Sequence[SourceFile], cache: Cache, texts: str | None = None) -> Iterator[Built]:
-    """Build the library of these sources; one that is not kept in the cache lasts as long as the context.
-
-    ``texts``: what stands for the sources; None: their checksum.
-    """
-    compiler = find_compiler()
-    flags = compiler.flags(processor())
-    key = library_key(texts_of(parts) if texts is None else texts, compiler, flags)
-    if (path := cache.find(key)) is not None:
-        yield Built(path, compiler, flags, cached=True)
-        return
-    with temporary_folder("symphys-kernel-") as folder:
-        with cache.building(key):
-            found = cache.find(key)  # another process may have built it meanwhile
-            path, note = (found, "") if found else _kept(cache, key, compiler.build(parts, flags, Path(folder)))
-        yield Built(path, compiler, flags, found is not None, note)
-
-
-def kept_library(texts: str, cache: Cache) -> Built | None:
-    """Return the library of C files with that checksum, if it is kept."""
-    compiler = find_compiler()
-    flags = compiler.flags(processor())
-    path = cache.find(library_key(texts, compiler, flags))
-    return None if path is None else Built(path, compiler, flags, cached=True)
-
-
-def compile_for(given: IO[bytes]) -> None:
-    """Keep the library that a ``Background`` asks for, and print its path, or why there is none."""
-    from symphys.codegen.emit.source import SourceFile
-
-    request = json.load(given)
-    parts, texts = [SourceFile(**part) for part in request["parts"]], request["texts"]
-    cache = Cache(Path(request["cache"]["folder"]), request["cache"]["limit"])
-    try:
-        with shared_library(parts, cache, texts) as built:
-            said = {"error": built.note} if built.note else {"path": str(built.path)}
-    except KernelUnavailable as error:
-        said = {"error": str(error)}
-    with suppress(OSError):  # the process that started this one may have ended
-        print(json.dumps(said), flush=True)
-
-
-def texts_of(parts: Sequence[SourceFile]) -> str:
-    """Return a checksum of C files."""
-    return hashlib.sha256(
-        "\0".join(f"{part.narrow} {part.straight} {part.broadcasts} {part.text}" for part in parts).encode()
-    ).hexdigest()
-
-
-def library_key(texts: str, compiler: Compiler, flags: Sequence[str]) -> str:
-    """Return the key under which the library of C files with that checksum is kept."""
-    return hashlib.sha256("\0".join([texts, *compiler.command, compiler.version, *flags]).encode()).hexdigest()[:32]
-
-
-def _kept(cache: Cache, key: str, path: Path) -> tuple[Path, str]:
-    """Return the library in the cache; or its path and the reason why it was not kept."""
-    try:
-        return cache.store(key, path), ""
-    except OSError as error:
-        why = f"the kernel was not kept in {cache.folder} ({error.strerror}); it will be compiled again next time"
-        return path, why
-
-
-def temporary_folder(kind: str) -> TemporaryFolder:
-    """Make a ``TemporaryFolder``; KernelUnavailable if there is no room for one."""
-    try:
-        return TemporaryFolder(kind)
-    except OSError as error:
-        where = f"the temporary folder {error.filename}" if error.filename else "a temporary folder"
-        raise KernelUnavailable(f"{where} cannot be made: {error.strerror or error}; {ELSEWHERE}") from error

@@ -22,7 +22,7 @@ from symphys.codegen.toolchain.processes import ADVICE, ELSEWHERE, run, run_all
 from symphys.records import dataclass
 
 if TYPE_CHECKING:
-    from symphys.codegen.emit.source import SourceFile
+    from symphys.codegen.toolchain.source_file import SourceFile
 
 AVX2 = ("avx2", "fma", "f16c", "bmi1", "bmi2")
 AVX512 = ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")

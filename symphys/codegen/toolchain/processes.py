@@ -25,7 +25,7 @@ from symphys.codegen.toolchain.cache import Cache
 from symphys.records import dataclass
 
 if TYPE_CHECKING:
-    from symphys.codegen.emit.source import SourceFile
+    from symphys.codegen.toolchain.source_file import SourceFile
 
 SIGNAL_INTERVAL = 0.2
 """[s] The main thread wakes so often: a signal that arrives as a wait begins, or in another thread, does not end it."""
@@ -44,7 +44,7 @@ MEMORY_WORDS = (
 ROOM_WORDS = ("no space left on device", "disk quota exceeded", "read-only file system")
 Ended = SimpleQueue[BaseException | None]
 """The error, or None, of each command that is over."""
-PROCESS = "import sys; from symphys.codegen.toolchain.build import compile_for; compile_for(sys.stdin.buffer)"
+PROCESS = "import sys; from symphys.codegen.toolchain.libraries import compile_for; compile_for(sys.stdin.buffer)"
 Built = Callable[[Path], None]
 
 

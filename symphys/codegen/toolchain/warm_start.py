@@ -20,9 +20,10 @@ import casadi as ca
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import ProcessorKernel
-from symphys.codegen.toolchain.build import BlockWidth, KeptLibraries, compiled, kernel_of, temporary_folder, width_of
+from symphys.codegen.toolchain.build import BlockWidth, KeptLibraries, compiled, kernel_of, width_of
 from symphys.codegen.toolchain.cache import PLAN_SUFFIX, Cache, default_cache
 from symphys.codegen.toolchain.identity import identity_of, package_stamp
+from symphys.codegen.toolchain.libraries import temporary_folder
 from symphys.codegen.toolchain.plans import KeptPlan
 from symphys.records import dataclass
 

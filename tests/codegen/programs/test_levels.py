@@ -13,10 +13,9 @@ from worlds.toys import require
 
 import symphys
 from symphys.codegen import Cache, Program, compile_program
-from symphys.codegen.emit.pieces import Form
+from symphys.codegen.emit.form import Form
 from symphys.codegen.emit.writer import write
 from symphys.codegen.graph.instructions import graph_of
-from symphys.codegen.graph.rewrite import with_fused_products
 from symphys.codegen.toolchain import compiler
 from symphys.transcription import rollout_program
 from symphys.transcription.rollout import symbolic_rollout
@@ -59,6 +58,6 @@ def test_products_that_are_only_added_are_fused_in_adjoints() -> None:
     assert "FMA" not in write("f", graph, PLAIN)  # values are casadi's
     assert adjoint.count("FMA(") == 3  # not of the square, which its sine reads
     assert "o3[0] = FMA(" in adjoint
-    kinds = [node.op for node in with_fused_products(graph, adds=True).nodes]
+    kinds = [node.op for node in graph.fused(adds=True).nodes]
     assert (kinds.count("fma"), kinds.count("fnma"), kinds.count("fms")) == (1, 1, 0)
     assert "o3[0] = v" in write("f", graph, Form(primal=3, adds=False, backward=True))

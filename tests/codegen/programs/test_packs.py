@@ -14,7 +14,6 @@ from worlds.toys import require
 from symphys.codegen import Cache, FunctionCall, MemoryLayout, Program, compile_program
 from symphys.codegen.emit.packs import pack_calls, single_lane_plan
 from symphys.codegen.emit.plan import plan
-from symphys.codegen.graph.adjoint import with_early_sums
 from symphys.codegen.graph.graph import Graph
 from symphys.codegen.graph.instructions import graph_of
 from symphys.codegen.runtime.widths import suited
@@ -100,7 +99,7 @@ def test_sums_do_not_wait_for_all_their_terms() -> None:
     x, seed = ca.SX.sym("x", 9), ca.SX.sym("s")
     terms = [x[k] * seed for k in range(8)]
     chain = graph_of(ca.Function("chain", [x, seed], [sum(terms[2:], terms[0] - terms[1]) * x[8]]))
-    found = with_early_sums(chain, 1)
+    found = chain.with_early_sums(1)
     assert depth(found) < depth(chain)
     numbers = np.random.default_rng(3).normal(size=10)
     assert value(found, numbers) == pytest.approx(value(chain, numbers), rel=1e-14)

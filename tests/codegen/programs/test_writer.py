@@ -13,11 +13,10 @@ from tools.repeats import few
 from worlds.operations import ARGUMENTS, PAIRS, SMOOTH, alone, build, every_operation, long_function
 
 from symphys.codegen import Cache, compile_program
-from symphys.codegen.emit.pieces import Form
+from symphys.codegen.emit.form import Form
 from symphys.codegen.emit.writer import write
-from symphys.codegen.graph.adjoint import adjoint_graph
-from symphys.codegen.graph.instructions import graph_of
-from symphys.codegen.graph.rewrite import taped
+from symphys.codegen.graph.graph import taped
+from symphys.codegen.graph.instructions import graph_of, instructions_of
 
 step = st.tuples(st.integers(0, len(SMOOTH) + len(PAIRS) - 1), st.integers(0, 10**6), st.integers(0, 10**6))
 
@@ -124,8 +123,8 @@ def test_adjoints_find_what_the_call_has_computed() -> None:
     """Of x y / (y + x) the sum and the quotient, though written the other way round; what is new is one reciprocal."""
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     function = ca.Function("f", [x, y], [x * y / (y + x)])
-    forward = graph_of(function)
-    pair = taped(forward, adjoint_graph(function, forward, (True, True), (True,)))
+    instructions = instructions_of(function)
+    pair = taped(instructions.graph(), instructions.adjoint((True, True), (True,)))
     assert pair is not None
     operations = [pair.forward.nodes[k].op for k in pair.forward.needed()]
     assert (operations.count("add"), operations.count("div")) == (1, 2)
