@@ -36,7 +36,7 @@ def _numbers() -> dict[int, int]:
 def instructions_of(function: Function) -> Instructions:
     """Return the instructions of a function; KernelUnavailable if an operation has no counterpart."""
     count, numbers = function.n_instructions(), _numbers()
-    ids = [function.instruction_id(i) for i in range(count)]
+    ids = list(map(function.instruction_id, range(count)))
     codes = np.array([numbers.get(op, UNKNOWN) for op in ids] or [0], np.int32)
     if UNKNOWN in codes[:count]:
         op = ids[int(np.flatnonzero(codes == UNKNOWN)[0])]
@@ -45,19 +45,18 @@ def instructions_of(function: Function) -> Instructions:
         )
     read, written = np.full((count + 1, 2), UNKNOWN, np.int32), np.full((count + 1, 2), UNKNOWN, np.int32)
     values = np.zeros(count + 1)
+    for places, find in ((read, function.instruction_input), (written, function.instruction_output)):
+        found = list(map(find, range(count)))
+        for column in (0, 1):
+            places[:count, column] = [each[column] if len(each) > column else UNKNOWN for each in found]
     for i, op in enumerate(ids):
         if op == ca.OP_CONST:
             values[i] = function.instruction_constant(i)
-        else:
-            places = function.instruction_input(i)
-            read[i, : len(places)] = places
-        places = function.instruction_output(i)
-        written[i, : len(places)] = places
     given = np.array([function.numel_in(i) for i in range(function.n_in())] or [0], np.int32)
-    found = np.array([function.numel_out(i) for i in range(function.n_out())] or [0], np.int32)
+    results = np.array([function.numel_out(i) for i in range(function.n_out())] or [0], np.int32)
     address = library().function_new(
         count, codes.ctypes.data, read.ctypes.data, written.ctypes.data, values.ctypes.data, function.sz_w() + 1,
-        function.n_in(), given.ctypes.data, function.n_out(), found.ctypes.data,
+        function.n_in(), given.ctypes.data, function.n_out(), results.ctypes.data,
     )  # fmt: skip
     return Instructions(address, "function_free")
 

@@ -110,11 +110,11 @@ def loaded(path: Path) -> ctypes.CDLL:
         raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
 
 
-@cached
-def own_library(name: str) -> ctypes.CDLL:
-    """Return a C file of this package as a library, which is built once for a machine; KernelUnavailable if it cannot.
+OWN_FILES = ("graphs.c", "riccati.c")
 
-    ``name``: of the file, such as ``riccati.c``.
-    """
-    with shared_library([SourceFile(resource(name))], default_cache()) as built:
+
+@cached
+def own_library() -> ctypes.CDLL:
+    """Return the C files of this package that know no program, built once for a machine; KernelUnavailable if not."""
+    with shared_library([SourceFile(resource(name)) for name in OWN_FILES], default_cache()) as built:
         return loaded(built.path)

@@ -178,6 +178,6 @@ def test_a_process_that_ends_leaves_the_kernel_to_the_next(how: str, tmp_path: P
     code = ENDS_AT_ONCE.format(signal=how)
     ended = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
     assert ended.returncode == -signal.Signals[how]
-    until(lambda: cache.info().kernels >= 3)  # graphs and interpreter too
+    until(lambda: cache.info().kernels >= 3)  # what makes graphs, and the interpreter, too
     kernel = compile_source(ProgramSource(programs.chain, "a chain"), ("merit",), 1, cache=cache, wait=False)
     assert kernel.report.cached
