@@ -49,10 +49,10 @@ def waits(process: subprocess.Popen[str]) -> bool:
     return False
 
 
-def building(folder: Path, compiler: str, **places: str) -> subprocess.Popen[str]:
+def building(folder: Path, compiler: str, code: str = BUILD, **places: str) -> subprocess.Popen[str]:
     """A process that builds the pendulum with a compiler, into a cache in the folder.
 
-    ``compiler``: what CC names; empty: that of PATH. ``places``: of its environment.
+    ``compiler``: what CC names; empty: that of PATH. ``code``: what it runs. ``places``: of its environment.
     """
     environment = os.environ | {
         "CC": compiler,
@@ -60,5 +60,5 @@ def building(folder: Path, compiler: str, **places: str) -> subprocess.Popen[str
         "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[1]), *sys.path]),
         **places,
     }
-    command = [sys.executable, "-c", BUILD]
+    command = [sys.executable, "-c", code]
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
