@@ -1378,8 +1378,6 @@ void text_free(char *t) { free(t); }
 typedef struct {
   uint32_t *words;
   int64_t count, room;
-  double *constants;
-  int64_t numbers, number_room;
   graph *known; /* its nodes are the constants: each once */
 } codes;
 
