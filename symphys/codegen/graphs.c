@@ -1,6 +1,6 @@
 /* Graphs of functions: each distinct value once, masks apart from numbers; adjoints, rewriting, C text and codes.
    Python sees a graph as a handle; graph/graph.py says what each function is for. Nodes stand in an order in which they
-   can be computed. Memory that cannot be had ends the process, as it does inside casadi. */
+   can be computed. The process ends where there is no memory left. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -18,7 +18,7 @@
 #define FOREIGN(X)                                                                                                     \
   X(sq) X(twice) X(inv) X(assign) X(sign) X(fmin) X(fmax) X(given) X(output) X(constant)
 #define NUMBERED(name) op_##name,
-enum { OPERATIONS(NUMBERED) COUNT, FOREIGN(NUMBERED) END };
+enum { OPERATIONS(NUMBERED) FOREIGN(NUMBERED) };
 #define NAMED(name) #name " "
 /* Names of operations in the order of their numbers, then of what only instructions of casadi have. */
 const char *operation_names(void) { return OPERATIONS(NAMED); }
@@ -1178,18 +1178,17 @@ typedef struct {
 
 /* Statements in groups: of each first all loads, then what is computed, then all stores and sums. */
 typedef struct {
-  text done, loads, computed, stores, *sums;
-  int64_t ahead, waiting, summed, room, count;
-  int32_t (*words)[2];
+  text done, loads, computed, stores, sums;
+  int64_t ahead, waiting, count; /* loads that wait; sums of the function */
 } lines;
 
 static void close_group(lines *l) {
-  append(&l->done, l->loads.at ? l->loads.at : "", l->loads.size);
-  append(&l->done, l->computed.at ? l->computed.at : "", l->computed.size);
-  append(&l->done, l->stores.at ? l->stores.at : "", l->stores.size);
-  for (int64_t i = 0; i < l->summed; i++) append(&l->done, l->sums[i].at, l->sums[i].size), clear(&l->sums[i]);
-  clear(&l->loads), clear(&l->computed), clear(&l->stores);
-  l->waiting = l->summed = 0;
+  text *const parts[] = {&l->loads, &l->computed, &l->stores, &l->sums};
+  for (int i = 0; i < 4; i++) {
+    if (parts[i]->size) append(&l->done, parts[i]->at, parts[i]->size);
+    clear(parts[i]);
+  }
+  l->waiting = 0;
 }
 
 static void next_line(lines *l) {
@@ -1198,27 +1197,17 @@ static void next_line(lines *l) {
 
 #define START "\n  "
 
-/* Add to a word that no other name leads to. */
+/* Add to a word that no other name leads to, once. */
 static void add_up(lines *l, const style *s, int32_t r, int32_t word, const char *value) {
-  int64_t i = 0;
-  while (i < l->summed && (l->words[i][0] != r || l->words[i][1] != word)) i++;
-  if (i == l->room) {
-    l->words = taken(l->words, (l->room = 2 * l->room + 8) * sizeof *l->words);
-    l->sums = taken(l->sums, l->room * sizeof *l->sums);
-    memset(l->sums + i, 0, (l->room - i) * sizeof *l->sums);
-  }
-  text *sum = &l->sums[i];
-  if (i == l->summed) { /* its closing statement begins with the word, and tells the number of its sum */
-    l->words[i][0] = r, l->words[i][1] = word, l->summed++;
-    say_number(&l->loads, START "V s", l->count), say(&l->loads, " = ");
-    fill(&l->loads, s->read[r], NULL, word, NULL), say(&l->loads, ";");
-    say(sum, START), fill(sum, s->read[r], NULL, word, NULL);
-    say_number(sum, " = s", l->count++), say(sum, ";");
-    l->waiting++;
-  }
-  const char *name = strrchr(sum->at, 's');
-  say(&l->computed, START), append(&l->computed, name, strcspn(name, ";"));
-  say(&l->computed, " += "), say(&l->computed, value), say(&l->computed, ";");
+  char name[24];
+  snprintf(name, sizeof name, "s%lld", (long long)l->count++);
+  say(&l->loads, START "V "), say(&l->loads, name), say(&l->loads, " = ");
+  fill(&l->loads, s->read[r], NULL, word, NULL), say(&l->loads, ";");
+  say(&l->computed, START), say(&l->computed, name), say(&l->computed, " += ");
+  say(&l->computed, value), say(&l->computed, ";");
+  say(&l->sums, START), fill(&l->sums, s->read[r], NULL, word, NULL);
+  say(&l->sums, " = "), say(&l->sums, name), say(&l->sums, ";");
+  l->waiting++;
   next_line(l);
 }
 
@@ -1227,7 +1216,7 @@ typedef struct {
   const style *s;
   lines *l;
   int32_t *named, piece; /* the piece that has loaded or computed a node */
-  int32_t primal, shared, adds;
+  int32_t adds;
   text value[3];
 } writer;
 
@@ -1344,13 +1333,12 @@ static void write_piece(writer *w) {
 }
 
 /* Return the C functions of all pieces of a graph, ``name_0`` and so on; to be freed by ``text_free``. */
-char *graph_write(const graph *whole, const style *s, int32_t primal, int32_t adds, int32_t backward, int32_t shared,
-                  int32_t fuses, int32_t *pieces, int32_t *slots) {
+char *graph_write(const graph *whole, const style *s, int32_t adds, int32_t backward, int32_t fuses, int32_t *pieces,
+                  int32_t *slots) {
   cut c = cut_of(whole, backward, adds, fuses);
   text all = {0};
   lines l = {.ahead = s->ahead};
-  writer w = {.c = &c, .s = s, .l = &l, .named = filled(c.g->count, NONE), .primal = primal, .shared = shared};
-  w.adds = adds;
+  writer w = {.c = &c, .s = s, .l = &l, .named = filled(c.g->count, NONE), .adds = adds};
   for (int k = 0; k < 3; k++) say(&w.value[k], "");
   for (w.piece = 0; w.piece < c.pieces; w.piece++) {
     say(&all, s->head), say(&all, " "), say(&all, s->name), say_number(&all, "_", w.piece);
@@ -1364,8 +1352,7 @@ char *graph_write(const graph *whole, const style *s, int32_t primal, int32_t ad
     say(&all, "\n}\n");
   }
   *pieces = c.pieces, *slots = c.slots;
-  for (int64_t i = 0; i < l.room; i++) free(l.sums[i].at);
-  free(l.sums), free(l.words), free(l.done.at), free(l.loads.at), free(l.computed.at), free(l.stores.at);
+  free(l.sums.at), free(l.done.at), free(l.loads.at), free(l.computed.at), free(l.stores.at);
   for (int k = 0; k < 3; k++) free(w.value[k].at);
   free(w.named), cut_free(&c);
   return all.at;

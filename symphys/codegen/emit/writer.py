@@ -86,7 +86,7 @@ def write(
     )
     pieces, slots = ctypes.c_int32(), ctypes.c_int32()
     address = library().graph_write(
-        graph.address, ctypes.byref(style), form.primal, form.adds, form.backward, form.shared, dialect.fuses,
+        graph.address, ctypes.byref(style), form.adds, form.backward, dialect.fuses,
         ctypes.byref(pieces), ctypes.byref(slots),
     )  # fmt: skip
     text = ctypes.string_at(address).decode()

@@ -36,7 +36,7 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "graph_fused": (POINTER, (POINTER, INT)),
     "graph_early_sums": (POINTER, (POINTER, INT)),
     "graph_taped": (INT, (POINTER, POINTER, POINTER, POINTER)),
-    "graph_write": (POINTER, (POINTER, POINTER, *[INT] * 5, POINTER, POINTER)),
+    "graph_write": (POINTER, (POINTER, POINTER, *[INT] * 3, POINTER, POINTER)),
     "text_free": (None, (POINTER,)),
     "function_new": (POINTER, (COUNT, *[POINTER] * 4, INT, INT, POINTER, INT, POINTER)),
     "function_free": (None, (POINTER,)),
@@ -71,7 +71,7 @@ def operations() -> tuple[str, ...]:
 
 
 class Handle:
-    """What ``graphs.c`` has made, for as long as this object lives."""
+    """An object of ``graphs.c``, which is freed together with this one."""
 
     def __init__(self, address: int, free: str) -> None:
         """Keep an address; ``free``: the name of the function that ends its life."""

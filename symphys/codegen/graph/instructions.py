@@ -25,10 +25,8 @@ UNKNOWN = -1
 @cache
 def _numbers() -> dict[int, int]:
     """Return the number of each operation of casadi in ``graphs.c``."""
-    own = operations()
-    known = {name: number for number, name in enumerate(own)}
-    # one number is between the operations of graphs and what only instructions have
-    known |= {name: len(own) + 1 + k for k, name in enumerate(library().foreign_names().decode().split())}
+    foreign = library().foreign_names().decode().split()
+    known = {name: number for number, name in enumerate((*operations(), *foreign))}
     names = {name.removeprefix("OP_").lower(): getattr(ca, name) for name in dir(ca) if name.startswith("OP_")}
     return {code: known[ALIASES.get(name, name)] for name, code in names.items() if ALIASES.get(name, name) in known}
 

@@ -13,7 +13,7 @@ from functools import partial
 from math import inf
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.runtime.batch import RolloutBatch
@@ -21,10 +21,8 @@ from symphys.codegen.runtime.library import BatchData, Loaded
 from symphys.codegen.runtime.thread_pool import MemoryPool
 from symphys.codegen.toolchain.cache import Cache
 from symphys.codegen.toolchain.processes import Background
+from symphys.codegen.toolchain.source_file import SourceFile
 from symphys.records import dataclass
-
-if TYPE_CHECKING:
-    from symphys.codegen.toolchain.source_file import SourceFile
 
 COMPILE_TIME = 2.0, 1e-4
 """Estimate of the time of compiling: [s], and [s] for each operation of the kernel."""

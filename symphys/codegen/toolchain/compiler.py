@@ -15,14 +15,11 @@ import sys
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.processes import ADVICE, ELSEWHERE, run, run_all
+from symphys.codegen.toolchain.source_file import SourceFile
 from symphys.records import dataclass
-
-if TYPE_CHECKING:
-    from symphys.codegen.toolchain.source_file import SourceFile
 
 AVX2 = ("avx2", "fma", "f16c", "bmi1", "bmi2")
 AVX512 = ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")

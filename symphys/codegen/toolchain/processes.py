@@ -18,14 +18,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING
 
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.toolchain.cache import Cache
+from symphys.codegen.toolchain.source_file import SourceFile
 from symphys.records import dataclass
-
-if TYPE_CHECKING:
-    from symphys.codegen.toolchain.source_file import SourceFile
 
 SIGNAL_INTERVAL = 0.2
 """[s] The main thread wakes so often: a signal that arrives as a wait begins, or in another thread, does not end it."""
