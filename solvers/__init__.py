@@ -79,6 +79,7 @@ MODULES = {
     "cma": "cma_es",
     "stochastic": "stochastic",
     "evolution": "evolution",
+    "race": "race",
 }
 """The module of each solver in ``methods``."""
 SOLVERS = Catalogue(MODULES)

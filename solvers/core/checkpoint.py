@@ -21,6 +21,7 @@ T = TypeVar("T")
 READERS: dict[str, Callable[[Any], Any]] = {
     "int": int,
     "float": float,
+    "str": str,
     "bool": bool,
     "Status": Status,
     "Array": lambda value: np.array(value, float),
@@ -89,7 +90,7 @@ def from_plain(
         numbers, met = (float(best["merit"]), float(best["objective"])), problem.met(errors)
         point = Point(z, *numbers, errors, met, outputs, failed_samples=int(best["spoilt"]))
         counts = Counts(*map(int, saved["counts"]))
-        rows = [revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in saved["rows"]]
+        rows = revived_rows(saved)
         stages = tuple(revive(StageResult, present(each), Counts) for each in saved["stages"])
         seconds = float(saved["seconds"])
         state, last = dict(saved["state"]), np.array(saved["last"], float)
@@ -133,7 +134,7 @@ def revived_outcome(saved: dict[str, Any], solver: str) -> Outcome:
             status=Status(found["status"]),
             advice=str(found["advice"]),
             z=np.array(saved["best"]["z"], float),
-            trace=tuple(revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in saved["rows"]),
+            trace=tuple(revived_rows(saved)),
             counts=Counts(*map(int, saved["counts"])),
             stages=tuple(revive(StageResult, each, Counts) for each in found["stages"]),
             gains=gains,
@@ -141,6 +142,11 @@ def revived_outcome(saved: dict[str, Any], solver: str) -> Outcome:
         )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise damaged(error) from error
+
+
+def revived_rows(saved: dict[str, Any]) -> list[TraceRow]:
+    """Return the trace in a checkpoint."""
+    return [revive(TraceRow, dict(zip(names(TraceRow), row, strict=True))) for row in saved["rows"]]
 
 
 def present(stage: dict[str, Any]) -> dict[str, Any]:

@@ -187,7 +187,7 @@ def make_solver(
         )
         return Driver(request, run_stage, rate(options, seed)).run()
 
-    return Solver(name, summary, Options, solve, prepare, threaded, scenarios, by_steps)
+    return Solver(name, summary, Options, solve, prepare, threaded, scenarios, lambda problem: by_steps)
 
 
 @dataclass(frozen=True)

@@ -143,6 +143,11 @@ class Solve(Protocol[O_contra]):
         ...
 
 
+def none(problem: ShootingProblem) -> bool:
+    """Return False: most solvers evaluate rollouts."""
+    return False
+
+
 def nothing() -> None:
     """Load nothing: most solvers need no library."""
 
@@ -161,7 +166,7 @@ class Solver(Generic[O_inv]):
             works without, and a second call costs nothing.
         threaded: whether several solves may run in threads side by side, see ``multi_start``.
         scenarios: whether it is for problems with scenarios, and for no others; None: for all.
-        by_steps: whether it evaluates by ``ShootingProblem.by_steps`` where there is that.
+        by_steps: of which problems it evaluates by ``ShootingProblem.by_steps`` where there is that.
     """
 
     name: str
@@ -171,4 +176,4 @@ class Solver(Generic[O_inv]):
     prepare: Callable[[], object] = nothing
     threaded: bool = False
     scenarios: bool | None = False
-    by_steps: bool = False
+    by_steps: Callable[[ShootingProblem], bool] = none

@@ -35,10 +35,11 @@ from symphys.solvers.core.checkpoint import damaged
 from symphys.solvers.core.convergence import PLATEAU_ADVICE, converged, not_finite
 from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.evaluator import CountingEvaluator
-from symphys.solvers.core.interface import Iteration, Log, Method, StageContext
+from symphys.solvers.core.interface import Iteration, Log, Method, Solver, StageContext
 from symphys.solvers.core.options import SolverOptions, at_least, nearest, refuse, require
 from symphys.solvers.core.outcome import Status, StopReason
 from symphys.solvers.core.point import Point, best_of
+from symphys.solvers.core.subspace import SearchSpace, search_space
 from symphys.solvers.randomized.validation import (
     SAMPLE_STREAM,
     Validation,
@@ -196,23 +197,22 @@ class CmaState:
 
 
 class PycmaStrategy:
-    """pycma's CMAEvolutionStrategy in x = z / scale, without variables whose bounds are equal."""
+    """pycma's CMAEvolutionStrategy in a space, in x / scale, without coordinates whose bounds are equal."""
 
     def __init__(
         self,
-        evaluator: CountingEvaluator,
-        start: Array,
+        space: SearchSpace,
         sigma: float,
         population: int,
         options: Mapping[str, Any],
         stream: np.random.Generator,
     ) -> None:
-        """Begin at ``start`` (n,) with the standard deviation ``sigma``; SymphysError for invalid options."""
+        """Begin at the start of ``space`` with the standard deviation ``sigma``; SymphysError for invalid options."""
         cma = load()
         check(options, cma.CMAOptions.defaults())
-        self.stream = stream
-        self.start, self.scale, self.free = start, evaluator.scale, evaluator.lower < evaluator.upper
-        bounds = [sides(bound / evaluator.scale, self.free) for bound in (evaluator.lower, evaluator.upper)]
+        self.stream, self.space = stream, space
+        self.free = space.lower < space.upper
+        bounds = [sides(bound / space.scale, self.free) for bound in (space.lower, space.upper)]
         named = {name: getattr(cma, options[name]) for name in TEXT_OPTIONS if name in options}
         diagonal = {"CMA_diagonal": True} if self.free.sum() > MAX_FULL_COVARIANCE else {}
         own = {
@@ -228,7 +228,7 @@ class PycmaStrategy:
             own["popsize"] = population
         with pycma():
             kind = single(cma) if self.free.sum() == 1 else cma.CMAEvolutionStrategy
-            self.es = kind((start / evaluator.scale)[self.free], sigma, own)
+            self.es = kind((space.origin / space.scale)[self.free], sigma, own)
         self.merits: tuple[tuple[float, ...], ...] = ()
         self._reasons: set[str] | None = None
 
@@ -261,7 +261,13 @@ class PycmaStrategy:
 
     def state(self) -> CmaState:
         """Return the data that a replay needs."""
-        return CmaState(self.start, self.merits, self.es.mean.copy(), self.sigma)
+        return CmaState(self.space.start, self.merits, self.es.mean.copy(), self.sigma)
+
+    def at(self, state: CmaState) -> bool:
+        """Whether the strategy is in a state."""
+        return self.merits is state.merits or (
+            self.merits == state.merits and np.array_equal(self.es.mean, state.mean) and self.sigma == state.sigma
+        )
 
     def replay(self, state: CmaState) -> None:
         """Replay the generations of a state; SymphysError if the result differs."""
@@ -285,9 +291,9 @@ class PycmaStrategy:
 
     def full(self, x: Array) -> Array:
         """Return z (n,) of a candidate (free,)."""
-        z = self.start.copy()
-        z[self.free] = np.asarray(x) * self.scale[self.free]
-        return z
+        full = self.space.origin.copy()
+        full[self.free] = np.asarray(x) * self.space.scale[self.free]
+        return self.space.z(full)
 
 
 UNUSED = "matplotlib", "scipy.stats"
@@ -375,7 +381,9 @@ class CmaOptions(SolverOptions):
     """Options of CMA-ES.
 
     Attributes:
-        sigma: first standard deviation, in units of scale.
+        sigma: first standard deviation, in units of scale; with ``knots`` of a quarter of the distance of bounds.
+        knots: 0: all variables are searched. Else deviations from the start are, which for each control are splines of
+            at most so many knots in time.
         population: candidates in a generation; 0 is pycma's 4 + 3 ln n.
         evaluations: rollouts in each stage of smoothing; the generation that reaches it is the last.
         options: pycma's own, such as {tolfun = 1e-8, CMA_diagonal = 50}; cma.CMAOptions() lists them. With more than
@@ -388,6 +396,7 @@ class CmaOptions(SolverOptions):
     """
 
     sigma: float = 1.0
+    knots: int = 0
     population: int = 0
     evaluations: int = 10_000
     options: dict[str, Any] = field(default_factory=dict)
@@ -402,7 +411,7 @@ class CmaOptions(SolverOptions):
         super().__post_init__()
         require(0 < self.sigma < math.inf, "sigma", "above 0")
         require(self.population == 0 or self.population > 2, "population", "0 or at least 3")
-        at_least(0, evaluations=self.evaluations, validation=self.validation)
+        at_least(0, evaluations=self.evaluations, validation=self.validation, knots=self.knots)
         at_least(0, width=self.width, validation_width=self.validation_width)
         at_least(1, samples=self.samples, every=self.every)
 
@@ -418,8 +427,8 @@ class CmaEs(Method[CmaState]):
     state is kept beside it: a step from that state costs no replay.
     """
 
-    def __init__(self, context: StageContext, options: CmaOptions) -> None:
-        """Set up one stage."""
+    def __init__(self, context: StageContext, options: CmaOptions, latest: PycmaStrategy | None = None) -> None:
+        """Set up one stage; ``latest``: a strategy that may be in the state to which it is resumed."""
         self.evaluator: CountingEvaluator = context.evaluator
         self.start, self.seed, self.options = context.start, context.seed, options
         self.held = not np.any(self.evaluator.lower < self.evaluator.upper)
@@ -428,14 +437,14 @@ class CmaEs(Method[CmaState]):
             self.candidates = SampledCandidates(
                 self.evaluator, options.samples, options.width, options.batch(self.seed), options.every, context.log
             )
-        self._latest: PycmaStrategy | None = None
+        self.strategy = latest
 
     def init(self) -> Iteration[CmaState] | StopReason:
         """Keep the start as the first candidate; it is the only one where bounds hold every variable."""
         if self.held:
             point = self.evaluator.value(self.start)
             return Iteration(self._held_state(), point) if point.finite else not_finite(point)
-        strategy = self._latest = self._fresh(self.start)
+        strategy = self.strategy = self._fresh(self.start)
         (point,) = self.candidates.rate([self.start], 0)
         if not point.finite:
             return not_finite(point)
@@ -444,14 +453,14 @@ class CmaEs(Method[CmaState]):
 
     def step(self, state: CmaState) -> Iteration[CmaState] | StopReason:
         """Draw a generation, evaluate it, and update the strategy with the merits."""
-        strategy, generation = self._strategy(state), len(state.merits)
-        self._latest = None
+        strategy, generation = self._in(state), len(state.merits)
+        self.strategy = None
         points = self.candidates.rate([self.evaluator.clip(z) for z in strategy.ask()], generation)
         best = best_of(points)
         if best is None:
             return self.candidates.conclude(StopReason(Status.NOT_FINITE, NOT_FINITE), state.start)
         strategy.tell(tuple(point.merit if point.finite else math.inf for point in points))
-        self._latest = strategy
+        self.strategy = strategy
         self.candidates.keep(strategy.centre, generation + 1)
         return Iteration(strategy.state(), best, step=strategy.sigma)
 
@@ -459,12 +468,12 @@ class CmaEs(Method[CmaState]):
         """Stop if the budget is used up or one of pycma's criteria holds."""
         if self.held:
             return converged(self.evaluator)
-        reason = self._reason(self._strategy(state))
+        reason = self._reason(self._in(state))
         return None if reason is None else self.conclude(state, reason)
 
     def conclude(self, state: CmaState, reason: StopReason) -> StopReason:
         """Implement ``Method.conclude``: the last mean may be kept."""
-        self.candidates.keep(self._strategy(state).centre, len(state.merits), due=True)
+        self.candidates.keep(self._in(state).centre, len(state.merits), due=True)
         return self.candidates.conclude(reason, state.start)
 
     def resume(self, saved: dict[str, Any]) -> CmaState:
@@ -495,24 +504,38 @@ class CmaEs(Method[CmaState]):
             return self.candidates.converged()
         return StopReason(Status.STALLED, STALLED.format(", ".join(reasons)))
 
-    def _strategy(self, state: CmaState) -> PycmaStrategy:
+    def _in(self, state: CmaState) -> PycmaStrategy:
         """Return pycma's strategy in a state."""
-        if self._latest is None or self._latest.merits is not state.merits:
-            self._latest = self._fresh(state.start)
-            self._latest.replay(state)
-        return self._latest
+        if self.strategy is None or not self.strategy.at(state):
+            self.strategy = self._fresh(state.start)
+            self.strategy.replay(state)
+        return self.strategy
 
     def _fresh(self, start: Array) -> PycmaStrategy:
         options, stream = self.options, np.random.default_rng([self.seed, 1])
-        return PycmaStrategy(self.evaluator, start, options.sigma, options.population, options.options, stream)
+        space = search_space(self.evaluator.problem, start, options.knots)
+        return PycmaStrategy(space, options.sigma, options.population, options.options, stream)
 
 
-CMA = make_solver(
-    "cma",
-    "CMA-ES by pycma, without derivatives",
-    CmaOptions,
-    stage_of(CmaEs),
-    rate=lambda options, seed: rate_by_validation(options.batch(seed)),
-    prepare=load,
-    scenarios=None,
-)
+def cma(keep: bool = False) -> Solver[CmaOptions]:
+    """Return the solver; ``keep``: the last solve's strategy, so that one that goes on from there need not replay."""
+    last: list[CmaEs] = []
+
+    def method(context: StageContext, options: CmaOptions) -> CmaEs:
+        found = CmaEs(context, options, last.pop().strategy if last else None)
+        if keep:
+            last.append(found)
+        return found
+
+    return make_solver(
+        "cma",
+        "CMA-ES by pycma, without derivatives",
+        CmaOptions,
+        stage_of(method),
+        rate=lambda options, seed: rate_by_validation(options.batch(seed)),
+        prepare=load,
+        scenarios=None,
+    )
+
+
+CMA = cma()

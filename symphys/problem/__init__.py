@@ -8,6 +8,7 @@ from symphys.problem.load import require_solvable
 from symphys.problem.model import (
     ALIVE,
     DURATION,
+    STEP_LENGTH,
     Constraint,
     Cost,
     Discretisation,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ALIVE",
     "DURATION",
+    "STEP_LENGTH",
     "Constraint",
     "Cost",
     "Discretisation",

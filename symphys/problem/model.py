@@ -170,6 +170,7 @@ Kind = Literal["initial", "parameter", "control", "weight", "duration", "recordi
 ALIVE = "alive"
 """In formulas: 1 until the motion is over, 0 from then on."""
 DURATION = "simulation.duration"
+STEP_LENGTH = "simulation.dt"
 """What a variable sets that chooses how long a motion takes: its steps become longer or shorter, not more or fewer."""
 
 

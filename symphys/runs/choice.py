@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from symphys.problem import Constraint, Cost, Problem, Target
+from symphys.problem import Problem
 from symphys.records import dataclass
 
 MAX_SMALL = 300
 """Length of z up to which a derivative-free search, or a Jacobian, is worth its evaluations."""
-ALWAYS = "always"
 
 
 @dataclass(frozen=True)
@@ -63,31 +62,9 @@ def is_small(problem: Problem) -> bool:
     return sum(variable.guess.size for variable in problem.variables) <= MAX_SMALL
 
 
-def staged(problem: Problem) -> bool:
-    """Whether controls act over time, and every term depends on one state and one input."""
-    asked: tuple[Cost | Target | Constraint, ...] = (*problem.costs, *problem.targets, *problem.constraints)
-    return controls(problem) and not problem.free_duration and not any(each.formula.parts for each in asked)
-
-
 def controls(problem: Problem) -> bool:
     """Whether a variable acts over time."""
     return any(variable.kind == "control" and variable.knots > 1 for variable in problem.variables)
-
-
-def squares(problem: Problem) -> bool:
-    """Whether every minimised term is a square."""
-    return all(cost.squares for cost in problem.costs)
-
-
-def along(problem: Problem) -> bool:
-    """Whether something is evaluated over time, not only at a few instants."""
-    asked: tuple[Cost | Constraint, ...] = (*problem.costs, *problem.constraints)
-    return any(each.at == ALWAYS for each in asked)
-
-
-def limited(problem: Problem) -> bool:
-    """Whether states are constrained over time, or the file has a guess of them."""
-    return problem.guess is not None or any(each.at == ALWAYS for each in problem.constraints)
 
 
 SITUATIONS = (
@@ -105,52 +82,14 @@ SITUATIONS = (
         (ChosenSolver("stochastic", "samples of its scenarios differ, and it has too many numbers to search in"),),
     ),
     Situation(
-        "controls over time, states limited or guessed",
-        lambda problem: staged(problem) and limited(problem),
-        (
-            ChosenSolver("ilqr", "its controls act over time, and what it asks for is summed step by step"),
-            ChosenSolver("multiple_shooting", "its states are limited along the way, or guessed"),
-        ),
-    ),
-    Situation(
-        "controls over time, squares at instants",
-        lambda problem: staged(problem) and squares(problem) and not along(problem) and is_small(problem),
-        (
-            ChosenSolver("least_squares", "squares at a few instants make a Jacobian of few rows"),
-            ChosenSolver("ilqr", "its controls act over time, and feedback leads steps around kinks"),
-        ),
-    ),
-    Situation(
-        "controls over time, step by step",
-        staged,
-        (
-            ChosenSolver("ilqr", "its controls act over time, and what it asks for is summed step by step"),
-            ChosenSolver("ipopt", "it sees the motion as a whole, where kinks stop what goes step by step"),
-        ),
-    ),
-    Situation(
-        "controls over time, seen as a whole",
+        "controls over time",
         controls,
-        (
-            ChosenSolver("ipopt", "what it asks for is of the whole motion, and constraints may bind"),
-            ChosenSolver("gradient", "a gradient costs the same for any number of knots"),
-        ),
+        (ChosenSolver("race", "a search sees where a guess misses, and a method that follows derivatives finishes"),),
     ),
     Situation(
-        "few numbers, squares",
-        lambda problem: squares(problem) and is_small(problem),
-        (
-            ChosenSolver("least_squares", "a few numbers set what is squared"),
-            ChosenSolver("cma", "among few numbers a search needs no gradient, and passes kinks and plateaus"),
-        ),
-    ),
-    Situation(
-        "few numbers, other costs",
+        "few numbers",
         is_small,
-        (
-            ChosenSolver("ipopt", "its costs are no squares, and a few numbers set them"),
-            ChosenSolver("cma", "among few numbers a search needs no gradient, and passes kinks and plateaus"),
-        ),
+        (ChosenSolver("race", "a search passes kinks and plateaus, and a method that follows derivatives finishes"),),
     ),
     Situation(
         "many numbers",

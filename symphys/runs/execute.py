@@ -7,6 +7,7 @@ import time
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -16,6 +17,7 @@ from symphys.codegen.backends import PRECISIONS, require_kernels
 from symphys.errors import SymphysError, Unavailable
 from symphys.findings.examination import Examination
 from symphys.findings.obstacles import obstacles
+from symphys.findings.verdict import holds
 from symphys.findings.writing import capital
 from symphys.problem import Problem
 from symphys.results.file_names import CHECKPOINT, GAINS, GUESS, LOG, MULTIPLIERS, RESULT, SCENE, TRAJECTORY
@@ -195,9 +197,11 @@ def solve(
     with a few words before each part of judging. ``bounded``: whether a limit may kill the process, so that the
     solver's outcome is saved before it is judged.
     """
-    if solver(job.config.solver).by_steps:
+    if solver(job.config.solver).by_steps(transcription.shooting):
         transcription = transcription.by_steps
-    shooting = replace(transcription.shooting, multipliers=job.guess.multipliers)
+    shooting = replace(
+        transcription.shooting, multipliers=job.guess.multipliers, confirms=partial(confirmed, transcription)
+    )
     log(f"evaluated by {transcription.backend}")
     for note in job.guess.notes:
         log(f"guess from {job.guess.folder}: {note}")
@@ -281,14 +285,21 @@ def spent_before(found: RunInspection) -> float:
     return float(seconds) if isinstance(seconds, int | float) else 0.0
 
 
+def confirmed(transcription: Transcription, z: Array) -> bool:
+    """Whether z solves the problem, and with half and a quarter of the time step still does."""
+    verdict = transcription.judge(z)
+    finer = Examination.from_json(files.strict({"refined": trust.finer_values(transcription, z)}))
+    return verdict.solved and holds(finer, judged(verdict))
+
+
 def judge(
     transcription: Transcription, outcome: Outcome, examine: bool = True, tell: Callable[[str], None] = no_callback
 ) -> Judgement:
     """Roll the solution out exactly and examine it; ``tell`` as in ``solve``."""
     tell(JUDGING)
     try:
+        taken = transcription.record(outcome.z)  # where steps are compared with the virtual machine's
         verdict = transcription.judge(outcome.z)
-        taken = transcription.record(outcome.z)
         examined: dict[str, Any] | None = None
         if outcome.status is not Status.INTERRUPTED:
             examined = (

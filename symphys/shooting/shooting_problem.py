@@ -257,6 +257,7 @@ class ShootingProblem:
         by_steps: evaluates by the steps of ``staged``, for solvers that compile no rollout; None: there is none.
         guessed_states: (z (n,), numbers (M,) of states from 1 on, smoothing) -> (M, nx) where the motion is guessed to
             pass. None: where the rollout of z leads.
+        confirms: (z (n,)) -> whether what meets everything still does with finer time steps; None: nobody can say.
         multipliers: those that a solve of this or a like problem ended with where its guess is, see
             ``Outcome.multipliers``; empty where none are known.
     """
@@ -277,6 +278,7 @@ class ShootingProblem:
     staged: Callable[[], StagedProblem] | None = None
     by_steps: StepwiseEvaluator | None = None
     guessed_states: GuessedStates | None = None
+    confirms: Callable[[Array], bool] | None = None
     multipliers: Mapping[str, Array] = field(default_factory=dict)
 
     @property

@@ -221,6 +221,10 @@ class StagedProblem(Protocol):
         """
         ...
 
+    def prepare(self) -> None:
+        """Begin to compile what linearises, beside other work."""
+        ...
+
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Return slopes of all steps."""
         ...

@@ -8,7 +8,7 @@ from symphys.transcription.judge import Assessment, Criterion
 from symphys.transcription.objective import Terms, terms
 from symphys.transcription.program import rollout_program
 from symphys.transcription.rollout import Rollout, symbolic_rollout
-from symphys.transcription.transcribe import guessed, transcribe
+from symphys.transcription.transcribe import guessed, transcribe, transcribe_finer
 from symphys.transcription.transcription import Transcription
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ __all__ = [
     "symbolic_rollout",
     "terms",
     "transcribe",
+    "transcribe_finer",
 ]
 
 __getattr__ = later(

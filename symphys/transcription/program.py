@@ -24,7 +24,7 @@ from symphys.model.controllers import Net
 from symphys.model.controllers.net import Activation, Layer, activated
 from symphys.model.state_layout import Layout as Columns
 from symphys.model.state_layout import input_columns
-from symphys.problem import ALIVE, FeedbackController, Problem
+from symphys.problem import ALIVE, STEP_LENGTH, FeedbackController, Problem
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.formula_names import spans
 from symphys.transcription.gradient_probe import combined
@@ -329,13 +329,18 @@ OF_STEP = ("sensors", "controllers", "forces", "references", "phases", "terminat
 def step_identity(rollout: Rollout, exact: bool) -> str | None:
     """Return a key of one step: other costs, targets, limits, guesses and durations have the same.
 
-    The duration is part of it where it is free, and where formulas may name it.
+    The duration is part of it where it is free, formulas may name it, or phases act; the time step where it is no
+    parameter.
     """
     problem, parameters, simulation = rollout.problem, rollout.parameters, rollout.problem.simulation
     world = structure(rollout.world, parameters.symbols, parameters.scheme(simulation))
     columns = [(name, each.start, each.stop) for name, each in parameters.columns.items()]
     own = [getattr(problem, name) for name in OF_STEP]
-    timed = simulation if problem.free_duration or any(own) else simulation.dt
+    phased = any(phase.sets for phase in problem.phases) or any(law.during for law in problem.forces)
+    if problem.free_duration or phased or "duration" in repr(own):
+        timed: object = simulation
+    else:
+        timed = None if STEP_LENGTH in parameters.columns else simulation.dt
     return identity_of(world, timed, own, columns, rollout.inputs, tuple(rollout.memory.columns), exact)
 
 

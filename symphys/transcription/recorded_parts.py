@@ -32,6 +32,11 @@ class RolloutArrays:
     p: Array
     time: Array
 
+    @property
+    def finite(self) -> bool:
+        """Whether all states are finite."""
+        return bool(np.isfinite(self.x).all())
+
     def step_arguments(self, k: int) -> list[Array]:
         """Return the arguments of the step function at step k."""
         return [self.x[k], self.u[k], self.p, np.array([self.smoothing])]

@@ -410,12 +410,15 @@ class Rollout:
         return moving_names(self.world).union(*(each.names for each in self.problem.references))
 
 
-def symbolic_rollout(problem: Problem, inputs: tuple[str, ...] | None = None, asked: Iterable[Formula] = ()) -> Rollout:
+def symbolic_rollout(
+    problem: Problem, inputs: tuple[str, ...] | None = None, asked: Iterable[Formula] = (), timed: bool = False
+) -> Rollout:
     """Make the rollout of a problem; ``inputs`` may name more than the problem itself uses.
 
-    ``asked``: formulas that will be evaluated along it beside those of the problem.
+    ``asked``: formulas that will be evaluated along it beside those of the problem. ``timed``: the time step is a
+    parameter, so that finer steps share what is built.
     """
-    parameters = varied_parameters(problem)
+    parameters = varied_parameters(problem, timed)
     scheduled = tuple((share.name, share.symbol) for share in parameters.phases.shares)
     inputs = (*(input_names(problem) if inputs is None else inputs), *(name for name, _ in scheduled))
     world = replace(problem.world(parameters.overrides()), scheduled=scheduled)

@@ -19,6 +19,9 @@ from symphys.transcription.recorded_parts import RolloutArrays
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 
+AGREEMENT = 1e-7
+"""Relative and absolute difference of two evaluations of a step up to which it is rounding."""
+
 
 @dataclass(frozen=True)
 class Record:
@@ -37,19 +40,29 @@ def recorder(rollout: Rollout) -> ca.Function:
 
 def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: float) -> Record:
     """Simulate z; NotFinite, with place and cause, if a number is not finite."""
-    return recorded(rollout, [np.array(part) for part in record(z, smoothing)], z, smoothing)
-
-
-def recorded(rollout: Rollout, simulated: Sequence[Array], z: Array, smoothing: float) -> Record:
-    """Return the rollout of z from the results of ``recorder``; NotFinite, with place and cause, if it has none."""
-    x, u, given, p, *happened = (part.T for part in simulated)
-    z = np.asarray(z, float)
+    x, u, given, p, *happened = (np.array(part).T for part in record(z, smoothing))
     dt = rollout.parameters.step_length(rollout.problem.simulation, p.ravel())
     time = np.arange(rollout.steps + 1, dtype=np.float64) * dt
-    arrays = RolloutArrays(z, smoothing, x, u, given, p.ravel(), time)
-    motion = _trajectory(rollout, time, x, u, p.ravel(), *happened)
+    return _recorded(rollout, RolloutArrays(np.asarray(z, float), smoothing, x, u, given, p.ravel(), time), happened)
+
+
+def recorded(rollout: Rollout, arrays: RolloutArrays) -> Record | None:
+    """Return the record of a motion whose states are known, by casadi's virtual machine.
+
+    None where a step leads elsewhere there, beyond rounding. NotFinite, with place and cause, if it is not finite.
+    """
+    p, steps = np.tile(arrays.p[:, None], rollout.steps), rollout.steps
+    found = rollout.report.map(steps)(arrays.x[:-1].T, arrays.u.T, p, np.full((1, steps), arrays.smoothing))
+    after, *happened = (np.array(part).T for part in found)
+    if not np.allclose(after, arrays.x[1:], AGREEMENT, AGREEMENT, equal_nan=True):
+        return None
+    return _recorded(rollout, arrays, happened)
+
+
+def _recorded(rollout: Rollout, arrays: RolloutArrays, happened: Sequence[Array]) -> Record:
+    motion = _trajectory(rollout, arrays.time, arrays.x, arrays.u, arrays.p, *happened)
     try:
-        return Record(z, arrays, motion.require_finite())
+        return Record(arrays.z, arrays, motion.require_finite())
     except NotFinite as error:
         raise NotFinite(f"{error}; {first_non_finite(rollout, arrays)}") from None
 

@@ -29,7 +29,7 @@ from symphys.codegen.backends.interface import joined
 from symphys.codegen.backends.simd import common, probed
 from symphys.codegen.runtime.kernel import Outputs
 from symphys.codegen.toolchain.warm_start import ProgramSource
-from symphys.problem import GuessedMotion, Problem, Variable
+from symphys.problem import GuessedMotion, Problem, Simulation, Variable
 from symphys.shooting import (
     Evaluator,
     GuessedStates,
@@ -46,7 +46,7 @@ from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.network_rollout import has_large_nets
 from symphys.transcription.objective import Terms, bounds, has_squares, limits, rollout_terms
-from symphys.transcription.program import program_identity, rollout_program
+from symphys.transcription.program import program_identity, rollout_program, step_identity
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.sampler import Sampler, swept_inputs
 from symphys.transcription.staged.step_evaluator import StepEvaluator, evaluated_by_steps
@@ -54,6 +54,7 @@ from symphys.transcription.transcription import Transcription
 from symphys.types import Array
 
 if TYPE_CHECKING:
+    from symphys.transcription.staged.linearization import Linearization
     from symphys.transcription.staged.staged_problem import RolloutStages
 
 
@@ -88,6 +89,19 @@ def transcribe(
     return transcribe_whole(problem, exact, backend, threads)
 
 
+def transcribe_finer(known: Transcription, simulation: Simulation) -> Transcription:
+    """Transcribe a problem with another discretisation, to judge z there; equal steps are those of ``known``."""
+    found = transcribe(replace(known.problem, simulation=simulation), backend="casadi")
+    if has_large_nets(known.problem):
+        return found
+    own, step = found.steps(), known.steps().step
+    same = step_identity(own.rollout, own.step.exact)
+    if same is None or same != step_identity(step.rollout, step.exact):
+        return found
+    shared = own.sharing(step)
+    return replace(found, steps=lambda: shared)
+
+
 def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int | None) -> Transcription:
     """Transcribe a problem without its scenarios as one expression; nets of any size are part of the step."""
     began = perf_counter()
@@ -97,7 +111,8 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
     built = perf_counter() - began
     require_backend(backend)
     chosen = cache(lambda: _evaluating(rollout, functions, exact, backend, threads))
-    staged = cache(lambda: _stages(rollout, backend, threads, exact or not any(problem.simulation.smoothing)))
+    steps = cache(lambda: _steps(problem, backend, threads, exact or not any(problem.simulation.smoothing)))
+    staged = cache(lambda: _stages(steps(), backend, threads))
     shooting = ShootingProblem(
         name=problem.name,
         blocks=blocks(problem),
@@ -115,14 +130,21 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
         by_steps=_by_steps(rollout, staged, backend),
         guessed_states=states_of(staged, problem.guess),
     )
-    return Transcription(problem, rollout, functions, shooting, lambda: chosen().description, built)
+    return Transcription(problem, rollout, functions, shooting, lambda: chosen().description, built, steps)
 
 
-def _stages(rollout: Rollout, backend: str, threads: int | None, exact: bool) -> RolloutStages:
+def _steps(problem: Problem, backend: str, threads: int | None, exact: bool) -> Linearization:
+    """Return motions and their derivatives step by step; compiled on demand, for any time step."""
+    from symphys.transcription.staged.linearization import Linearization
+
+    return Linearization(symbolic_rollout(problem, timed=True), backend, threads, exact)
+
+
+def _stages(steps: Linearization, backend: str, threads: int | None) -> RolloutStages:
     """Return the staged problem, built on demand."""
     from symphys.transcription.staged.staged_problem import RolloutStages
 
-    return RolloutStages(rollout, backend, threads, exact)
+    return RolloutStages(steps.rollout, backend, threads, steps.step.exact, linearization=steps)
 
 
 def _by_steps(rollout: Rollout, staged: Callable[[], RolloutStages], backend: str) -> StepEvaluator | None:

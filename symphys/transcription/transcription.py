@@ -12,21 +12,24 @@ import casadi as ca
 import numpy as np
 
 from symphys.codegen.backends import Description
-from symphys.problem import DURATION, Problem
+from symphys.codegen.backends.calls import row_by_row
+from symphys.problem import Problem
 from symphys.records import dataclass
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import Trajectory
 from symphys.transcription.functions import ExpressionFunctions
-from symphys.transcription.gradient_probe import ExpressionProbe, Probe
+from symphys.transcription.gradient_probe import Probe
 from symphys.transcription.judge import Assessment, assessment
-from symphys.transcription.motion_values import motion_values
+from symphys.transcription.motion_values import motion_values, probe_slopes
 from symphys.transcription.objective import Terms
+from symphys.transcription.recorded_parts import RolloutArrays
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.step_evaluator import StepEvaluator
 from symphys.types import Array
 
 if TYPE_CHECKING:
     from symphys.transcription.simulation import Record
+    from symphys.transcription.staged.linearization import Linearization, StepPull
 
 PRICING_CALLS = 5
 """Calls with which a function is timed; the fastest counts."""
@@ -39,6 +42,7 @@ class Transcription:
     Attributes:
         described: describes the evaluator of the shooting problem, and makes it where nobody has asked for it yet.
         build_seconds: until there were expressions; ``backend.seconds`` come on top.
+        steps: makes what takes the steps of its motions one by one, and differentiates them.
         records_contacts: whether ``record`` has the forces and gaps of contacts.
     """
 
@@ -50,6 +54,7 @@ class Transcription:
     shooting: ShootingProblem
     described: Callable[[], Description]
     build_seconds: float
+    steps: Callable[[], Linearization]
 
     @property
     def backend(self) -> Description:
@@ -72,7 +77,7 @@ class Transcription:
 
     def judge(self, z: Array, smoothing: float = 0.0) -> Assessment:
         """Assess ``z`` by the exact rollout, or by a smoothed one."""
-        found = self._motion_values.call([z, self._simulated(z, smoothing)[0]])
+        found = self._motion_values.call([z, self.arrays(z, smoothing).x.T])
         _, objective, *parts, _ = (np.array(part).ravel() for part in found)
         return assessment(self.rollout.problem, float(objective[0]), *parts)
 
@@ -81,21 +86,50 @@ class Transcription:
         return self.record(z, smoothing).motion
 
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
-        """Simulate z and return motion, states and arguments; NotFinite if a number is not finite."""
-        from symphys.transcription.simulation import recorded
+        """Simulate z and return motion, states and arguments; NotFinite if a number is not finite.
 
-        return recorded(self.rollout, self._simulated(z, smoothing), z, smoothing)
+        Each step is taken by casadi's virtual machine too; where one leads elsewhere, all of the motion is that of the
+        virtual machine.
+        """
+        from symphys.transcription.simulation import recorded, simulate
 
-    def _simulated(self, z: Array, smoothing: float) -> list[Array]:
-        """Return the results of ``recorder`` for z; the last ones are cached for judging and recording."""
+        found = None if self._doubted else recorded(self.rollout, self.arrays(z, smoothing))
+        if found is None:
+            self._doubted.append(True)
+            self._last.clear()
+            found = simulate(self.rollout, self._recorder, np.array(z, float), smoothing)
+        return found
+
+    def arrays(self, z: Array, smoothing: float = 0.0) -> RolloutArrays:
+        """Return states and arguments of the motion of z, which may be not finite; the last ones are cached."""
         key, last = (np.asarray(z, np.float64).tobytes(), smoothing), self._last.get("found")
         if last is None or last[0] != key:
-            last = key, [np.array(part) for part in self._recorder(z, smoothing)]
+            last = key, self._simulated(np.array(z, float), smoothing)
             self._last["found"] = last
-        return list(last[1])
+        return last[1]
+
+    def _simulated(self, z: Array, smoothing: float) -> RolloutArrays:
+        rollout, steps = self.rollout, self.steps()
+        _, given, p = (np.array(part) for part in self._start(z))
+        dt = float(np.ravel(rollout.parameters.step_length(self.problem.simulation, p.ravel()))[0])
+        time = np.arange(rollout.steps + 1, dtype=np.float64) * dt
+        if self._doubted or (smoothing and steps.step.exact):
+            x, u = (np.array(part).T for part in self._recorder(z, smoothing)[:2])
+        else:
+            x = steps.states(z[None], smoothing)[0]
+            u = given.T
+            if rollout.feedback is not None:
+                found = rollout.feedback.map(rollout.steps)(x[:-1].T, given, np.tile(p, rollout.steps), time[None, :-1])
+                u = np.array(found).T
+        return RolloutArrays(z, smoothing, x, u, given.T, p.ravel(), time)
 
     @cached_property
-    def _last(self) -> dict[str, tuple[Any, list[Array]]]:
+    def _doubted(self) -> list[bool]:
+        """Not empty where the virtual machine has taken a step elsewhere: then it takes all of them."""
+        return []
+
+    @cached_property
+    def _last(self) -> dict[str, tuple[Any, RolloutArrays]]:
         return {}
 
     def motion(self, z: Array, x: Array, u: Array) -> Trajectory:
@@ -137,16 +171,13 @@ class Transcription:
     @cached_property
     def probe(self) -> Probe:
         """Return the number that is differentiated to examine the gradient."""
-        return ExpressionProbe(self.rollout, self.terms, self.shooting.evaluator)
+        return MotionProbe(self)
 
     def back(self, record: Record, ends: Array) -> Iterator[Array]:
         """Derivatives of ends . x_N, with ``ends`` (nx, m), with respect to x_N-1, x_N-2 ... x_0: (nx, m) each."""
-        arrays, step = record.arrays, self.rollout.closed
-        backward, adjoint = self._backward(ends.shape[1]), ends
-        results = [np.zeros(step.numel_out(i)) for i in range(step.n_out())]
-        inert = [np.zeros((len(result), ends.shape[1])) for result in results[1:]]
-        for k in reversed(range(self.rollout.steps)):
-            adjoint = np.array(backward(*arrays.closed_arguments(k, self.rollout), *results, adjoint, *inert)[0])
+        adjoint = ends
+        for pull in self._pulls(record.arrays):
+            adjoint, _, _ = pull(adjoint)
             yield adjoint
 
     def pull(self, record: Record, states: Mapping[int, Array], parameters: Array) -> Array | None:
@@ -160,23 +191,22 @@ class Transcription:
         Returns:
             None for problems with large nets, of which that is not known.
         """
-        arrays, step, count = record.arrays, self.rollout.closed, parameters.shape[1]
-        backward, adjoint = self._backward(count), np.zeros((step.size1_in(0), count))
-        results = [np.zeros(step.numel_out(i)) for i in range(step.n_out())]
-        inert = [np.zeros((len(result), count)) for result in results[1:]]
-        inputs = np.zeros((*arrays.given.shape, count))
-        for k in reversed(range(max(states) + 1)):
-            adjoint = adjoint + states.get(k, 0)
-            if k == 0:
-                break
-            arguments = arrays.closed_arguments(k - 1, self.rollout)
-            adjoint, given, p = (np.array(part) for part in backward(*arguments, *results, adjoint, *inert)[:3])
-            inputs[k - 1] = given[: inputs.shape[1]]
-            parameters = parameters + p
-            if self.problem.free_duration and self.rollout.feedback is not None:  # the time of this step
-                duration = self.rollout.parameters.columns[DURATION]
-                parameters[duration] += given[-1:] * ((k - 1) / self.rollout.steps)
-        return self._pulled_start(record.z, adjoint, inputs, parameters)
+        return self._pull(record.arrays, states, parameters)
+
+    def _pull(self, arrays: RolloutArrays, states: Mapping[int, Array], parameters: Array) -> Array:
+        end, count = max(states), parameters.shape[1]
+        adjoint, inputs = np.zeros((arrays.x.shape[1], count)), np.zeros((*arrays.given.shape, count))
+        for k, pull in zip(range(end, 0, -1), self._pulls(arrays, end), strict=True):
+            adjoint, given, p = pull(adjoint + states.get(k, 0))
+            inputs[k - 1, : len(given)] = given
+            parameters = parameters + p[: len(parameters)]
+        return self._pulled_start(arrays.z, adjoint + states.get(0, 0), inputs, parameters)
+
+    def _pulls(self, arrays: RolloutArrays, end: int | None = None) -> Iterator[StepPull]:
+        """Yield the adjoints of the steps before state ``end``, the last one first."""
+        steps, stop = self.steps(), self.rollout.steps if end is None else end
+        u = arrays.given[:stop, : self.rollout.controls]
+        return steps.pulls(arrays.x[: stop + 1], u, steps.full_parameters(arrays.p), arrays.smoothing)
 
     def _pulled_start(self, z: Array, x0: Array, inputs: Array, p: Array) -> Array:
         """Return (n, m) derivatives by z from those (nx, m), (N, nu, m), (np, m) by the start's parts."""
@@ -184,16 +214,6 @@ class Transcription:
         given = np.concatenate([inputs[:, :, i].T for i in range(count)], axis=1)
         known = [np.zeros(start.size_out(i)) for i in range(start.n_out())]
         return np.array(start.reverse(count)(z, *known, x0, given, p))
-
-    def _backward(self, count: int) -> ca.Function:
-        """Return the adjoint of the step for ``count`` directions, cached since it is slow to build."""
-        if count not in self._adjoints:
-            self._adjoints[count] = self.rollout.closed.reverse(count)
-        return self._adjoints[count]
-
-    @cached_property
-    def _adjoints(self) -> dict[int, ca.Function]:
-        return {}
 
     @cached_property
     def _start(self) -> ca.Function:
@@ -206,10 +226,39 @@ class Transcription:
         return motion_values(self.rollout)
 
     @cached_property
+    def _probe_slopes(self) -> ca.Function:
+        return probe_slopes(self.rollout)
+
+    @cached_property
     def _recorder(self) -> ca.Function:
         from symphys.transcription.simulation import recorder
 
         return recorder(self.rollout)
+
+
+class MotionProbe:
+    """A ``Probe`` along motions that are simulated and differentiated step by step."""
+
+    def __init__(self, transcription: Transcription) -> None:
+        """Take the motions of a transcription."""
+        self._of = transcription
+        self._slopes: dict[bytes, Array] = {}
+
+    def values(self, Z: Array) -> Array:
+        """Implement ``Probe.values``."""
+        X = self._of.steps().states(np.asarray(Z, float), 0.0)
+        return np.array(row_by_row(self._of._motion_values, Z, X)[-1][:, 0])
+
+    def gradient(self, z: Array) -> Array:
+        """Implement ``Probe.gradient``; the gradient at the last z is cached."""
+        key = np.asarray(z, np.float64).tobytes()
+        if key not in self._slopes:
+            arrays = self._of.arrays(z)
+            direct, by_states = (np.array(part) for part in self._of._probe_slopes(z, arrays.x.T))
+            states = {k: by_states[:, k, None] for k in range(len(arrays.x))}
+            pulled = self._of._pull(arrays, states, np.zeros((len(arrays.p), 1)))
+            self._slopes = {key: direct.ravel() + pulled[:, 0]}
+        return self._slopes[key].copy()
 
 
 def gradient_prices(

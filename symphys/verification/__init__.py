@@ -4,5 +4,6 @@ Its numbers are explained in words by ``symphys.findings``.
 """
 
 from symphys.verification.examination import examine, survey
+from symphys.verification.refinement import finer_values
 
-__all__ = ["examine", "survey"]
+__all__ = ["examine", "finer_values", "survey"]

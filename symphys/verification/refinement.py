@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from symphys.model.state_layout import Layout
 from symphys.shooting import VariableBlock
 from symphys.trajectory import NotFinite
-from symphys.transcription import Assessment, Record, Rollout, Transcription, transcribe
+from symphys.transcription import Assessment, Record, Rollout, Transcription, transcribe_finer
 from symphys.types import Array
 from symphys.verification.bodies import Bodies, bodies, floating
 
@@ -80,6 +80,15 @@ def refine(
         objectives += [verdict.objective] * (what != MORE_SWEEPS)
         rows.append({"what": what, "objective": verdict.objective, "worst": verdict.worst, "gradient": changes})
     return {"refined": rows, "order": {"objective": order(objectives), "gradient": order(slopes)}}
+
+
+def finer_values(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
+    """Return the rows "refined" of ``refine`` for dt / 2 and dt / 4, without gradients."""
+    rows = []
+    for what in (FINER_DT, FINEST_DT):
+        verdict = finer_problem(transcription, what).judge(z)
+        rows.append({"what": what, "objective": verdict.objective, "worst": verdict.worst, "gradient": {}})
+    return rows
 
 
 def follows(judged: Assessment, row: dict[str, Any]) -> bool:
@@ -202,15 +211,14 @@ def order(values: Sequence[ArrayLike]) -> float | None:
 @lru_cache(maxsize=len(TOLD) + 1)
 def finer_problem(transcription: Transcription, what: str) -> Transcription:
     """Transcribe the refined problem; once for all runs of a problem."""
-    problem = transcription.problem
-    simulation = problem.simulation
+    simulation = transcription.problem.simulation
     finer = {
         FINER_DT: replace(simulation, dt=simulation.dt / 2),
         FINEST_DT: replace(simulation, dt=simulation.dt / 4),
         MORE_SWEEPS: replace(simulation, sweeps=2 * simulation.sweeps),
         ONE_MORE: replace(simulation, sweeps=simulation.sweeps + 1),
     }
-    return transcribe(replace(problem, simulation=finer[what]), backend="casadi")
+    return transcribe_finer(transcription, finer[what])
 
 
 def smoothed(transcription: Transcription, record: Record) -> list[dict[str, Any]]:

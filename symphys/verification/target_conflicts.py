@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from symphys.problem import Target
 from symphys.records import dataclass
 from symphys.shooting import ShootingProblem, VariableBlock
-from symphys.trajectory import NotFinite
 from symphys.transcription import Record, Rollout, Transcription
-from symphys.transcription.recorded_parts import part_numbers
+from symphys.transcription.recorded_parts import RolloutArrays, part_numbers
 from symphys.types import Array
 from symphys.verification.sensitivity_growth import DIRECTIONS
 
@@ -123,7 +122,7 @@ def target_conflicts(transcription: Transcription, record: Record) -> dict[str, 
     shooting = transcription.shooting
     nothing: dict[str, Any] = {"contradicting": [], "opposed": [], "outweighed": []}
     functions = [transcription.rollout.compiled(target.formula) for target in transcription.problem.targets]
-    samples = target_samples(transcription.rollout, record, functions)
+    samples = target_samples(transcription.rollout, record.arrays, functions)
     if not any(sample.missed for sample in samples):
         return {"equations": 0, "unknowns": 0, **nothing}
     free = shooting.stacked("lower") < shooting.stacked("upper")
@@ -142,9 +141,9 @@ def target_conflicts(transcription: Transcription, record: Record) -> dict[str, 
     }
 
 
-def target_samples(rollout: Rollout, record: Record, functions: Sequence[ca.Function]) -> list[TargetSample]:
+def target_samples(rollout: Rollout, arrays: RolloutArrays, functions: Sequence[ca.Function]) -> list[TargetSample]:
     """Evaluate every target of a rollout, whose formulas are compiled to ``functions``."""
-    arrays, found = record.arrays, []
+    found = []
     for target, function in zip(rollout.problem.targets, functions, strict=True):
         k = rollout.tick(target.at)
         u = arrays.u[min(k, rollout.steps - 1)]
@@ -231,9 +230,8 @@ def outweighed(
     height = penalty([samples[i] for i in missed])
     step = height / float(own @ own) * own * scale
     z = np.clip(record.z - step, shooting.stacked("lower"), shooting.stacked("upper"))
-    try:
-        beside = transcription.record(z)
-    except NotFinite:
+    beside = transcription.arrays(z)
+    if not beside.finite:
         return []
     nearer = target_samples(transcription.rollout, beside, [sample.function for sample in samples])
     return missed if penalty([nearer[i] for i in missed]) < NEARER * height else []
@@ -303,10 +301,8 @@ def _changes(
         way = np.where(free, rng.standard_normal(z.size), 0.0)
         step = distance * shooting.stacked("scale") * way / (float(np.linalg.norm(way)) or 1.0)
         inside = (z + step >= lower) & (z + step <= upper)
-        try:
-            record = transcription.record(np.clip(z + np.where(inside, step, -step), lower, upper))
-        except NotFinite:
-            continue
-        beside = target_samples(transcription.rollout, record, [sample.function for sample in samples])
-        changes.append(joined(beside) - here)
+        arrays = transcription.arrays(np.clip(z + np.where(inside, step, -step), lower, upper))
+        if arrays.finite:
+            beside = target_samples(transcription.rollout, arrays, [sample.function for sample in samples])
+            changes.append(joined(beside) - here)
     return np.array(changes).T if len(changes) >= here.size else None

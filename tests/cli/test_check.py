@@ -32,11 +32,11 @@ def test_check_says_that_a_list_gets_the_same_values(run: Run, throw: Path) -> N
 @pytest.mark.slow
 def test_check_and_solve_say_which_solvers_are_taken_and_why(run: Run, throw: Path) -> None:
     """Where none is named; a list in the file is only repeated, and events and silence stay clean."""
-    since = "least_squares, since a few numbers set what is squared"
+    since = "race, since a search passes kinks and plateaus, and a method that follows derivatives finishes"
     assert f"  solver       {since}" in run("check", throw)[1]
     code, table, err = run("solve", throw, "--backend", "casadi", "--unexamined", "--no-report")
-    assert code == 0 and f"throw: {since}\n" in err and "throw: cma, since " in err
-    assert "gradient" not in table and table.count("1/1") == 2
+    assert code == 0 and f"throw: {since}\n" in err
+    assert "gradient" not in table and table.count("1/1") == 1
     assert run("solve", throw, "--backend", "casadi", "--unexamined", "--no-report", "--quiet")[2] == ""
     assert "since" not in run("solve", throw, "--solver", "cma", "--backend", "casadi", "--unexamined")[2]
     throw.write_text('solvers = ["cma"]\n' + throw.read_text(encoding="utf-8"), encoding="utf-8")

@@ -153,7 +153,8 @@ def test_the_motion_is_the_guess_of_the_states(cart: Problem, found: Solution) -
 @few("solver", [name for name, each in SOLVERS.items() if each.scenarios is not True], 2)
 def test_every_solver_starts_there(solver: str, cart: Problem, found: Solution, tmp_path: Path) -> None:
     """The first row of its trace is the solution of the run; on another grid it is as good as its control is."""
-    few = {"generations": 1} if solver == "evolution" else {"evaluations": 20} if solver == "cma" else {"iterations": 1}
+    budgets = {"evolution": {"generations": 1}, "cma": {"evaluations": 20}, "race": {"rounds": 0}}
+    few = budgets.get(solver, {"iterations": 1})
     again = symphys.solve(cart, solver, backend="casadi", folder=tmp_path, guess=found, **few)
     assert again.run.guess["objective"] == pytest.approx(found.objective, rel=1e-9)
     assert again.folder.parent.name.startswith("cart@solver.") and ",guess=" in again.folder.parent.name

@@ -33,10 +33,11 @@ def test_names() -> None:
         "cma",
         "stochastic",
         "evolution",
+        "race",
     ]
     for name in SOLVERS:
         assert solver(name).name == name
-    with pytest.raises(SymphysError, match=r"'gradient'.*cma, stochastic, evolution"):
+    with pytest.raises(SymphysError, match=r"'gradient'.*cma, stochastic, evolution, race"):
         solver("gradent")
     with pytest.raises(SymphysError, match="gradient"):
         solver("xyz")
@@ -52,7 +53,7 @@ def test_options_are_documented_and_have_defaults(name: str) -> None:
 @every_solver
 def test_a_table_of_a_problem_file_is_validated(name: str) -> None:
     adapter = TypeAdapter(solver(name).Options)
-    budget = "evaluations" if name == "cma" else "iterations"
+    budget = {"cma": "evaluations", "race": "rounds"}.get(name, "iterations")
     assert getattr(adapter.validate_python({budget: 7}), budget) == 7
     for bad in ({"smoothng": 1}, {budget: "x"}, {"iterations": -1}, {"evaluations": -1}):
         with pytest.raises(ValidationError):

@@ -10,8 +10,10 @@ import pytest
 from worlds.features import FEATURES
 from worlds.toys import require
 
+import symphys
 from symphys.problem import problem_of_tables
 from symphys.transcription import Transcription, transcribe
+from symphys.transcription.staged.linearization import Linearization
 from symphys.types import Array
 
 HEAVY = {"loop of joints", "orientation", "reactions of joints", "soft joint", "a leg that lands"}
@@ -89,3 +91,23 @@ def test_steps_give_what_the_whole_gives(name: str) -> None:
     assert plain.value == pytest.approx(wanted.objective[0], rel=1e-10)
     assert found.gradient is not None
     np.testing.assert_allclose(found.gradient, expected[1], rtol=1e-8, atol=1e-8 * np.abs(expected[1]).max())
+
+
+def test_a_kernel_whose_steps_lead_elsewhere_does_not_judge(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The virtual machine takes each recorded step too, and all of them from then on."""
+    problem = symphys.load("ball_throw")
+    honest, wrong = (transcribe(problem, backend="casadi") for _ in range(2))
+    z, own = honest.shooting.start(0), Linearization.states
+
+    def off(self: Linearization, Z: Array, smoothing: float) -> Array:
+        found = own(self, Z, smoothing)
+        found[:, 5:] += 1e-3
+        return found
+
+    expected = honest.record(z), honest.judge(z)
+    with monkeypatch.context() as changed:
+        changed.setattr(Linearization, "states", off)
+        assert not np.allclose(wrong.arrays(z).x, expected[0].arrays.x)
+        taken = wrong.record(z)
+        assert np.array_equal(taken.motion.position, expected[0].motion.position)
+        assert wrong.judge(z).worst == expected[1].worst

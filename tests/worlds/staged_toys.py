@@ -206,6 +206,9 @@ class Chain(SingleSteps):
 
     recursion = None
 
+    def prepare(self) -> None:
+        """Do nothing: there is nothing to compile."""
+
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Any, Any, Any]:
         P = np.tile(self.p(motion.z), (self.steps, 1))
         g, gx, gu, gp = blocks(self.f_g, motion.x[:-1], motion.u, P)

@@ -19,8 +19,9 @@ from symphys.shooting import Evaluator, ShootingProblem, Values, VariableBlock
 from symphys.solvers import SOLVERS, Outcome, TraceRow, solver
 from symphys.types import Array
 
-PLAIN = [name for name, each in SOLVERS.items() if not each.scenarios and name not in ("ilqr", "multiple_shooting")]
-"""The solvers that need neither a scenario nor steps; test_ilqr.py and test_multiple_shooting.py have the others."""
+OTHERS = ("ilqr", "multiple_shooting", "race")
+PLAIN = [name for name, each in SOLVERS.items() if not each.scenarios and name not in OTHERS]
+"""The solvers that need neither a scenario nor steps; each of the others has tests of its own."""
 
 Formula = Callable[[Any, Any], Any]
 """(z, smoothing) -> casadi expression."""

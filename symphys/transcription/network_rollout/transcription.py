@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symphys.codegen import KernelUnavailable, ProgramError, processors
 from symphys.codegen.backends import BEST, PRECISIONS, Description, described
 from symphys.codegen.cuda import DeviceKernel
+from symphys.errors import SymphysError
 from symphys.problem import Problem
 from symphys.records import dataclass
 from symphys.shooting import Nlp, ShootingProblem
@@ -24,9 +25,13 @@ from symphys.transcription.network_rollout.context import RolloutContext, make_c
 from symphys.transcription.network_rollout.evaluator import LargeEvaluator, LargeProbe
 from symphys.transcription.network_rollout.forward_backward import ForwardPass, back, objective_arguments
 from symphys.transcription.objective import limits
+from symphys.transcription.recorded_parts import RolloutArrays
 from symphys.transcription.simulation import Record, simulate
 from symphys.transcription.transcription import Transcription, gradient_prices
 from symphys.types import Array
+
+if TYPE_CHECKING:
+    from symphys.transcription.staged.linearization import Linearization
 
 INTERPRETED_BACKENDS = ("casadi", "c")
 NET_PRECISIONS = {"double": np.float64, "single": np.float32}
@@ -58,6 +63,10 @@ class LargeTranscription(Transcription):
         motion = self._plain.forward_pass(z, smoothing)
         found = simulate(self.rollout, lambda *_: self._happened(motion, smoothing), motion.z[0], smoothing)
         return replace(found, z=np.asarray(z, float))
+
+    def arrays(self, z: Array, smoothing: float = 0.0) -> RolloutArrays:
+        """Implement ``Transcription.arrays``."""
+        return self.record(z, smoothing).arrays
 
     def prices(
         self, kinds: Iterable[str] = ("gradient",), clock: Callable[[], float] = perf_counter
@@ -117,8 +126,12 @@ def transcribe_large(
     )
     functions = ExpressionFunctions(context.rollout, context.objectives.terms)
     return LargeTranscription(
-        problem, context.rollout, functions, shooting, lambda: description, built, context=context
+        problem, context.rollout, functions, shooting, lambda: description, built, _no_steps, context=context
     )
+
+
+def _no_steps() -> Linearization:
+    raise SymphysError("the steps of a problem with large nets are not taken one by one")
 
 
 def evaluator_or_plain(

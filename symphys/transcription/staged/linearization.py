@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 
 import casadi as ca
@@ -13,10 +13,13 @@ from symphys.codegen.backends import BEST
 from symphys.shooting import Linearized, StagedMotion
 from symphys.transcription.formula_names import spans
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.staged.linearized_step import LinearizedStep, Slopes
+from symphys.transcription.staged.linearized_step import LinearizedStep, Pull, Slopes
 from symphys.transcription.staged.tangent import Tangent
 from symphys.types import Array, Ints
 
+StepSlopes = tuple[Array, Array, Array]
+"""Derivatives (nx, k), (m, k), (np, k) by the state before a step, its inputs and parameters."""
+StepPull = Callable[[Array], StepSlopes]
 OFF_TANGENT_TOLERANCE = 1e-13
 """Relative size of slopes of the first state that counts as rounding: smaller ones lie on the tangent."""
 
@@ -38,11 +41,16 @@ class Linearization:
         threads: int | None = None,
         exact: bool = False,
         wait: bool = False,
+        step: LinearizedStep | None = None,
     ) -> None:
-        """Compile the step; arguments are as in ``LinearizedStep``."""
-        self.rollout, self.tangent = rollout, Tangent(rollout)
-        self.statics = statics_of(rollout)
-        self.step = LinearizedStep(rollout, self.tangent, backend, threads, exact, wait=wait)
+        """Compile the step; arguments are as in ``LinearizedStep``. ``step``: that of a rollout with an equal step."""
+        self.rollout, self.statics = rollout, statics_of(rollout)
+        self.step = step or LinearizedStep(rollout, Tangent(rollout), backend, threads, exact, wait=wait)
+        self.tangent = self.step.tangent
+
+    def sharing(self, step: LinearizedStep) -> Linearization:
+        """Return the same with an equal step that may be compiled already."""
+        return Linearization(self.rollout, step=step)
 
     def motion(self, z: ArrayLike, smoothing: float, start: Array | None = None) -> StagedMotion:
         """Return the motion of z (len(z),), from its own first state or another one (nx,)."""
@@ -87,6 +95,28 @@ class Linearization:
                 c[0] += self.step.full_state_slopes(motion.x[0], motion.u[0], p, motion.smoothing) @ left
             yield Linearized(a, b, c, start)
 
+    def pulls(self, x: Array, u: Array, p: Array, smoothing: float) -> Iterator[StepPull]:
+        """Yield the adjoints of the steps along states (N + 1, nx) with inputs (N, m) and p (np,), the last one first.
+
+        Inputs are without shares of phases. An adjoint takes derivatives (nx, k) by the state after its step, and
+        returns those by the state before (nx, k), by its inputs (m, k) and by p (np, k).
+        """
+        (nx, n, m, np_), varied = self.step.arguments.sizes, self.step.arguments.varied
+        steps = zip(reversed(range(len(u))), self.step.pulls(x[:-1], x[1:], u, p, smoothing), strict=True)
+        for k, pull in steps:
+            lift = self._sparse(self.tangent.basis, x[k + 1], p)
+            shifts = [self._sparse(self.tangent.shift, x[i], p)[:, varied] for i in (k, k + 1) if self.tangent.shifts]
+
+            def back(seeds: Array, pull: Pull = pull, lift: Array = lift, shifts: list[Array] = shifts) -> StepSlopes:
+                found = pull(lift.T @ seeds)
+                by_state, by_p = found[-nx:], np.zeros((np_, seeds.shape[1]))
+                by_p[varied] = found[n + m : -nx]
+                if shifts:  # there p moves both states with their joints, here the one before stays
+                    by_p[varied] += shifts[1].T @ seeds - shifts[0].T @ by_state
+                return by_state, found[n : n + m], by_p
+
+            yield back
+
     def start_slopes(self, motion: StagedMotion) -> tuple[Array, Array, Array]:
         """Differentiate by the static entries: the first state in its tangent (n, s), its rest (nx, s), p (np, s)."""
         if not len(self.statics):
@@ -102,6 +132,10 @@ class Linearization:
             np.where(np.abs(left) > OFF_TANGENT_TOLERANCE * np.abs(first).max(initial=0.0), left, 0.0),
             parameters,
         )
+
+    def full_parameters(self, p: Array) -> Array:
+        """Return p (np,) of the steps from that of a rollout whose time step is no parameter."""
+        return np.append(p, self._parameters[len(p) :])
 
     def parameters(self, z: Array) -> Array:
         """Return p (np,): without static entries the same for all z."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import field
-from functools import cached_property
+from functools import cached_property, partial
 from time import perf_counter
 from typing import Any
 
@@ -31,9 +31,13 @@ from symphys.types import Array
 
 Slopes = tuple[Array, Array, Array]
 """(N, n, n), (N, n, m), (N, n, np): derivatives of the next tangent by the tangent, inputs and parameters."""
+Pull = Callable[[Array], Array]
+"""(n, k) derivatives by the next tangent -> (d + u + varied p + nx, k) those by the varying arguments of the step."""
 ZERO = np.zeros(1)
 ZERO.flags.writeable = False
 """The buffer of derivatives by parameters where no parameter varies."""
+MAX_PULLED = 2**23
+"""Numbers of Jacobians that are computed at once for adjoints."""
 MAX_LENT_ROWS = 16
 """Rows up to which preparing a call takes longer than computing it."""
 
@@ -148,6 +152,12 @@ class LinearizedStep:
         varying, given = self.rows(k, X, after, U, P, smoothing)
         return map(self._cut, self._off.jacobians_from_end(varying, given, self._columns))
 
+    def pulls(self, X: ArrayLike, after: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Iterator[Pull]:
+        """Yield the adjoints of steps from X (N, nx) to ``after`` (N, nx), the last step first."""
+        states = np.asarray(X, float)
+        varying, given = self.rows(np.arange(len(states)), states, after, U, P, smoothing)
+        return self._off.pulls(varying, given)
+
     @property
     def _columns(self) -> int:
         """Return the number of columns of a Jacobian: d, u, and the entries of p that z sets."""
@@ -197,6 +207,10 @@ class LinearizedStep:
             return f"casadi's virtual machine{self._note}"
         report = self._off.kernel.report
         return f"{report.precision} precision, lanes {report.lanes}, threads {self._off.kernel.threads}"
+
+    def prepare(self) -> None:
+        """Begin to compile the slopes."""
+        _ = self._off
 
     @cached_property
     def evaluator(self) -> Description:
@@ -299,6 +313,14 @@ class _BySlopes:
     def jacobians_from_end(self, varying: Array, given: Array, columns: int) -> Iterator[Array]:
         return self.kernel.jacobians_from_end(varying, given, columns)
 
+    def pulls(self, varying: Array, given: Array) -> Iterator[Pull]:
+        width = varying.shape[1]
+        some = max(1, MAX_PULLED // (self.kernel.library.data.height * width))
+        for end in range(len(varying), 0, -some):
+            part = slice(max(0, end - some), end)
+            for jacobian in self.kernel.jacobians(varying[part], given[part], width)[::-1]:
+                yield jacobian.T.__matmul__
+
 
 class _ByCasadi:
     """Evaluates state by state on casadi's virtual machine, for machines without a compiler."""
@@ -306,6 +328,7 @@ class _ByCasadi:
     def __init__(self, function: ca.Function) -> None:
         self.function = function
         self._jacobian: dict[int, ca.Function] = {}
+        self._reversed: dict[int, ca.Function] = {}
 
     def values(self, varying: Array, given: Array) -> Array:
         rows = [np.array(self.function(*row)).ravel() for row in zip(varying, given, strict=True)]
@@ -320,6 +343,19 @@ class _ByCasadi:
         cut = (np.split(row, [columns]) for row in varying)
         rows = [np.array(ca.DM(self._jacobian[columns](*row, more))) for row, more in zip(cut, given, strict=True)]
         return np.array(rows).reshape(len(varying), -1, columns)
+
+    def pulls(self, varying: Array, given: Array) -> Iterator[Pull]:
+        result = np.zeros(self.function.size1_out(0))
+        for row, more in zip(varying[::-1], given[::-1], strict=True):
+            yield partial(self._pull, row, more, result)
+
+    def _pull(self, varying: Array, given: Array, result: Array, seeds: Array) -> Array:
+        return np.array(self._reverse(seeds.shape[1])(varying, given, result, seeds)[0])
+
+    def _reverse(self, count: int) -> ca.Function:
+        if count not in self._reversed:
+            self._reversed[count] = self.function.reverse(count)
+        return self._reversed[count]
 
     def jacobians_from_end(self, varying: Array, given: Array, columns: int) -> Iterator[Array]:
         rows = zip(varying[::-1], given[::-1], strict=True)

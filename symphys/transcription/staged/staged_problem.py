@@ -63,11 +63,13 @@ class RolloutStages:
         threads: int | None = None,
         exact: bool = False,
         priced: bool = False,
+        linearization: Linearization | None = None,
     ) -> None:
         """Compile the step.
 
         Args:
             rollout: of a problem.
+            linearization: of this rollout, with the same options; None: it is made.
             backend: the evaluator of the step.
             threads: their number for a batch; None: one for each processor.
             exact: whether it is for smoothing 0 only.
@@ -76,7 +78,7 @@ class RolloutStages:
         problem = rollout.problem
         self.rollout, self.steps = rollout, rollout.steps
         self.statics = statics_of(rollout)
-        self._linearization = Linearization(rollout, backend, threads, exact, wait=priced)
+        self._linearization = linearization or Linearization(rollout, backend, threads, exact, wait=priced)
         self.tangent = self._linearization.tangent
         self._evaluated, self._priced = (backend, 1, 0) if priced else (backend, threads, None), priced
         self._groups = TermGroups(rollout, self.tangent, backend, threads)
@@ -205,6 +207,10 @@ class RolloutStages:
         return motions.x, motions.u, motions.new, motions.cost if self._rolled.costs else None
 
     _rolled: PolicyRollout | None = None
+
+    def prepare(self) -> None:
+        """Implement ``StagedProblem.prepare``."""
+        self._linearization.step.prepare()
 
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Return the derivatives of all steps."""

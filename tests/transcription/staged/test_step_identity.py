@@ -5,6 +5,7 @@ from __future__ import annotations
 from copy import deepcopy
 from typing import Any
 
+import numpy as np
 import pytest
 
 import symphys
@@ -50,6 +51,9 @@ def changed(table: str, key: str, value: Any) -> Linearization:
     return Linearization(symbolic_rollout(symphys.load(tables)), "casadi", 1)
 
 
+NAMED = "-drag.c * bob.velocity * duration"
+
+
 def keys(made: Linearization) -> list[str | None]:
     return [made.step.source(what, lambda: pytest.fail("is not made")).identity for what in ("step", "slopes")]
 
@@ -80,14 +84,29 @@ def test_what_changes_the_step_has_a_key_of_its_own(name: str) -> None:
     assert not set(keys(made)) & set(keys(other))
 
 
-def test_laws_have_a_key_of_their_own_which_has_the_duration() -> None:
-    """Since their formulas may name it."""
+def test_laws_have_a_key_of_their_own() -> None:
+    """With the duration in it where a formula names it."""
     found = []
-    for law, seconds in ((None, 0.4), (DRAG, 0.4), (DRAG, 0.6), (DRAG | {"value": "-2 * drag.c * bob.velocity"}, 0.4)):
-        tables = deepcopy(SWING) | ({} if law is None else {"force": [law]})
+    for value, seconds in ((None, 0.4), (DRAG["value"], 0.4), (NAMED, 0.4), (NAMED, 0.6)):
+        tables = deepcopy(SWING) | ({} if value is None else {"force": [DRAG | {"value": value}]})
         tables["simulation"]["duration"] = seconds
         found.append(tuple(keys(Linearization(symbolic_rollout(symphys.load(tables)), "casadi", 1))))
     assert len(set(found)) == 4
+
+
+def test_a_time_step_that_is_a_parameter_is_no_part_of_the_key() -> None:
+    """Then steps half as long are those of the same kernel, to rounding."""
+    made = []
+    for dt in (0.01, 0.005):
+        tables = deepcopy(SWING)
+        tables["simulation"]["dt"] = dt
+        made.append(Linearization(symbolic_rollout(symphys.load(tables), timed=True), "casadi", 1))
+    coarse, fine = made
+    assert keys(coarse) == keys(fine) and None not in keys(coarse)
+    z = np.zeros(int(fine.rollout.z.shape[0])) + 0.3
+    shared, own = fine.sharing(coarse.step).motion(z, 0.0), fine.motion(z, 0.0)
+    assert len(shared.x) == 2 * len(coarse.motion(z, 0.0).x) - 1
+    assert np.array_equal(shared.x, own.x)
 
 
 def test_what_is_varied_has_a_key_of_its_own() -> None:

@@ -1,0 +1,470 @@
+"""A race of a search and of methods that finish, for guesses from which a gradient says nothing.
+
+Where hands do not touch the box, or feet leave the ground too late, descent ends in a stationary point far from every
+target. A search among few numbers sees further, and finishes nothing. So CMA-ES searches for a round of generations
+among splines of few knots about the guess, and a finisher goes on from what it found, through all stages of
+smoothing. Where that misses, the search has another round. Whenever it has found something better, the finisher starts
+again. The race ends with the first point that meets everything, from which it goes on to a stationary point where the
+problem asks for one.
+
+The finisher is ilqr where formulas look at one state each, least squares for a few numbers with squares, IPOPT for
+others, or gradient descent for nets. Each part is a whole solve of that solver, with its own budget; the trace of the
+race is theirs, one after the other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from dataclasses import asdict, astuple, replace
+from typing import Any
+
+import numpy as np
+
+from symphys.errors import SymphysError
+from symphys.records import dataclass
+from symphys.shooting import ShootingProblem
+from symphys.solvers.core.checkpoint import damaged, plain, revive, revived_rows
+from symphys.solvers.core.driver import INTERRUPTED, counts_of, ignore_log
+from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.interface import Log, Solver
+from symphys.solvers.core.options import SolverOptions, at_least, require
+from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageResult, Status, StopReason, TraceRow
+from symphys.solvers.core.point import Incumbent
+from symphys.solvers.methods.cma_es import CmaOptions, cma, load
+from symphys.solvers.methods.gradient import GRADIENT
+from symphys.solvers.methods.ilqr import ILQR
+from symphys.solvers.methods.ipopt import IPOPT
+from symphys.solvers.methods.least_squares import LEAST_SQUARES
+from symphys.types import Array
+
+MAX_SMALL = 300
+"""Length of z up to which least squares finish."""
+GROWTH, MOST = 2, 8
+"""Factor on the population of a search that begins anew, and that of all of them at most."""
+BETTER = 0.6
+"""Share of the merit of the last start of the finisher below which it starts again."""
+FIRST_ROUNDS = 4
+"""Rounds of the search before the finisher starts, whose slopes are compiled meanwhile."""
+PATIENCE = 10
+"""Iterations without progress after which the finisher gives up a start."""
+LONGER = 2
+"""Iterations with which the finisher goes on, exactly, in units of those of a stage."""
+NO_LIMIT = 10**12
+"""Evaluations of a search, which its rounds limit."""
+SEEDS = 100_000
+"""Between the seeds of searches that begin anew."""
+USED_UP = "the finisher's iterations are used up: raise `finisher_iterations`"
+NAME, SEARCH, FINISH, POLISH = "race", "search", "finish", "polish"
+
+
+@dataclass(frozen=True)
+class RaceOptions(SolverOptions):
+    """Options of the race.
+
+    Attributes:
+        finisher_iterations: in each stage of smoothing, each time it starts; exactly it goes on for ``LONGER``
+            times as many, where they have ended, or what it meets is to be a stationary point.
+        rounds: of the search, at most.
+        generations: of a round.
+        population: candidates of a generation.
+        knots: of the splines among which is searched, for each control.
+        sigma: first standard deviation of the search, in units of a quarter of the distance of bounds.
+    """
+
+    finisher_iterations: int = 30
+    rounds: int = 30
+    generations: int = 10
+    population: int = 64
+    knots: int = 8
+    sigma: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Raise ValueError, which names the option and what would be valid."""
+        super().__post_init__()
+        at_least(1, generations=self.generations, knots=self.knots)
+        at_least(0, rounds=self.rounds, finisher_iterations=self.finisher_iterations)
+        require(self.population > 2, "population", "at least 3")
+        require(0 < self.sigma < math.inf, "sigma", "above 0")
+
+
+@dataclass(frozen=True)
+class RacePart:
+    """A solve that is part of a race, and is over or paused.
+
+    Attributes:
+        kind: SEARCH; FINISH, through all stages of smoothing, until everything is met; POLISH from there, exactly.
+        status, advice: how it ended; INTERRUPTED: a search that goes on.
+        z: (n,) its best point.
+        objective, merit, max_violation, violation, met: of that point, exactly; see ``Point``.
+        confirmed: whether it meets everything, and with finer time steps still does, where somebody can say.
+        counts, seconds: of this part alone.
+    """
+
+    kind: str
+    status: Status
+    advice: str
+    z: Array
+    objective: float
+    merit: float
+    max_violation: float
+    violation: float
+    met: bool
+    confirmed: bool
+    counts: Counts
+    seconds: float
+
+    @property
+    def rank(self) -> tuple[bool, bool, float, float]:
+        """Return the sort key, lower is better, as ``Point.rank``."""
+        merit = self.merit if math.isfinite(self.merit) else math.inf
+        return not self.confirmed, not self.met, self.violation, merit
+
+
+@dataclass(frozen=True)
+class Shift:
+    """How the rows of a part become those of the race: what is added to their numbers.
+
+    Attributes:
+        rows, counts, seconds: added.
+        skip: how many rows the part had before, which the race has already.
+    """
+
+    rows: int
+    counts: Counts
+    seconds: float
+    skip: int = 0
+
+    def moved(self, row: TraceRow) -> TraceRow:
+        """Return the row of the race."""
+        counts = asdict(counts_of(row) + self.counts)
+        return replace(row, iteration=row.iteration + self.rows, seconds=row.seconds + self.seconds, **counts)
+
+
+Plan = Generator[tuple[str, Array], RacePart, None]
+"""Yields kind and start (n,) of a part, and takes what became of it."""
+
+
+class Paused(KeyboardInterrupt):
+    """Ends a part: a search whose round is over, or one within which a limit of the race is reached."""
+
+
+class Race:
+    """One race. What it does next follows from the parts that are over: so it goes on by replaying these."""
+
+    def __init__(
+        self,
+        problem: ShootingProblem,
+        options: RaceOptions,
+        seed: int,
+        monitor: Monitor | None,
+        log: Log,
+        keep: Keep | None,
+    ) -> None:
+        """Prepare a race; the arguments are those of ``interface.Solve``."""
+        self.finisher = finisher(problem)
+        if self.finisher is ILQR and problem.by_steps is not None:
+            problem = replace(problem, evaluator=problem.by_steps)
+        self.problem, self.options, self.seed = problem, options, seed
+        self.monitor, self.log, self.keep = monitor, log, keep
+        self.evaluator = CountingEvaluator(
+            problem, problem.smoothing[-1], Incumbent(stop_when_met=False), constraints=self.finisher in (ILQR, IPOPT)
+        )
+        self.cma = cma(keep=True)
+        self.parts: list[RacePart] = []
+        self.rows: list[TraceRow] = []
+        self.stages: dict[float, StageResult] = {}
+        self.searching: dict[str, Any] = {}
+        self.running: dict[str, Any] = {}
+        self.finished: Outcome | None = None
+        self.pausing = self.stopping = False
+        self.spent: StopReason | None = None
+
+    def run(self, start: Array, checkpoint: dict[str, Any] | None) -> Outcome:
+        """Race from ``start`` (n,)."""
+        if checkpoint:
+            self._resume(checkpoint)
+        self.start = self.evaluator.clip(np.array(start, float))
+        plan = self._plan(self.start)
+        kind, z = next(plan)
+        try:
+            for part in self.parts:
+                kind, z = plan.send(part)
+            self._begin_again(kind)
+            while self.spent is None:
+                outcome = self._solve(kind, z)
+                if outcome.status is Status.INTERRUPTED and not self.pausing:
+                    return self._interrupted(kind, outcome.checkpoint)
+                self._take(kind, outcome)
+                if self.stopping:
+                    return self._interrupted(kind, {})
+                kind, z = plan.send(self.parts[-1])
+        except StopIteration:
+            pass
+        except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
+            return self._outcome(StopReason(Status.FAILED, f"{NAME} failed: {str(error).strip() or error!r}"))
+        return self._outcome(self.spent)
+
+    def _begin_again(self, kind: str) -> None:
+        """Compare a resumed race with its limits; where one is reached, the part that ran is over."""
+        rows = revived_rows(self.running) if self.running else []
+        last = self._shift(kind).moved(rows[-1]) if rows else self.rows[-1] if self.rows else None
+        self.spent = self.options.spent(last) if last else None
+        if self.spent and rows:
+            z, counts = np.array(self.running["best"]["z"], float), Counts(*map(int, self.running["counts"]))
+            self._take(kind, Outcome(Status.INTERRUPTED, "", z, tuple(rows), counts))
+
+    def _plan(self, guess: Array) -> Plan:
+        """Say what is solved next, and from where."""
+        tried, guessed = math.inf, False
+        for number in range(self.options.rounds):
+            found = yield SEARCH, guess
+            if self._over(found):
+                return
+            if number + 1 < min(FIRST_ROUNDS, self.options.rounds):
+                continue
+            if found.merit < BETTER * tried:
+                tried, start = found.merit, found.z
+            elif not guessed:
+                start = guess
+            else:
+                continue
+            guessed = guessed or np.array_equal(start, guess)
+            found = yield FINISH, start
+            if self._over(found):
+                return
+            if found.met or found.status is Status.BUDGET:
+                polished = yield POLISH, found.z
+                if found.confirmed or self._over(polished):
+                    return
+        if not guessed:
+            found = yield FINISH, guess
+            if not self._over(found) and (found.met or found.status is Status.BUDGET):
+                yield POLISH, found.z
+
+    def _over(self, part: RacePart) -> bool:
+        """Whether a part ends the race."""
+        if part.status.fatal or (part is self.parts[0] and not math.isfinite(part.merit)):
+            return True
+        if math.isnan(part.max_violation):  # nothing is asked for but a low objective
+            return part.kind == POLISH or (part.kind == FINISH and part.status is not Status.BUDGET)
+        return part.confirmed and (self.problem.stop_when_met or part.kind == POLISH)
+
+    def _solve(self, kind: str, start: Array) -> Outcome:
+        """Solve a part, from its checkpoint where it has one."""
+        shift, self.pausing = self._shift(kind), False
+        last = len(self.rows) + self.options.generations
+
+        def see(row: TraceRow) -> None:
+            moved = shift.moved(row)
+            self.spent = self.options.spent(moved)
+            self.pausing = self.spent is not None or (kind == SEARCH and moved.iteration >= last)
+            try:
+                if self.monitor:
+                    self.monitor(moved)
+            except KeyboardInterrupt:
+                self.stopping = True
+                raise
+            if self.pausing:
+                raise Paused
+
+        def offer(make: Callable[[], dict[str, object]]) -> None:
+            if self.keep:
+                self.keep(lambda: self._saved(kind, make()))
+
+        searches = sum(part.kind == SEARCH and part.status is not Status.INTERRUPTED for part in self.parts)
+        chosen, problem, options = self._part(kind, searches)
+        running = self.running or (self.searching if kind == SEARCH else {})
+        seed = self.seed + SEEDS * searches
+        self.log(f"{kind}, part {len(self.parts) + 1} of the race")
+        return chosen.solve(problem, start, options, seed, see, running or None, self.log, offer)
+
+    def _part(self, kind: str, searches: int) -> tuple[Solver[Any], ShootingProblem, SolverOptions]:
+        """Return solver, problem and options of a part; ``searches``: how many are over."""
+        options, exact = self.options, replace(self.problem, smoothing=self.problem.smoothing[-1:])
+        if kind == SEARCH:
+            population = options.population * min(GROWTH**searches, MOST)
+            own = CmaOptions(
+                sigma=options.sigma, knots=options.knots, population=population, evaluations=NO_LIMIT, validation=0
+            )
+            return self.cma, exact, own
+        patience = {"patience": PATIENCE} if self.finisher is ILQR else {}
+        if kind == POLISH:
+            return (
+                self.finisher,
+                exact,
+                self.finisher.Options(iterations=LONGER * options.finisher_iterations, **patience),
+            )
+        meeting = replace(self.problem, stop_when_met=True)
+        return self.finisher, meeting, self.finisher.Options(iterations=options.finisher_iterations, **patience)
+
+    def _shift(self, kind: str) -> Shift:
+        """Return how the rows of a part become those of the race."""
+        before = Shift(len(self.rows), self._counts(), self._seconds())
+        saved = self.searching if kind == SEARCH else {}
+        if not saved:
+            return before
+        seen = Shift(len(saved["rows"]), Counts(*map(int, saved["counts"])), float(saved["seconds"]))
+        return Shift(before.rows - seen.rows, before.counts - seen.counts, before.seconds - seen.seconds, seen.rows)
+
+    def _counts(self) -> Counts:
+        return sum((part.counts for part in self.parts), Counts())
+
+    def _seconds(self) -> float:
+        return sum(part.seconds for part in self.parts)
+
+    def _best(self) -> RacePart | None:
+        return min(self.parts, key=lambda part: part.rank, default=None)
+
+    def _take(self, kind: str, outcome: Outcome) -> None:
+        """Add a part that is over, or paused."""
+        shift = self._shift(kind)
+        rows = [shift.moved(row) for row in outcome.trace[shift.skip :]]
+        seconds = rows[-1].seconds - self._seconds() if rows else 0.0
+        (point,) = self.evaluator.rate([outcome.z])
+        counts = outcome.counts + shift.counts - self._counts() + Counts(rollouts=1)
+        confirmed = point.met and (self.problem.confirms is None or self.problem.confirms(point.z))
+        numbers = point.objective, point.merit, point.max_violation, point.violation, point.met, confirmed
+        part = RacePart(kind, outcome.status, outcome.advice, outcome.z, *numbers, counts, seconds)
+        self._add_stages(part, outcome.stages if kind != SEARCH else ())
+        best = self._best()
+        if best is None or part.rank < best.rank:
+            self.finished = outcome
+        self.parts.append(part)
+        self.rows += rows
+        self.running = {}
+        if kind == SEARCH:
+            self.searching = outcome.checkpoint if self.pausing else {}
+        self.log(f"{kind}: {outcome.status.value}, merit {point.merit:g}, misses by {point.max_violation:g} tolerances")
+
+    def _add_stages(self, part: RacePart, stages: tuple[StageResult, ...]) -> None:
+        """Add the stages of a part to those of the race; what is left of its work is that of the exact stage."""
+        rest = part.counts - sum((stage.counts for stage in stages), Counts())
+        left = part.seconds - sum(stage.seconds for stage in stages)
+        numbers = part.objective, part.max_violation, rest, left
+        for stage in (*stages, StageResult(self.evaluator.smoothing, part.status, part.z, *numbers)):
+            known = self.stages.get(stage.smoothing)
+            if known is not None:
+                stage = replace(stage, counts=known.counts + stage.counts, seconds=known.seconds + stage.seconds)
+            self.stages[stage.smoothing] = stage
+
+    def _outcome(self, reason: StopReason | None) -> Outcome:
+        """Return the best of all parts; ``reason`` why the race ended, None: as its parts did."""
+        best = self._best()
+        if best is None:
+            assert reason is not None, "a race has a part"
+            return Outcome(reason.status, reason.advice, self.start, tuple(self.rows), self._counts())
+        last = next((part for part in reversed(self.parts) if part.kind != SEARCH), self.parts[-1])
+        ended = best if best.kind != SEARCH else last
+        ended = self.parts[-1] if self.parts[-1].status.fatal else ended
+        status, advice = ended.status, ended.advice if ended.status is not Status.BUDGET else USED_UP
+        if reason:
+            status, advice = reason.status, reason.advice
+        elif best.met and self.problem.stop_when_met:
+            status, advice = Status.MET, ""
+        stages = self._stages()
+        stages[-1] = replace(
+            stages[-1], status=status, z=best.z, objective=best.objective, max_violation=best.max_violation
+        )
+        known = self.finished
+        return Outcome(
+            status,
+            advice,
+            best.z,
+            tuple(self.rows),
+            self._counts(),
+            stages=tuple(stages),
+            gains=known.gains if known else {},
+            multipliers=known.multipliers if known else {},
+        )
+
+    def _stages(self) -> list[StageResult]:
+        return [self.stages[each] for each in self.problem.smoothing if each in self.stages]
+
+    def _interrupted(self, kind: str, running: dict[str, Any]) -> Outcome:
+        """Return the outcome of a race that is interrupted; ``running``: the checkpoint of a part, {} between two."""
+        if not (running or self.parts):
+            return Outcome(Status.INTERRUPTED, INTERRUPTED, self.start, (), Counts())
+        saved = self._saved(kind, running)
+        z, counts = np.array(saved["best"]["z"], float), Counts(*saved["counts"])
+        rows, stages = tuple(revived_rows(saved)), tuple(self._stages())
+        return Outcome(Status.INTERRUPTED, INTERRUPTED, z, rows, counts, saved, stages)
+
+    def _saved(self, kind: str, running: dict[str, Any]) -> dict[str, Any]:
+        """Return the checkpoint of a race with that of the part that runs."""
+        shift, best = self._shift(kind), self._best()
+        more = [shift.moved(row) for row in revived_rows(running)[shift.skip :]] if running else []
+        return {
+            "solver": NAME,
+            "best": {"z": plain(best.z) if best else running["best"]["z"]},
+            "counts": list(astuple(counts_of(more[-1]) if more else self._counts())),
+            "seconds": more[-1].seconds if more else self._seconds(),
+            "rows": [list(astuple(row)) for row in (*self.rows, *more)],
+            "over": len(self.rows),
+            "parts": plain(self.parts),
+            "stages": plain(list(self.stages.values())),
+            "searching": self.searching,
+            "running": running,
+        }
+
+    def _resume(self, saved: dict[str, Any]) -> None:
+        """Go on from a checkpoint; SymphysError if it is damaged or of another solve."""
+        if saved.get("solver") != NAME:
+            raise SymphysError(f"this checkpoint is of the solver {saved.get('solver')!r}, not of {NAME!r}")
+        try:
+            self.parts = [revive(RacePart, each, Counts) for each in saved["parts"]]
+            self.stages = {float(each["smoothing"]): revive(StageResult, each, Counts) for each in saved["stages"]}
+            self.rows = revived_rows(saved)[: int(saved["over"])]
+            self.searching, self.running = dict(saved["searching"]), dict(saved["running"])
+            size = len(saved["best"]["z"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise damaged(error) from error
+        if size != self.problem.n:
+            raise SymphysError(f"this checkpoint has {size} variables, the problem {self.problem.n}")
+
+
+def finisher(problem: ShootingProblem) -> Solver[Any]:
+    """Return the solver that finishes."""
+    if by_steps(problem):
+        return ILQR
+    if problem.squares and problem.n <= MAX_SMALL:
+        return LEAST_SQUARES
+    return GRADIENT if problem.nlp.expression is None else IPOPT
+
+
+def by_steps(problem: ShootingProblem) -> bool:
+    """Whether all is evaluated step by step."""
+    if problem.staged is None:
+        return False
+    try:
+        problem.staged()
+    except SymphysError:
+        return False  # formulas look at more than one state
+    return True
+
+
+def solve(
+    problem: ShootingProblem,
+    start: Array,
+    options: RaceOptions,
+    seed: int = 0,
+    monitor: Monitor | None = None,
+    checkpoint: dict[str, object] | None = None,
+    log: Log | None = None,
+    keep: Keep | None = None,
+) -> Outcome:
+    """Solve as ``interface.Solve`` has it."""
+    race = Race(problem, options, seed, monitor, log or ignore_log, keep)
+    if race.finisher is ILQR and problem.staged is not None and any(block.shape[1] > 1 for block in problem.blocks):
+        problem.staged().prepare()  # few numbers may be found before any slope is needed
+    return race.run(start, checkpoint)
+
+
+RACE: Solver[RaceOptions] = Solver(
+    NAME,
+    "a search among few numbers, and from what it finds a method that finishes, in turns",
+    RaceOptions,
+    solve,
+    prepare=load,
+    by_steps=by_steps,
+)

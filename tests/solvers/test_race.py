@@ -1,0 +1,177 @@
+"""The race: a search sees where a gradient says nothing, a finisher converges, and both are parts of one solve."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from worlds.staged_toys import boxed, pendulum
+from worlds.toys import constrained, counted, failing, quadratic, rosenbrock, solve, stop_at, target, through_json, toy
+
+from symphys.errors import SymphysError
+from symphys.shooting import ShootingProblem
+from symphys.solvers import Counts, Outcome, Status, TraceRow
+from symphys.solvers.core.convergence import PLATEAU_ADVICE
+from symphys.solvers.core.subspace import search_space
+
+SMALL = {"generations": 3, "population": 8, "rounds": 4}
+
+
+def mesa(**more: Any) -> ShootingProblem:
+    """Level at 2 around the guess 0; further out a bowl with its bottom at (1, 0)."""
+
+    def miss(z: Any, s: Any) -> Any:
+        return ca.if_else(ca.sumsqr(z) < 0.25, ca.vertcat(2, 0), z - ca.vertcat(1, 0))
+
+    return toy(2, miss, errors=lambda z, s: ca.norm_2(miss(z, s)) / 1e-6, **more)
+
+
+def level() -> ShootingProblem:
+    """The same everywhere."""
+    return toy(2, lambda z, s: 2 + 0 * z, errors=lambda z, s: 5 + 0 * z[0])
+
+
+def same(a: Outcome, b: Outcome) -> None:
+    """All but the seconds."""
+    assert (a.status, a.advice, a.counts) == (b.status, b.advice, b.counts)
+    assert np.array_equal(a.z, b.z)
+    rows = [[astuple(replace(row, seconds=0.0))[:-1] for row in outcome.trace] for outcome in (a, b)]
+    np.testing.assert_array_equal(*rows)
+    assert [repr(replace(each, seconds=0.0)) for each in a.stages] == [
+        repr(replace(each, seconds=0.0)) for each in b.stages
+    ]
+
+
+def test_where_the_gradient_says_nothing_the_search_leads_and_the_finisher_ends() -> None:
+    """To six digits, which a search of so few generations does not reach, and descent does not begin."""
+    assert solve("least_squares", mesa()).advice == PLATEAU_ADVICE
+    found = solve("race", mesa(), options=SMALL)
+    assert found.status is Status.MET
+    assert found.counts.jacobians > 0 and found.counts.rollouts > 8
+    assert found.z == pytest.approx([1, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize("problem", [quadratic(), rosenbrock(), constrained()], ids=["quadratic", "valley", "limit"])
+def test_without_anything_to_meet_it_ends_as_its_finisher_does(problem: ShootingProblem) -> None:
+    found, alone = (solve(name, problem) for name in ("race", "least_squares"))
+    assert found.status is alone.status is Status.CONVERGED
+    assert found.z == pytest.approx(alone.z, abs=1e-4)
+
+
+def test_controls_over_time_are_finished_by_ilqr() -> None:
+    problem = boxed(pendulum(), 8.0)
+    found, alone = (solve(name, problem) for name in ("race", "ilqr"))
+    assert found.status is Status.CONVERGED
+    assert found.gains
+    assert found.stages[-1].objective <= alone.stages[-1].objective * (1 + 1e-6)
+
+
+def test_met_at_the_start() -> None:
+    found = solve("race", replace(target(), blocks=(replace(target().blocks[0], guess=np.array([2.0, -1.0])),)))
+    assert (found.status, len(found.trace)) == (Status.MET, 1)
+
+
+def test_what_does_not_hold_with_finer_steps_does_not_end_it() -> None:
+    """Two points meet everything, one of them only as it stands."""
+
+    def miss(z: Any, s: Any) -> Any:
+        return (z - 1) * (z + 1)
+
+    problem = toy(1, miss, errors=lambda z, s: ca.fabs(miss(z, s)) / 1e-3, guess=0.9, bounds=(-3.0, 3.0))
+    asked = []
+
+    def confirms(z: Any) -> bool:
+        asked.append(float(z[0]))
+        return bool(z[0] < 0)
+
+    found = solve("race", replace(problem, confirms=confirms), options={**SMALL, "rounds": 20})
+    assert (found.status, found.z[0]) == (Status.MET, pytest.approx(-1, abs=1e-3))
+    assert any(each > 0 for each in asked)
+    never = solve("race", replace(problem, confirms=lambda z: False), options=SMALL)
+    assert never.status is Status.MET
+
+
+def test_it_is_that_of_its_seed() -> None:
+    first, again, other = (solve("race", mesa(), seed, SMALL) for seed in (1, 1, 2))
+    same(first, again)
+    assert not np.array_equal(first.z, other.z)
+
+
+def test_work_and_time_are_those_of_its_parts() -> None:
+    rows: list[TraceRow] = []
+    problem, count = counted(mesa(smoothing=(0.1, 0.0)))
+    found = solve("race", problem, options=SMALL, monitor=rows.append)
+    assert rows == list(found.trace)
+    assert [row.iteration for row in rows] == list(range(len(rows)))
+    for name in ("seconds", "rollouts", "jacobians"):
+        column = [getattr(row, name) for row in rows]
+        assert column == sorted(column)
+    assert found.counts.rollouts == count.count["value"] + count.count["residuals"]
+    assert found.counts.jacobians == count.count["jacobian"]
+    assert Counts(*map(sum, zip(*(astuple(each.counts) for each in found.stages), strict=True))) == found.counts
+    assert [each.smoothing for each in found.stages] == [0.1, 0.0]
+    assert np.array_equal(found.stages[-1].z, found.z)
+
+
+@pytest.mark.parametrize("problem", [mesa(smoothing=(0.1, 0.0)), level()], ids=["mesa", "level"])
+def test_it_goes_on_to_the_last_bit(problem: ShootingProblem) -> None:
+    whole = solve("race", problem, options=SMALL)
+    for stop in {0, 2, 3, 4, 7, 8, len(whole.trace) - 1}:
+        part = solve("race", problem, options=SMALL, monitor=stop_at(stop))
+        assert part.status is Status.INTERRUPTED
+        assert len(part.trace) == stop + 1
+        same(solve("race", problem, options=SMALL, checkpoint=through_json(part.checkpoint)), whole)
+
+
+def test_what_it_keeps_on_its_way_is_a_checkpoint() -> None:
+    kept: list[dict[str, Any]] = []
+    whole = solve("race", mesa(), options=SMALL, keep=lambda make: kept.append(make()))
+    assert len(kept) == len(whole.trace)
+    for each in (kept[0], kept[len(kept) // 2], kept[-1]):
+        same(solve("race", mesa(), options=SMALL, checkpoint=through_json(each)), whole)
+
+
+def test_a_checkpoint_that_does_not_fit() -> None:
+    saved = solve("race", mesa(), options=SMALL, monitor=stop_at(5)).checkpoint
+    with pytest.raises(SymphysError, match="of the solver 'race'"):
+        solve("cma", mesa(), checkpoint=through_json(saved))
+    with pytest.raises(SymphysError, match="not of 'race'"):
+        solve("race", mesa(), checkpoint={**saved, "solver": "cma"})
+    with pytest.raises(SymphysError, match="2 variables, the problem 3"):
+        solve("race", quadratic(), checkpoint=saved)
+    with pytest.raises(SymphysError, match="damaged"):
+        solve("race", mesa(), checkpoint={**saved, "parts": [{"kind": "search"}]})
+
+
+def test_nothing_is_found_where_there_is_nothing() -> None:
+    found = solve("race", level(), options=SMALL)
+    assert (found.status, found.advice) == (Status.CONVERGED, PLATEAU_ADVICE)
+
+
+def test_a_start_that_is_not_finite() -> None:
+    found = solve("race", toy(2, lambda z, s: ca.sqrt(z - 1), guess=0.0))
+    assert found.status is Status.NOT_FINITE
+    assert "start" in found.advice
+
+
+@pytest.mark.parametrize("at", [3, 30, 60])
+def test_what_a_library_raises_is_a_failure(at: int) -> None:
+    broken = failing(level(), ("value", "residuals", "jacobian"), at, RuntimeError("out of order"))
+    found = solve("race", broken, options=SMALL)
+    assert found.status is Status.FAILED
+    assert "out of order" in found.advice
+
+
+def test_a_search_among_splines_moves_smoothly() -> None:
+    """Few numbers for each control; bounds give their unit."""
+    problem = boxed(pendulum(), 8.0)
+    problem = replace(problem, blocks=(replace(problem.blocks[0], shape=(1, problem.n)),))
+    few, whole = (search_space(problem, problem.start(0), knots) for knots in (4, 0))
+    assert few.columns is not None and few.columns.shape == (problem.n, 4)
+    assert whole.columns is None and np.array_equal(whole.z(problem.start(0)), problem.start(0))
+    assert few.z(np.ones(4)) == pytest.approx(np.full(problem.n, 4.0))
+    steps = np.diff(few.z(np.array([0.0, 1.0, 0.0, 0.0])))
+    assert abs(steps).max() < 0.4
