@@ -45,7 +45,7 @@ GROWTH, MOST = 2, 8
 BETTER = 0.6
 """Share of the merit of the last start of the finisher below which it starts again."""
 FIRST_ROUNDS = 4
-"""Rounds of the search before the finisher starts, whose slopes are compiled meanwhile."""
+"""Rounds of the search for controls over time before the finisher starts, whose slopes are compiled meanwhile."""
 PATIENCE = 10
 """Iterations without progress after which the finisher gives up a start."""
 LONGER = 2
@@ -190,7 +190,8 @@ class Race:
         try:
             for part in self.parts:
                 kind, z = plan.send(part)
-            self._begin_again(kind)
+            if self._begun_part_is_over(kind):
+                kind, z = plan.send(self.parts[-1])
             while self.spent is None:
                 outcome = self._solve(kind, z)
                 if outcome.status is Status.INTERRUPTED and not self.pausing:
@@ -205,23 +206,32 @@ class Race:
             return self._outcome(StopReason(Status.FAILED, f"{NAME} failed: {str(error).strip() or error!r}"))
         return self._outcome(self.spent)
 
-    def _begin_again(self, kind: str) -> None:
-        """Compare a resumed race with its limits; where one is reached, the part that ran is over."""
+    def _begun_part_is_over(self, kind: str) -> bool:
+        """Whether the part that ran as a resumed race was interrupted had reached a limit, or its end as a round."""
         rows = revived_rows(self.running) if self.running else []
         last = self._shift(kind).moved(rows[-1]) if rows else self.rows[-1] if self.rows else None
         self.spent = self.options.spent(last) if last else None
-        if self.spent and rows:
-            z, counts = np.array(self.running["best"]["z"], float), Counts(*map(int, self.running["counts"]))
-            self._take(kind, Outcome(Status.INTERRUPTED, "", z, tuple(rows), counts))
+        self.pausing = kind == SEARCH and last is not None and last.iteration >= self._round_ends
+        if not rows or not (self.spent or self.pausing):
+            return False
+        z, counts = np.array(self.running["best"]["z"], float), Counts(*map(int, self.running["counts"]))
+        self._take(kind, Outcome(Status.INTERRUPTED, "", z, tuple(rows), counts, self.running))
+        return True
+
+    @property
+    def _round_ends(self) -> int:
+        """The number of the row with which a round of the search ends."""
+        return len(self.rows) + self.options.generations
 
     def _plan(self, guess: Array) -> Plan:
         """Say what is solved next, and from where."""
         tried, guessed = math.inf, False
+        alone = min(FIRST_ROUNDS if over_time(self.problem) else 1, self.options.rounds)
         for number in range(self.options.rounds):
             found = yield SEARCH, guess
             if self._over(found):
                 return
-            if number + 1 < min(FIRST_ROUNDS, self.options.rounds):
+            if number + 1 < alone:
                 continue
             if found.merit < BETTER * tried:
                 tried, start = found.merit, found.z
@@ -253,7 +263,7 @@ class Race:
     def _solve(self, kind: str, start: Array) -> Outcome:
         """Solve a part, from its checkpoint where it has one."""
         shift, self.pausing = self._shift(kind), False
-        last = len(self.rows) + self.options.generations
+        last = self._round_ends
 
         def see(row: TraceRow) -> None:
             moved = shift.moved(row)
@@ -432,6 +442,11 @@ def finisher(problem: ShootingProblem) -> Solver[Any]:
     return GRADIENT if problem.nlp.expression is None else IPOPT
 
 
+def over_time(problem: ShootingProblem) -> bool:
+    """Whether a variable has several knots."""
+    return any(block.shape[1] > 1 for block in problem.blocks)
+
+
 def by_steps(problem: ShootingProblem) -> bool:
     """Whether all is evaluated step by step."""
     if problem.staged is None:
@@ -455,7 +470,7 @@ def solve(
 ) -> Outcome:
     """Solve as ``interface.Solve`` has it."""
     race = Race(problem, options, seed, monitor, log or ignore_log, keep)
-    if race.finisher is ILQR and problem.staged is not None and any(block.shape[1] > 1 for block in problem.blocks):
+    if race.finisher is ILQR and problem.staged is not None and over_time(problem):
         problem.staged().prepare()  # few numbers may be found before any slope is needed
     return race.run(start, checkpoint)
 

@@ -119,7 +119,7 @@ def test_work_and_time_are_those_of_its_parts() -> None:
 @pytest.mark.parametrize("problem", [mesa(smoothing=(0.1, 0.0)), level()], ids=["mesa", "level"])
 def test_it_goes_on_to_the_last_bit(problem: ShootingProblem) -> None:
     whole = solve("race", problem, options=SMALL)
-    for stop in {0, 2, 3, 4, 7, 8, len(whole.trace) - 1}:
+    for stop in {0, 2, 3, 4, len(whole.trace) // 2, len(whole.trace) - 1}:
         part = solve("race", problem, options=SMALL, monitor=stop_at(stop))
         assert part.status is Status.INTERRUPTED
         assert len(part.trace) == stop + 1
@@ -130,7 +130,7 @@ def test_what_it_keeps_on_its_way_is_a_checkpoint() -> None:
     kept: list[dict[str, Any]] = []
     whole = solve("race", mesa(), options=SMALL, keep=lambda make: kept.append(make()))
     assert len(kept) == len(whole.trace)
-    for each in (kept[0], kept[len(kept) // 2], kept[-1]):
+    for each in kept:
         same(solve("race", mesa(), options=SMALL, checkpoint=through_json(each)), whole)
 
 

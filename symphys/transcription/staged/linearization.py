@@ -20,6 +20,8 @@ from symphys.types import Array, Ints
 StepSlopes = tuple[Array, Array, Array]
 """Derivatives (nx, k), (m, k), (np, k) by the state before a step, its inputs and parameters."""
 StepPull = Callable[[Array], StepSlopes]
+MAX_LIFTED = 2**20
+"""Numbers of bases of tangents that are computed at once."""
 OFF_TANGENT_TOLERANCE = 1e-13
 """Relative size of slopes of the first state that counts as rounding: smaller ones lie on the tangent."""
 
@@ -102,9 +104,8 @@ class Linearization:
         returns those by the state before (nx, k), by its inputs (m, k) and by p (np, k).
         """
         (nx, n, m, np_), varied = self.step.arguments.sizes, self.step.arguments.varied
-        steps = zip(reversed(range(len(u))), self.step.pulls(x[:-1], x[1:], u, p, smoothing), strict=True)
-        for k, pull in steps:
-            lift = self._sparse(self.tangent.basis, x[k + 1], p)
+        adjoints = zip(self.step.pulls(x[:-1], x[1:], u, p, smoothing), self._lifts(x[:0:-1], p), strict=True)
+        for k, (pull, lift) in zip(reversed(range(len(u))), adjoints, strict=True):
             shifts = [self._sparse(self.tangent.shift, x[i], p)[:, varied] for i in (k, k + 1) if self.tangent.shifts]
 
             def back(seeds: Array, pull: Pull = pull, lift: Array = lift, shifts: list[Array] = shifts) -> StepSlopes:
@@ -132,6 +133,17 @@ class Linearization:
             np.where(np.abs(left) > OFF_TANGENT_TOLERANCE * np.abs(first).max(initial=0.0), left, 0.0),
             parameters,
         )
+
+    def _lifts(self, X: Array, p: Array) -> Iterator[Array]:
+        """Yield the bases (nx, n) of the tangents at states X (N, nx)."""
+        nx, n = self.step.arguments.sizes[:2]
+        some = min(len(X), max(1, MAX_LIFTED // max(nx * n, 1)))
+        mapped = self.tangent.basis.map(some)
+        for first in range(0, len(X), some):
+            part = X[first : first + some]
+            states = np.concatenate([part, np.repeat(part[:1], some - len(part), axis=0)])
+            found = np.array(ca.DM(mapped(states.T, np.tile(p[:, None], some))))
+            yield from np.split(found, some, axis=1)[: len(part)]
 
     def full_parameters(self, p: Array) -> Array:
         """Return p (np,) of the steps from that of a rollout whose time step is no parameter."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import field
 from functools import cached_property, partial
 from time import perf_counter
@@ -87,14 +88,32 @@ class LinearizedStep:
         count, steps = U.shape[:2]
         X = np.empty((count, steps + 1, first.shape[1]))
         X[:, 0] = first
-        if not (isinstance(self._step, _ByKernel) and self._step.lends(count)):
+        kernel = self._step
+        if not (isinstance(kernel, _ByKernel) and kernel.lends(1)):
             for k in range(steps):
                 X[:, k + 1] = self.step(k, X[:, k], U[:, k], P, smoothing)
             return X
+        rows = range(0, count, MAX_LENT_ROWS)
+        parts = [slice(a, min(a + MAX_LENT_ROWS, count)) for a in rows]  # each goes its whole way without the others
+
+        def part(rows: slice) -> None:
+            self._roll(kernel, X[rows], U[rows], P if P.ndim == 1 else P[rows], smoothing)
+
+        if len(parts) == 1 or self._count == 1:
+            for each in parts:
+                part(each)
+        else:
+            with ThreadPoolExecutor(self._count, thread_name_prefix="symphys-roll") as pool:
+                list(pool.map(part, parts))
+        return X
+
+    def _roll(self, kernel: _ByKernel, X: Array, U: Array, P: Array, smoothing: float) -> None:
+        """Take all steps of a few rollouts; X (B, N + 1, nx) begins with their first states."""
+        count, steps = U.shape[:2]
 
         def put(batch: FixedBatch) -> None:
             """Take all steps but the last, and prepare that."""
-            self._few(batch, 0, first, U[:, 0], P, smoothing)
+            self._few(batch, 0, X[:, 0], U[:, 0], P, smoothing)
             (nx, n, m, _), ticks = self.arguments.sizes, self._ticks(np.arange(steps))
             state, given, tick = batch.parameters[:, :nx], batch.z[:, n : n + m], batch.parameters[:, 2 * nx]
             for k in range(1, steps):
@@ -102,8 +121,7 @@ class LinearizedStep:
                 X[:, k] = batch.outputs
                 state[:], given[:], tick[:] = batch.outputs, U[:, k], ticks[k]
 
-        X[:, steps] = self._step.lend(count, put)
-        return X
+        X[:, steps] = kernel.lend(count, put)
 
     def difference(self, X: ArrayLike, Y: ArrayLike) -> Array:
         """Return ``Tangent.difference`` of (B, nx), (B, nx) as (B, n), with the parameters of the guess."""
