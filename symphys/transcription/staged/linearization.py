@@ -137,7 +137,7 @@ class Linearization:
     def _lifts(self, X: Array, p: Array) -> Iterator[Array]:
         """Yield the bases (nx, n) of the tangents at states X (N, nx)."""
         nx, n = self.step.arguments.sizes[:2]
-        some = min(len(X), max(1, MAX_LIFTED // max(nx * n, 1)))
+        some = max(1, min(len(X), MAX_LIFTED // max(nx * n, 1)))
         mapped = self.tangent.basis.map(some)
         for first in range(0, len(X), some):
             part = X[first : first + some]
