@@ -143,7 +143,7 @@ class Solve(Protocol[O_contra]):
         ...
 
 
-def none(problem: ShootingProblem) -> bool:
+def never(problem: ShootingProblem) -> bool:
     """Return False: most solvers evaluate rollouts."""
     return False
 
@@ -176,4 +176,4 @@ class Solver(Generic[O_inv]):
     prepare: Callable[[], object] = nothing
     threaded: bool = False
     scenarios: bool | None = False
-    by_steps: Callable[[ShootingProblem], bool] = none
+    by_steps: Callable[[ShootingProblem], bool] = never

@@ -123,7 +123,7 @@ class RacePart:
 
 @dataclass(frozen=True)
 class Shift:
-    """How the rows of a part become those of the race: what is added to their numbers.
+    """The offsets that turn rows of a part's trace into rows of the race's.
 
     Attributes:
         rows, counts, seconds: added.
@@ -143,6 +143,14 @@ class Shift:
 
 Plan = Generator[tuple[str, Array], RacePart, None]
 """Yields kind and start (n,) of a part, and takes what became of it."""
+
+
+def following(plan: Plan, part: RacePart) -> tuple[str, Array] | None:
+    """Return what a plan asks for after a part; None: it is at its end."""
+    try:
+        return plan.send(part)
+    except StopIteration:
+        return None
 
 
 class Paused(KeyboardInterrupt):
@@ -186,22 +194,21 @@ class Race:
             self._resume(checkpoint)
         self.start = self.evaluator.clip(np.array(start, float))
         plan = self._plan(self.start)
-        kind, z = next(plan)
+        asked = next(plan, None)
+        for part in self.parts:
+            asked = following(plan, part)
         try:
-            for part in self.parts:
-                kind, z = plan.send(part)
-            if self._begun_part_is_over(kind):
-                kind, z = plan.send(self.parts[-1])
-            while self.spent is None:
+            if asked and self._begun_part_is_over(asked[0]):
+                asked = following(plan, self.parts[-1])
+            while asked and self.spent is None:
+                kind, z = asked
                 outcome = self._solve(kind, z)
                 if outcome.status is Status.INTERRUPTED and not self.pausing:
                     return self._interrupted(kind, outcome.checkpoint)
                 self._take(kind, outcome)
                 if self.stopping:
                     return self._interrupted(kind, {})
-                kind, z = plan.send(self.parts[-1])
-        except StopIteration:
-            pass
+                asked = following(plan, self.parts[-1])
         except (RuntimeError, ArithmeticError, np.linalg.LinAlgError, MemoryError) as error:
             return self._outcome(StopReason(Status.FAILED, f"{NAME} failed: {str(error).strip() or error!r}"))
         return self._outcome(self.spent)
@@ -477,7 +484,7 @@ def solve(
 
 RACE: Solver[RaceOptions] = Solver(
     NAME,
-    "a search among few numbers, and from what it finds a method that finishes, in turns",
+    "CMA-ES over splines, alternating with a descent from the best point that it has found",
     RaceOptions,
     solve,
     prepare=load,

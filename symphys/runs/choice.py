@@ -63,8 +63,11 @@ def is_small(problem: Problem) -> bool:
 
 
 def controls(problem: Problem) -> bool:
-    """Whether a variable acts over time."""
-    return any(variable.kind == "control" and variable.knots > 1 for variable in problem.variables)
+    """Whether a variable acts over time, beside no more other numbers than a search is for."""
+    over_time = [variable.kind == "control" and variable.knots > 1 for variable in problem.variables]
+    sizes = [variable.guess.size for variable in problem.variables]
+    others = sum(size for size, control in zip(sizes, over_time, strict=True) if not control)
+    return any(over_time) and others <= MAX_SMALL
 
 
 SITUATIONS = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import casadi as ca
@@ -28,3 +29,23 @@ def combined(means: Expr) -> Expr:
     """Return the combination of ``Terms.means``."""
     weights = np.random.default_rng(0).uniform(0.5, 1.5, means.shape[0])
     return ca.dot(ca.DM(weights), ca.densify(means))
+
+
+class CachedProbe:
+    """A ``Probe`` from two functions; the gradient at the last z is cached."""
+
+    def __init__(self, values: Callable[[Array], Array], gradient: Callable[[Array], Array]) -> None:
+        """Take both functions."""
+        self._values, self._gradient = values, gradient
+        self._slopes: dict[bytes, Array] = {}
+
+    def values(self, Z: Array) -> Array:
+        """Implement ``Probe.values``."""
+        return self._values(Z)
+
+    def gradient(self, z: Array) -> Array:
+        """Implement ``Probe.gradient``."""
+        key = np.asarray(z, np.float64).tobytes()
+        if key not in self._slopes:
+            self._slopes = {key: self._gradient(z)}
+        return self._slopes[key].copy()

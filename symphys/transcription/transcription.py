@@ -18,7 +18,7 @@ from symphys.records import dataclass
 from symphys.shooting import ShootingProblem
 from symphys.trajectory import Trajectory
 from symphys.transcription.functions import ExpressionFunctions
-from symphys.transcription.gradient_probe import Probe
+from symphys.transcription.gradient_probe import CachedProbe, Probe
 from symphys.transcription.judge import Assessment, assessment
 from symphys.transcription.motion_values import motion_values, probe_slopes
 from symphys.transcription.objective import Terms
@@ -171,7 +171,18 @@ class Transcription:
     @cached_property
     def probe(self) -> Probe:
         """Return the number that is differentiated to examine the gradient."""
-        return MotionProbe(self)
+        return CachedProbe(self._probe_values, self._probe_gradient)
+
+    def _probe_values(self, Z: Array) -> Array:
+        X = self.steps().states(np.asarray(Z, float), 0.0)
+        return np.array(row_by_row(self._motion_values, Z, X)[-1][:, 0])
+
+    def _probe_gradient(self, z: Array) -> Array:
+        arrays = self.arrays(z)
+        direct, by_states = (np.array(part) for part in self._probe_slopes(z, arrays.x.T))
+        states = {k: by_states[:, k, None] for k in range(len(arrays.x))}
+        pulled = self._pull(arrays, states, np.zeros((len(arrays.p), 1)))
+        return np.asarray(direct.ravel() + pulled[:, 0])
 
     def back(self, record: Record, ends: Array) -> Iterator[Array]:
         """Derivatives of ends . x_N, with ``ends`` (nx, m), with respect to x_N-1, x_N-2 ... x_0: (nx, m) each."""
@@ -234,31 +245,6 @@ class Transcription:
         from symphys.transcription.simulation import recorder
 
         return recorder(self.rollout)
-
-
-class MotionProbe:
-    """A ``Probe`` along motions that are simulated and differentiated step by step."""
-
-    def __init__(self, transcription: Transcription) -> None:
-        """Take the motions of a transcription."""
-        self._of = transcription
-        self._slopes: dict[bytes, Array] = {}
-
-    def values(self, Z: Array) -> Array:
-        """Implement ``Probe.values``."""
-        X = self._of.steps().states(np.asarray(Z, float), 0.0)
-        return np.array(row_by_row(self._of._motion_values, Z, X)[-1][:, 0])
-
-    def gradient(self, z: Array) -> Array:
-        """Implement ``Probe.gradient``; the gradient at the last z is cached."""
-        key = np.asarray(z, np.float64).tobytes()
-        if key not in self._slopes:
-            arrays = self._of.arrays(z)
-            direct, by_states = (np.array(part) for part in self._of._probe_slopes(z, arrays.x.T))
-            states = {k: by_states[:, k, None] for k in range(len(arrays.x))}
-            pulled = self._of._pull(arrays, states, np.zeros((len(arrays.p), 1)))
-            self._slopes = {key: direct.ravel() + pulled[:, 0]}
-        return self._slopes[key].copy()
 
 
 def gradient_prices(

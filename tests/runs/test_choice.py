@@ -38,6 +38,21 @@ tolerance = 0.1
 CONTROL = 'sets = "ball.force"\nknots = 5'
 ALONG = '\n[[cost]]\nname = "effort"\nat = "always"\nsquares = "ball.force"\n'
 WHOLE = '\n[[cost]]\nname = "way"\nvalue = "integral(ball.velocity[0])"\n'
+MANY = """
+[[sensor]]
+name = "place"
+reads = "ball.position"
+
+[[controller]]
+name = "brain"
+drives = ["ball.torque"]
+senses = ["place"]
+net = { hidden = [64] }
+
+[[variable]]
+name = "weights"
+sets = "brain.weights"
+"""
 SHARE = '\n[[cost]]\nname = "low"\nvalue = "ball.position[2]"\n'
 SCENARIO = '\n[[scenario]]\nname = "heavy"\nsets = "ball.mass"\nfactor = 0.2\n'
 
@@ -58,6 +73,7 @@ def made(tmp_path: Path, sets: str, *more: str) -> Problem:
         (CONTROL.replace("5", "1"), "", ["race"]),
         (CONTROL, ALONG, ["race"]),
         (CONTROL, WHOLE, ["race"]),
+        (CONTROL, MANY, ["gradient"]),
     ],
 )
 def test_what_is_asked_for_chooses(tmp_path: Path, sets: str, more: str, solvers: list[str]) -> None:
