@@ -80,7 +80,10 @@ def transcribe(
         (False, 6)
     """
     if problem.scenarios is not None:
-        plain = transcribe(replace(problem, scenarios=None), exact, "casadi", threads)
+        rest = replace(problem, scenarios=None)
+        plain = transcribe(rest, exact, "casadi", threads)
+        if not has_large_nets(problem):  # it is judged by kernels all the same
+            plain = replace(plain, steps=cache(lambda: _steps(rest, backend, threads, exact)))
         return with_scenarios(plain, problem, exact, backend, threads)
     if has_large_nets(problem):
         from symphys.transcription.network_rollout import transcribe_large
@@ -111,7 +114,7 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
     built = perf_counter() - began
     require_backend(backend)
     chosen = cache(lambda: _evaluating(rollout, functions, exact, backend, threads))
-    steps = cache(lambda: _steps(problem, backend, threads, exact or not any(problem.simulation.smoothing)))
+    steps = cache(lambda: _steps(problem, backend, threads, exact))
     staged = cache(lambda: _stages(steps(), backend, threads))
     shooting = ShootingProblem(
         name=problem.name,
@@ -137,6 +140,7 @@ def _steps(problem: Problem, backend: str, threads: int | None, exact: bool) -> 
     """Return motions and their derivatives step by step; compiled on demand, for any time step."""
     from symphys.transcription.staged.linearization import Linearization
 
+    exact = exact or not any(problem.simulation.smoothing)
     return Linearization(symbolic_rollout(problem, timed=True), backend, threads, exact)
 
 

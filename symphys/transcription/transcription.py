@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -93,19 +93,17 @@ class Transcription:
         """
         from symphys.transcription.simulation import recorded, simulate
 
-        found = None if self._doubted else recorded(self.rollout, self.arrays(z, smoothing))
+        found = None if self._known.doubted else recorded(self.rollout, self.arrays(z, smoothing))
         if found is None:
-            self._doubted.append(True)
-            self._last.clear()
+            self._known.doubted, self._known.last = True, None
             found = simulate(self.rollout, self._recorder, np.array(z, float), smoothing)
         return found
 
     def arrays(self, z: Array, smoothing: float = 0.0) -> RolloutArrays:
         """Return states and arguments of the motion of z, which may be not finite; the last ones are cached."""
-        key, last = (np.asarray(z, np.float64).tobytes(), smoothing), self._last.get("found")
+        key, last = (np.asarray(z, np.float64).tobytes(), smoothing), self._known.last
         if last is None or last[0] != key:
-            last = key, self._simulated(np.array(z, float), smoothing)
-            self._last["found"] = last
+            last = self._known.last = key, self._simulated(np.array(z, float), smoothing)
         return last[1]
 
     def _simulated(self, z: Array, smoothing: float) -> RolloutArrays:
@@ -113,7 +111,7 @@ class Transcription:
         _, given, p = (np.array(part) for part in self._start(z))
         dt = float(np.ravel(rollout.parameters.step_length(self.problem.simulation, p.ravel()))[0])
         time = np.arange(rollout.steps + 1, dtype=np.float64) * dt
-        if self._doubted or (smoothing and steps.step.exact):
+        if self._known.doubted or (smoothing and steps.step.exact):
             x, u = (np.array(part).T for part in self._recorder(z, smoothing)[:2])
         else:
             x = steps.states(z[None], smoothing)[0]
@@ -124,13 +122,8 @@ class Transcription:
         return RolloutArrays(z, smoothing, x, u, given.T, p.ravel(), time)
 
     @cached_property
-    def _doubted(self) -> list[bool]:
-        """Not empty where the virtual machine has taken a step elsewhere: then it takes all of them."""
-        return []
-
-    @cached_property
-    def _last(self) -> dict[str, tuple[Any, RolloutArrays]]:
-        return {}
+    def _known(self) -> _Known:
+        return _Known()
 
     def motion(self, z: Array, x: Array, u: Array) -> Trajectory:
         """Return the motion of states (N + 1, nx) with inputs (N, m) of variables and the parameters of z (n,)."""
@@ -174,6 +167,10 @@ class Transcription:
         return CachedProbe(self._probe_values, self._probe_gradient)
 
     def _probe_values(self, Z: Array) -> Array:
+        known = self.shooting.evaluator.value(Z, 0.0).probe if self._known.gives_probes else None
+        if known is not None:
+            return known
+        self._known.gives_probes = False
         X = self.steps().states(np.asarray(Z, float), 0.0)
         return np.array(row_by_row(self._motion_values, Z, X)[-1][:, 0])
 
@@ -245,6 +242,21 @@ class Transcription:
         from symphys.transcription.simulation import recorder
 
         return recorder(self.rollout)
+
+
+class _Known:
+    """What a transcription remembers.
+
+    Attributes:
+        last: the last motion, with its z and smoothing.
+        doubted: whether the virtual machine has taken a step elsewhere than the kernel: then it takes all of them.
+        gives_probes: whether values of the evaluator come with the probe, as those of kernels do.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self.last: tuple[tuple[bytes, float], RolloutArrays] | None = None
+        self.doubted, self.gives_probes = False, True
 
 
 def gradient_prices(

@@ -42,3 +42,12 @@ def test_what_acts_in_a_phase_has_steps_of_its_own(name: str, same: bool) -> Non
     coarse, fine = known.judge(z).objective, finer.judge(z).objective
     assert abs(coarse - fine) < 0.02 * (1 + abs(coarse))
     assert np.isfinite(finer.arrays(z).x).all()
+
+
+def test_a_problem_with_scenarios_is_judged_by_steps_of_its_backend() -> None:
+    """Its own rollout, without them, is casadi's."""
+    tables = {**FEATURES["impacts with friction"]}
+    varied = [{"name": "heavy", "sets": "ball.mass", "factor": 0.2}]
+    for backend in ("casadi", "auto"):
+        made = transcribe(problem_of_tables({**tables, "scenario": varied}), backend=backend)
+        assert made.steps().step.backend == backend

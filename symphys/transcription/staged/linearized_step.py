@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symphys.codegen import FixedBatch, Kernel, KernelUnavailable, ProcessorKernel, Program, ProgramError, processors
 from symphys.codegen.backends import BEST, INTERPRETED, PRECISIONS, Description, build_kernel, described
+from symphys.codegen.backends.calls import mapped, row_by_row
 from symphys.codegen.slopes import SlopeKernel, compile_slopes
 from symphys.codegen.toolchain.identity import identity_of
 from symphys.codegen.toolchain.warm_start import ProgramSource
@@ -249,7 +250,7 @@ class LinearizedStep:
             return _ByKernel(self._kernel(self.source("step", lambda: step_program(self.arguments, self.exact, False))))
         except (KernelUnavailable, ProgramError) as error:
             self._step_note = f"{INTERPRETED}: {error}" if self.backend in PRECISIONS else ""
-            return _ByCasadi(step_functions(self.arguments)[0])
+            return _ByCasadi(step_functions(self.arguments)[0], self._count)
 
     @cached_property
     def _off(self) -> _BySlopes | _ByCasadi:
@@ -260,7 +261,7 @@ class LinearizedStep:
             return _BySlopes(compile_slopes(source, "off", threads=self._count, wait=self.wait))
         except (KernelUnavailable, ProgramError) as error:
             self._note = f"; {error}" if self.backend in PRECISIONS else ""
-            return _ByCasadi(step_functions(self.arguments)[1])
+            return _ByCasadi(step_functions(self.arguments)[1], self._count)
 
     @cached_property
     def _apart(self) -> _ByKernel | None:
@@ -343,14 +344,19 @@ class _BySlopes:
 class _ByCasadi:
     """Evaluates state by state on casadi's virtual machine, for machines without a compiler."""
 
-    def __init__(self, function: ca.Function) -> None:
-        self.function = function
+    def __init__(self, function: ca.Function, threads: int) -> None:
+        self.function, self.threads = function, threads
+        self._mapped: dict[int, ca.Function] = {}
         self._jacobian: dict[int, ca.Function] = {}
         self._reversed: dict[int, ca.Function] = {}
 
     def values(self, varying: Array, given: Array) -> Array:
-        rows = [np.array(self.function(*row)).ravel() for row in zip(varying, given, strict=True)]
-        return np.array(rows).reshape(len(varying), self.function.size1_out(0))
+        count = len(varying)
+        if count == 1 or self.threads == 1:
+            return row_by_row(self.function, varying, given)[0]
+        if count not in self._mapped:
+            self._mapped[count] = mapped(self.function, count, self.threads)
+        return np.array(self._mapped[count](varying.T, given.T)).T
 
     def jacobians(self, varying: Array, given: Array, columns: int) -> Array:
         if columns not in self._jacobian:
