@@ -21,7 +21,7 @@ from symphys.solvers.core.evaluator import CountingEvaluator, WorkCounter
 from symphys.solvers.core.interface import Iteration, IterationRecorder, Log, Method, Solver, StageContext, nothing
 from symphys.solvers.core.options import SolverOptions
 from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageResult, Status, StopReason, TraceRow
-from symphys.solvers.core.point import Incumbent, Stop
+from symphys.solvers.core.point import Incumbent, Point, Stop
 from symphys.types import Array
 
 
@@ -227,7 +227,7 @@ class Driver:
         problem = request.problem
         self._request, self._stage, self._rate = request, stage, rate
         self._evaluator = CountingEvaluator(
-            problem, problem.smoothing[0], Incumbent(problem.stop_when_met), constraints=request.constraints
+            problem, problem.smoothing[0], self._incumbent(problem.smoothing[0]), constraints=request.constraints
         )
         self._start = self._evaluator.clip(np.array(request.start, float))
         self._trace = SolveTrace()
@@ -316,7 +316,7 @@ class Driver:
         reason, smoothings = StopReason(Status.MET), self._request.problem.smoothing
         for index, smoothing in enumerate(smoothings[len(self._stages) :], len(self._stages)):
             if saved is None:
-                self._evaluator = self._evaluator.at(smoothing, Incumbent(self._request.problem.stop_when_met))
+                self._evaluator = self._evaluator.at(smoothing, self._incumbent(smoothing))
                 self._last = None
             self._request.log(f"stage {index + 1} of {len(smoothings)}: smoothing {smoothing:g}")
             reason = StopReason(Status.MET) if saved == FINISHED_STATE else self._run_stage(z, saved)
@@ -332,6 +332,11 @@ class Driver:
             self._request.log(str(reason))
         return reason, z
 
+    def _incumbent(self, smoothing: float, best: Point | None = None) -> Incumbent:
+        """Return the incumbent of a stage; only what is met exactly can be confirmed."""
+        problem = self._request.problem
+        return Incumbent(problem.stop_when_met, best, None if smoothing else problem.confirms)
+
     def _resume(self) -> tuple[Array, dict[str, object] | None]:
         """Return the start of the next stage, and the saved state of its method if the solve is resumed."""
         request = self._request
@@ -341,10 +346,11 @@ class Driver:
         self._checkpoint, self._stages, self._last = checkpoint, checkpoint.stages, checkpoint.last
         self._trace = SolveTrace(rows, checkpoint.seconds)
         best = replace(checkpoint.best, violation=self._evaluator.violation(checkpoint.best.errors))
+        smoothing = request.problem.smoothing[len(self._stages)]
         self._evaluator = replace(
             self._evaluator,
-            smoothing=request.problem.smoothing[len(self._stages)],
-            incumbent=Incumbent(request.problem.stop_when_met, best),
+            smoothing=smoothing,
+            incumbent=self._incumbent(smoothing, best),
             counter=WorkCounter(checkpoint.counts),
         )
         return self._stages[-1].z if self._stages else self._start, saved

@@ -153,7 +153,9 @@ class CountingEvaluator:
     def _points(self, Z: Array, values: Values) -> list[Point]:
         """Return the rows as points with their own copies of all arrays."""
         names = [name for name in ("outputs", "gradient", "residuals", "jacobian") if getattr(values, name) is not None]
-        merits, objectives = values.merit.tolist(), values.objective.tolist()
+        measure = self.problem.measure
+        merits = (values.merit if measure is None else measure(values.objective, values.errors)).tolist()
+        objectives = values.objective.tolist()
         points = []
         for row, (merit, objective) in enumerate(zip(merits, objectives, strict=True)):
             parts = {name: getattr(values, name)[row].copy() for name in names}

@@ -167,6 +167,7 @@ class Solver(Generic[O_inv]):
         threaded: whether several solves may run in threads side by side, see ``multi_start``.
         scenarios: whether it is for problems with scenarios, and for no others; None: for all.
         by_steps: of which problems it evaluates by ``ShootingProblem.by_steps`` where there is that.
+        confirms: whether it ends only where what it meets is confirmed, see ``ShootingProblem.confirms``.
     """
 
     name: str
@@ -177,3 +178,4 @@ class Solver(Generic[O_inv]):
     threaded: bool = False
     scenarios: bool | None = False
     by_steps: Callable[[ShootingProblem], bool] = never
+    confirms: bool = False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import field
 from functools import cached_property
 
@@ -88,11 +88,17 @@ class Stop(Exception):
 
 
 class Incumbent:
-    """The best point of a stage by the measure that judges runs, see ``Point.rank``."""
+    """The best point of a stage by the measure that judges runs, see ``Point.rank``.
 
-    def __init__(self, stop_when_met: bool, best: Point | None = None) -> None:
-        """Start from ``best``, that of a resumed solve; ``stop_when_met``: see ``ShootingProblem``."""
-        self._stop_when_met, self._best = stop_when_met, best
+    Where the problem stops when all is met, and somebody can confirm that, it stops at a point that is confirmed.
+    """
+
+    def __init__(
+        self, stop_when_met: bool, best: Point | None = None, confirms: Callable[[Array], bool] | None = None
+    ) -> None:
+        """Start from ``best``, that of a resumed solve; ``stop_when_met``, ``confirms``: see ``ShootingProblem``."""
+        self._stop_when_met, self._best, self._confirms = stop_when_met, best, confirms
+        self._refused: Point | None = None
 
     @property
     def best(self) -> Point | None:
@@ -112,5 +118,9 @@ class Incumbent:
         self._stop_if_met()
 
     def _stop_if_met(self) -> None:
-        if self._stop_when_met and self._best is not None and self._best.met:
+        best = self._best
+        if not self._stop_when_met or best is None or not best.met or best is self._refused:
+            return
+        if self._confirms is None or self._confirms(best.z):
             raise Stop
+        self._refused = best

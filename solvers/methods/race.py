@@ -2,10 +2,14 @@
 
 Where hands do not touch the box, or feet leave the ground too late, descent ends in a stationary point far from every
 target. A search among few numbers sees further, and finishes nothing. So CMA-ES searches for a round of generations
-among splines of few knots about the guess, and a finisher goes on from what it found, through all stages of
-smoothing. Where that misses, the search has another round. Whenever it has found something better, the finisher starts
-again. The race ends with the first point that meets everything, from which it goes on to a stationary point where the
-problem asks for one.
+among splines of few knots about the guess, and a finisher goes on from what it found: exactly first, since a search
+leaves little to do, then through all stages of smoothing. Where that misses, a search has a round near the best point,
+or the first one goes on. Whenever one has found something better, the finisher starts again. The race ends with the
+first point that meets everything, from which it goes on to a stationary point where the problem asks for one.
+
+Until then costs hold nobody back from what is asked for. The search compares points by ``distance``, and ilqr takes
+targets and constraints in units of their tolerances, beside which costs count little. (A car that should be quick
+otherwise stays where it is quick and off the road; a hand that should be strong enough hardly moves.)
 
 The finisher is ilqr where formulas look at one state each, least squares for a few numbers with squares, IPOPT for
 others, or gradient descent for nets. Each part is a whole solve of that solver, with its own budget; the trace of the
@@ -42,20 +46,31 @@ MAX_SMALL = 300
 """Length of z up to which least squares finish."""
 GROWTH, MOST = 2, 8
 """Factor on the population of a search that begins anew, and that of all of them at most."""
+COST_WEIGHT = 0.5
+"""What costs count for at most in the logarithm of ``distance``: enough to lead where nothing else moves."""
+MARGIN = 0.5
+"""[tolerances] What misses by less is not improved: finer time steps change it by that much and it is still met."""
+FAR = 1e100
+"""[tolerances] Errors are compared up to here."""
 BETTER = 0.6
 """Share of the merit of the last start of the finisher below which it starts again."""
+NEARER = 0.8
+"""Share of the ``distance`` of a point of the finisher below which it starts again from one near it."""
 FIRST_ROUNDS = 4
 """Rounds of the search for controls over time before the finisher starts, whose slopes are compiled meanwhile."""
 PATIENCE = 10
 """Iterations without progress after which the finisher gives up a start."""
-LONGER = 2
-"""Iterations with which the finisher goes on, exactly, in units of those of a stage."""
 NO_LIMIT = 10**12
 """Evaluations of a search, which its rounds limit."""
 SEEDS = 100_000
 """Between the seeds of searches that begin anew."""
 USED_UP = "the finisher's iterations are used up: raise `finisher_iterations`"
-NAME, SEARCH, FINISH, POLISH = "race", "search", "finish", "polish"
+NEAR_SIGMA = 0.3
+"""First standard deviation of a search near what the finisher has found, in units of that of the first search."""
+NAME, SEARCH, NEAR, FINISH, RELAX, POLISH = "race", "search", "near", "finish", "relax", "polish"
+
+
+SEARCHES = SEARCH, NEAR
 
 
 @dataclass(frozen=True)
@@ -63,8 +78,8 @@ class RaceOptions(SolverOptions):
     """Options of the race.
 
     Attributes:
-        finisher_iterations: in each stage of smoothing, each time it starts; exactly it goes on for ``LONGER``
-            times as many, where they have ended, or what it meets is to be a stationary point.
+        finisher_iterations: in each stage of smoothing, each time it starts; and as many where what it meets is to be
+            a stationary point.
         rounds: of the search, at most.
         generations: of a round.
         population: candidates of a generation.
@@ -76,7 +91,7 @@ class RaceOptions(SolverOptions):
     rounds: int = 30
     generations: int = 10
     population: int = 64
-    knots: int = 8
+    knots: int = 6
     sigma: float = 1.0
 
     def __post_init__(self) -> None:
@@ -93,11 +108,13 @@ class RacePart:
     """A solve that is part of a race, and is over or paused.
 
     Attributes:
-        kind: SEARCH; FINISH, through all stages of smoothing, until everything is met; POLISH from there, exactly.
+        kind: SEARCH; NEAR, a search about what the finisher has found; FINISH, exactly, until everything is met; RELAX
+            likewise through all stages of smoothing; POLISH, exactly, until the objective is stationary.
         status, advice: how it ended; INTERRUPTED: a search that goes on.
         z: (n,) its best point.
-        objective, merit, max_violation, violation, met: of that point, exactly; see ``Point``.
-        confirmed: whether it meets everything, and with finer time steps still does, where somebody can say.
+        objective, max_violation, met: of that point, exactly; see ``Point``.
+        distance: of that point, see ``distance``.
+        confirmed: whether it meets everything, and is confirmed where somebody can.
         counts, seconds: of this part alone.
     """
 
@@ -106,19 +123,17 @@ class RacePart:
     advice: str
     z: Array
     objective: float
-    merit: float
+    distance: float
     max_violation: float
-    violation: float
     met: bool
     confirmed: bool
     counts: Counts
     seconds: float
 
     @property
-    def rank(self) -> tuple[bool, bool, float, float]:
+    def rank(self) -> tuple[bool, bool, float]:
         """Return the sort key, lower is better, as ``Point.rank``."""
-        merit = self.merit if math.isfinite(self.merit) else math.inf
-        return not self.confirmed, not self.met, self.violation, merit
+        return not self.confirmed, not self.met, self.distance if math.isfinite(self.distance) else math.inf
 
 
 @dataclass(frozen=True)
@@ -143,6 +158,20 @@ class Shift:
 
 Plan = Generator[tuple[str, Array], RacePart, None]
 """Yields kind and start (n,) of a part, and takes what became of it."""
+
+
+def distance(objectives: Array, errors: Array, scale: float) -> Array:
+    """Return (batch,) how far points are from all that is asked for, 1 with nothing missing, times what they cost.
+
+    The errors (batch, k) beyond half the tolerances are summed as squares. The share of the objectives (batch,) is
+    bounded, so that none can outweigh what is missing by more than a factor; ``scale`` is a typical size of them. Where
+    nothing is asked for it is the objective.
+    """
+    if not errors.shape[1]:
+        return objectives
+    beyond = np.minimum(np.maximum(errors - MARGIN, 0), FAR)
+    share = objectives / np.maximum(np.abs(objectives) + scale, np.finfo(float).tiny)
+    return np.asarray((1 + np.sum(beyond**2, axis=1)) * np.exp(COST_WEIGHT * share))
 
 
 def following(plan: Plan, part: RacePart) -> tuple[str, Array] | None:
@@ -174,10 +203,10 @@ class Race:
         if self.finisher is ILQR and problem.by_steps is not None:
             problem = replace(problem, evaluator=problem.by_steps)
         self.problem, self.options, self.seed = problem, options, seed
+        self.compared = replace(problem, measure=self._measure)
+        self.scale: float | None = None
         self.monitor, self.log, self.keep = monitor, log, keep
-        self.evaluator = CountingEvaluator(
-            problem, problem.smoothing[-1], Incumbent(stop_when_met=False), constraints=self.finisher in (ILQR, IPOPT)
-        )
+        self.evaluator = CountingEvaluator(self.compared, problem.smoothing[-1], Incumbent(stop_when_met=False))
         self.cma = cma(keep=True)
         self.parts: list[RacePart] = []
         self.rows: list[TraceRow] = []
@@ -195,7 +224,9 @@ class Race:
         self.start = self.evaluator.clip(np.array(start, float))
         plan = self._plan(self.start)
         asked = next(plan, None)
-        for part in self.parts:
+        over, self.parts = self.parts, []
+        for part in over:
+            self.parts.append(part)
             asked = following(plan, part)
         try:
             if asked and self._begun_part_is_over(asked[0]):
@@ -218,7 +249,7 @@ class Race:
         rows = revived_rows(self.running) if self.running else []
         last = self._shift(kind).moved(rows[-1]) if rows else self.rows[-1] if self.rows else None
         self.spent = self.options.spent(last) if last else None
-        self.pausing = kind == SEARCH and last is not None and last.iteration >= self._round_ends
+        self.pausing = kind in SEARCHES and last is not None and last.iteration >= self._round_ends
         if not rows or not (self.spent or self.pausing):
             return False
         z, counts = np.array(self.running["best"]["z"], float), Counts(*map(int, self.running["counts"]))
@@ -238,33 +269,59 @@ class Race:
             found = yield SEARCH, guess
             if self._over(found):
                 return
+            if found.confirmed:
+                yield POLISH, found.z
+                return
             if number + 1 < alone:
                 continue
-            if found.merit < BETTER * tried:
-                tried, start = found.merit, found.z
+            if found.distance < BETTER * tried:
+                tried, start = found.distance, found.z
             elif not guessed:
                 start = guess
             else:
                 continue
             guessed = guessed or np.array_equal(start, guess)
-            found = yield FINISH, start
-            if self._over(found):
+            if (yield from self._finishing(start)):
                 return
-            if found.met or found.status is Status.BUDGET:
+        if not guessed and (yield from self._finishing(guess)):
+            return
+        best = self._best()
+        assert best is not None, "there was a guess"
+        yield POLISH, best.z
+
+    def _finishing(self, start: Array) -> Generator[tuple[str, Array], RacePart, bool]:
+        """Say how the finisher goes on from ``start`` (n,); return whether the race is over."""
+        asks = not self.parts or not math.isnan(self.parts[0].max_violation)
+        kind, before, relaxed = FINISH if asks else RELAX, math.inf, len(self.problem.smoothing) == 1
+        while True:
+            found = yield kind, start
+            if self._over(found):
+                return True
+            if found.met or not asks:
                 polished = yield POLISH, found.z
-                if found.confirmed or self._over(polished):
-                    return
-        if not guessed:
-            found = yield FINISH, guess
-            if not self._over(found) and (found.met or found.status is Status.BUDGET):
-                yield POLISH, found.z
+                return found.confirmed or self._over(polished)
+            if found.status is Status.BUDGET and found.distance < BETTER * before:
+                kind, start, before = FINISH, found.z, found.distance
+                continue
+            near = yield NEAR, found.z
+            if self._over(near):
+                return True
+            if near.confirmed:
+                yield POLISH, near.z
+                return True
+            if near.distance < NEARER * found.distance:
+                kind, start, before = FINISH, near.z, near.distance
+            elif relaxed:
+                return False
+            else:
+                kind, start, relaxed = RELAX, min(found, near, key=lambda part: part.rank).z, True
 
     def _over(self, part: RacePart) -> bool:
         """Whether a part ends the race."""
-        if part.status.fatal or (part is self.parts[0] and not math.isfinite(part.merit)):
+        if part.status.fatal or (part is self.parts[0] and not math.isfinite(part.distance)):
             return True
         if math.isnan(part.max_violation):  # nothing is asked for but a low objective
-            return part.kind == POLISH or (part.kind == FINISH and part.status is not Status.BUDGET)
+            return part.kind == POLISH or (part.kind == RELAX and part.status is not Status.BUDGET)
         return part.confirmed and (self.problem.stop_when_met or part.kind == POLISH)
 
     def _solve(self, kind: str, start: Array) -> Outcome:
@@ -275,7 +332,7 @@ class Race:
         def see(row: TraceRow) -> None:
             moved = shift.moved(row)
             self.spent = self.options.spent(moved)
-            self.pausing = self.spent is not None or (kind == SEARCH and moved.iteration >= last)
+            self.pausing = self.spent is not None or (kind in SEARCHES and moved.iteration >= last)
             try:
                 if self.monitor:
                     self.monitor(moved)
@@ -290,30 +347,42 @@ class Race:
                 self.keep(lambda: self._saved(kind, make()))
 
         searches = sum(part.kind == SEARCH and part.status is not Status.INTERRUPTED for part in self.parts)
-        chosen, problem, options = self._part(kind, searches)
+        chosen, problem, options = self._part(kind, start, searches)
         running = self.running or (self.searching if kind == SEARCH else {})
-        seed = self.seed + SEEDS * searches
+        seed = self.seed + SEEDS * searches + (len(self.parts) if kind == NEAR else 0)
         self.log(f"{kind}, part {len(self.parts) + 1} of the race")
         return chosen.solve(problem, start, options, seed, see, running or None, self.log, offer)
 
-    def _part(self, kind: str, searches: int) -> tuple[Solver[Any], ShootingProblem, SolverOptions]:
-        """Return solver, problem and options of a part; ``searches``: how many are over."""
-        options, exact = self.options, replace(self.problem, smoothing=self.problem.smoothing[-1:])
-        if kind == SEARCH:
-            population = options.population * min(GROWTH**searches, MOST)
-            own = CmaOptions(
-                sigma=options.sigma, knots=options.knots, population=population, evaluations=NO_LIMIT, validation=0
+    def _part(self, kind: str, start: Array, searches: int) -> tuple[Solver[Any], ShootingProblem, SolverOptions]:
+        """Return solver, problem and options of a part from ``start`` (n,); ``searches``: how many are over."""
+        options, last = self.options, self.problem.smoothing[-1:]
+        if kind in SEARCHES:
+            wide = kind == SEARCH
+            sought = CmaOptions(
+                sigma=options.sigma * (1.0 if wide else NEAR_SIGMA),
+                knots=options.knots,
+                population=options.population * (min(GROWTH**searches, MOST) if wide else 1),
+                evaluations=NO_LIMIT,
+                validation=0,
             )
-            return self.cma, exact, own
+            return self.cma if wide else cma(), replace(self.compared, smoothing=last), sought
         patience = {"patience": PATIENCE} if self.finisher is ILQR else {}
         if kind == POLISH:
-            return (
-                self.finisher,
-                exact,
-                self.finisher.Options(iterations=LONGER * options.finisher_iterations, **patience),
-            )
+            own = self.finisher.Options(iterations=options.finisher_iterations, **patience)
+            return self.finisher, replace(self.problem, smoothing=last), own
         meeting = replace(self.problem, stop_when_met=True)
+        if kind == FINISH:
+            meeting = replace(meeting, smoothing=last)
+        if self.finisher is ILQR and self.problem.asking is not None:
+            staged = self.problem.asking(start)
+            meeting = replace(meeting, staged=lambda: staged, measure=self.compared.measure)
         return self.finisher, meeting, self.finisher.Options(iterations=options.finisher_iterations, **patience)
+
+    def _measure(self, objectives: Array, errors: Array) -> Array:
+        """Return ``distance`` in units of the first objective that is evaluated: that of the guess."""
+        if self.scale is None:
+            self.scale = abs(float(objectives[0]))
+        return distance(objectives, errors, self.scale)
 
     def _shift(self, kind: str) -> Shift:
         """Return how the rows of a part become those of the race."""
@@ -331,7 +400,7 @@ class Race:
         return sum(part.seconds for part in self.parts)
 
     def _best(self) -> RacePart | None:
-        return min(self.parts, key=lambda part: part.rank, default=None)
+        return min(reversed(self.parts), key=lambda part: part.rank, default=None)
 
     def _take(self, kind: str, outcome: Outcome) -> None:
         """Add a part that is over, or paused."""
@@ -341,18 +410,21 @@ class Race:
         (point,) = self.evaluator.rate([outcome.z])
         counts = outcome.counts + shift.counts - self._counts() + Counts(rollouts=1)
         confirmed = point.met and (self.problem.confirms is None or self.problem.confirms(point.z))
-        numbers = point.objective, point.merit, point.max_violation, point.violation, point.met, confirmed
+        goes_on = self.pausing and confirmed >= point.met  # not towards what is met and does not hold
+        if kind == SEARCH and self.pausing and not goes_on:
+            outcome = replace(outcome, status=Status.MET, advice="")
+        numbers = point.objective, point.merit, point.max_violation, point.met, confirmed
         part = RacePart(kind, outcome.status, outcome.advice, outcome.z, *numbers, counts, seconds)
-        self._add_stages(part, outcome.stages if kind != SEARCH else ())
+        self._add_stages(part, outcome.stages if kind not in SEARCHES else ())
         best = self._best()
-        if best is None or part.rank < best.rank:
+        if best is None or part.rank <= best.rank:
             self.finished = outcome
         self.parts.append(part)
         self.rows += rows
         self.running = {}
         if kind == SEARCH:
-            self.searching = outcome.checkpoint if self.pausing else {}
-        self.log(f"{kind}: {outcome.status.value}, merit {point.merit:g}, misses by {point.max_violation:g} tolerances")
+            self.searching = outcome.checkpoint if goes_on else {}
+        self.log(f"{kind}: {outcome.status.value}, objective {point.objective:g}, worst {point.max_violation:g}")
 
     def _add_stages(self, part: RacePart, stages: tuple[StageResult, ...]) -> None:
         """Add the stages of a part to those of the race; what is left of its work is that of the exact stage."""
@@ -371,8 +443,8 @@ class Race:
         if best is None:
             assert reason is not None, "a race has a part"
             return Outcome(reason.status, reason.advice, self.start, tuple(self.rows), self._counts())
-        last = next((part for part in reversed(self.parts) if part.kind != SEARCH), self.parts[-1])
-        ended = best if best.kind != SEARCH else last
+        last = next((part for part in reversed(self.parts) if part.kind not in SEARCHES), self.parts[-1])
+        ended = best if best.kind not in SEARCHES else last
         ended = self.parts[-1] if self.parts[-1].status.fatal else ended
         status, advice = ended.status, ended.advice if ended.status is not Status.BUDGET else USED_UP
         if reason:
@@ -431,7 +503,8 @@ class Race:
         try:
             self.parts = [revive(RacePart, each, Counts) for each in saved["parts"]]
             self.stages = {float(each["smoothing"]): revive(StageResult, each, Counts) for each in saved["stages"]}
-            self.rows = revived_rows(saved)[: int(saved["over"])]
+            rows = revived_rows(saved)
+            self.rows, self.scale = rows[: int(saved["over"])], abs(rows[0].objective) if rows else None
             self.searching, self.running = dict(saved["searching"]), dict(saved["running"])
             size = len(saved["best"]["z"])
         except (KeyError, TypeError, ValueError) as error:
@@ -477,8 +550,8 @@ def solve(
 ) -> Outcome:
     """Solve as ``interface.Solve`` has it."""
     race = Race(problem, options, seed, monitor, log or ignore_log, keep)
-    if race.finisher is ILQR and problem.staged is not None and over_time(problem):
-        problem.staged().prepare()  # few numbers may be found before any slope is needed
+    if race.finisher is ILQR and problem.staged is not None:
+        problem.staged().prepare(slopes=over_time(problem))  # few numbers may be found before any slope is needed
     return race.run(start, checkpoint)
 
 
@@ -489,4 +562,5 @@ RACE: Solver[RaceOptions] = Solver(
     solve,
     prepare=load,
     by_steps=by_steps,
+    confirms=True,
 )

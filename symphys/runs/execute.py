@@ -197,11 +197,11 @@ def solve(
     with a few words before each part of judging. ``bounded``: whether a limit may kill the process, so that the
     solver's outcome is saved before it is judged.
     """
-    if solver(job.config.solver).by_steps(transcription.shooting):
+    chosen = solver(job.config.solver)
+    if chosen.by_steps(transcription.shooting):
         transcription = transcription.by_steps
-    shooting = replace(
-        transcription.shooting, multipliers=job.guess.multipliers, confirms=partial(confirmed, transcription)
-    )
+    confirms = partial(confirmed, transcription) if chosen.confirms else None
+    shooting = replace(transcription.shooting, multipliers=job.guess.multipliers, confirms=confirms)
     log(f"evaluated by {transcription.backend}")
     for note in job.guess.notes:
         log(f"guess from {job.guess.folder}: {note}")

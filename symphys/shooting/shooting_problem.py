@@ -17,6 +17,8 @@ Function = Any
 """casadi.Function"""
 GuessedStates = Callable[[Array, Ints, float], Array]
 """The type of ``ShootingProblem.guessed_states``."""
+Measure = Callable[[Array, Array], Array]
+"""The type of ``ShootingProblem.measure``."""
 
 
 @dataclass(frozen=True)
@@ -255,6 +257,10 @@ class ShootingProblem:
         staged: makes the problem as a chain of steps when it is first asked for; SymphysError where formulas look at
             more than one state. None: there is none, as of problems with scenarios.
         by_steps: evaluates by the steps of ``staged``, for solvers that compile no rollout; None: there is none.
+        asking: (z (n,)) -> the same steps with targets and constraints weighted by their tolerances, and costs by so
+            little that those of z count for a tenth of a tolerance. None: nothing is asked for, or nobody can say.
+        measure: (objectives (batch,), errors (batch, k)) -> (batch,) by which points are compared in place of their
+            merits, for methods that take no gradient of these. None: by their merits.
         guessed_states: (z (n,), numbers (M,) of states from 1 on, smoothing) -> (M, nx) where the motion is guessed to
             pass. None: where the rollout of z leads.
         confirms: (z (n,)) -> whether what meets everything still does with finer time steps; None: nobody can say.
@@ -277,6 +283,8 @@ class ShootingProblem:
     scenario: ScenarioEvaluator | None = None
     staged: Callable[[], StagedProblem] | None = None
     by_steps: StepwiseEvaluator | None = None
+    asking: Callable[[Array], StagedProblem] | None = None
+    measure: Measure | None = None
     guessed_states: GuessedStates | None = None
     confirms: Callable[[Array], bool] | None = None
     multipliers: Mapping[str, Array] = field(default_factory=dict)

@@ -221,8 +221,8 @@ class StagedProblem(Protocol):
         """
         ...
 
-    def prepare(self) -> None:
-        """Begin to compile what linearises, beside other work."""
+    def prepare(self, slopes: bool) -> None:
+        """Compile what takes steps; with ``slopes`` begin to compile what linearises, beside other work."""
         ...
 
     def linearize(self, motion: StagedMotion) -> Linearized:

@@ -42,6 +42,7 @@ from symphys.shooting import (
     Values,
     WithoutResiduals,
 )
+from symphys.transcription.asking import asking
 from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.network_rollout import has_large_nets
@@ -49,7 +50,7 @@ from symphys.transcription.objective import Terms, bounds, has_squares, limits, 
 from symphys.transcription.program import program_identity, rollout_program, step_identity
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.sampler import Sampler, swept_inputs
-from symphys.transcription.staged.step_evaluator import StepEvaluator, evaluated_by_steps
+from symphys.transcription.staged.step_evaluator import StepEvaluator
 from symphys.transcription.transcription import Transcription
 from symphys.types import Array
 
@@ -131,6 +132,7 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
         output_names=tuple(output.label for output in problem.outputs),
         staged=staged,
         by_steps=_by_steps(rollout, staged, backend),
+        asking=asking(staged) if problem.targets or problem.constraints else None,
         guessed_states=states_of(staged, problem.guess),
     )
     return Transcription(problem, rollout, functions, shooting, lambda: chosen().description, built, steps)
@@ -152,8 +154,8 @@ def _stages(steps: Linearization, backend: str, threads: int | None) -> RolloutS
 
 
 def _by_steps(rollout: Rollout, staged: Callable[[], RolloutStages], backend: str) -> StepEvaluator | None:
-    """Return the evaluator by steps; None where its merits are others, and for a backend that compiles no steps."""
-    return StepEvaluator(rollout, staged) if backend != "c" and evaluated_by_steps(rollout.problem) else None
+    """Return the evaluator by steps; None for a backend that compiles no steps."""
+    return StepEvaluator(rollout, staged) if backend != "c" else None
 
 
 def _evaluating(

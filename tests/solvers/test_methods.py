@@ -17,7 +17,7 @@ from symphys.solvers.core.checkpoint import plain
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
 from symphys.solvers.core.outcome import StopReason
-from symphys.solvers.core.point import Incumbent
+from symphys.solvers.core.point import Incumbent, Point, Stop
 from symphys.solvers.methods.cma_es import CmaEs, CmaOptions
 from symphys.solvers.methods.evolution import EvolutionOptions, EvolutionStrategy
 from symphys.solvers.methods.gradient import GradientDescent, GradientOptions
@@ -56,6 +56,23 @@ def context_of(problem: ShootingProblem, start: Any = None) -> StageContext:
     evaluator = CountingEvaluator(problem, 0.0, Incumbent(stop_when_met=False))
     z = problem.start(0) if start is None else np.array(start, float)
     return StageContext(evaluator, z, seed=0, log=lambda line: None)
+
+
+def test_a_stage_stops_where_what_it_meets_is_confirmed() -> None:
+    """Each point is asked about once."""
+    asked = []
+
+    def confirms(z: Any) -> bool:
+        asked.append(float(z[0]))
+        return len(asked) == 2
+
+    incumbent = Incumbent(stop_when_met=True, confirms=confirms)
+    points = [Point(np.array([k]), merit, merit, np.zeros(1), met=True) for k, merit in ((1.0, 3.0), (2.0, 2.0))]
+    incumbent.offer(points[:1])
+    incumbent.offer(points[:1])
+    with pytest.raises(Stop):
+        incumbent.offer(points[1:])
+    assert asked == [1.0, 2.0]
 
 
 def first(method: Method[Any]) -> Iteration[Any]:

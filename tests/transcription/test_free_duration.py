@@ -97,6 +97,18 @@ def test_a_free_duration_at_the_value_of_the_file_changes_nothing(name: str, tmp
     assert motion.position == pytest.approx(expected.position, rel=1e-9, abs=1e-10)
 
 
+def test_steps_give_the_merit_of_the_whole_and_its_gradient() -> None:
+    """Penalties of what holds always grow with the duration."""
+    lower = {"constraint": [{"name": "low", "at": "always", "value": "ball.position[2]", "upper": 0.2}]}
+    shooting = transcribe(problem_of_tables({**TABLES, **lower}), backend="casadi").shooting
+    assert shooting.by_steps is not None
+    z = shooting.start(0)[None]
+    found, expected = (each.gradient(z, 0.0) for each in (shooting.by_steps, shooting.evaluator))
+    assert found.merit > found.objective
+    assert found.merit == pytest.approx(expected.merit, rel=1e-10)
+    assert found.gradient == pytest.approx(expected.gradient, rel=1e-8, abs=1e-8)
+
+
 @pytest.mark.thorough
 def test_an_examination_is_of_the_duration_of_z(made: Transcription, other: Transcription) -> None:
     found = examine(made, made.shooting.start(0))

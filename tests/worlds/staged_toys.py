@@ -206,7 +206,7 @@ class Chain(SingleSteps):
 
     recursion = None
 
-    def prepare(self) -> None:
+    def prepare(self, slopes: bool) -> None:
         """Do nothing: there is nothing to compile."""
 
     def limit_slopes(self, motion: StagedMotion) -> tuple[Array, Any, Any, Any]:

@@ -126,7 +126,7 @@ class Widths:
 
         self._begin = begin
 
-    def _compile_now(self) -> None:
+    def begin(self) -> None:
         """Begin to compile the library of all lanes, if that was put off."""
         with self._lock:
             begin, self._begin = self._begin, None
@@ -135,7 +135,7 @@ class Widths:
 
     def finish(self) -> None:
         """Wait for the library that is being compiled, if there is one."""
-        self._compile_now()
+        self.begin()
         if self._compiling is not None:
             self._compiling.finish()
 
@@ -169,7 +169,7 @@ class Widths:
     def _timed(self, width: LoadedWidth, missing: int, parts: Sequence[BatchData], threads: int) -> None:
         """Compute parts, and build a better library once calls without it have taken as long as compiling does."""
         if self._begin is not None and self._called:
-            self._compile_now()
+            self.begin()
         self._called, began = True, perf_counter()
         width.pool.run([partial(width.loaded.evaluate, part) for part in parts], threads)
         if missing and self._libraries is not None:

@@ -70,6 +70,7 @@ class LinearizedStep:
     wait: bool = False
     _note: str = field(default="", init=False)
     _step_note: str = field(default="", init=False)
+    _seconds: float = field(default=0.0, init=False)
 
     @cached_property
     def arguments(self) -> StepArguments:
@@ -227,16 +228,32 @@ class LinearizedStep:
         report = self._off.kernel.report
         return f"{report.precision} precision, lanes {report.lanes}, threads {self._off.kernel.threads}"
 
-    def prepare(self) -> None:
-        """Begin to compile the slopes."""
-        _ = self._off
+    def prepare(self, slopes: bool) -> None:
+        """Compile the step; with ``slopes`` begin to compile these, once the step no longer needs the processors."""
+        began = perf_counter()
+        self._begin_step()
+        if slopes:
+            _ = self._off
+        self._finish_step()
+        self._seconds += perf_counter() - began
 
-    @cached_property
+    def _begin_step(self) -> None:
+        step = self._step
+        if isinstance(step, _ByKernel) and isinstance(step.kernel, ProcessorKernel):
+            step.kernel.widths.begin()
+
+    def _finish_step(self) -> None:
+        step = self.__dict__.get("_step")
+        if isinstance(step, _ByKernel) and isinstance(step.kernel, ProcessorKernel):
+            step.kernel.widths.finish()
+
+    @property
     def evaluator(self) -> Description:
-        """Describe the evaluator of next states."""
+        """Describe the evaluator of next states, with the seconds that were spent on it so far."""
         began, step = perf_counter(), self._step
+        self._seconds += perf_counter() - began
         if isinstance(step, _ByKernel):
-            return described(step.kernel, perf_counter() - began)
+            return described(step.kernel, self._seconds)
         return Description("casadi", threads=self._count, note=self._step_note)
 
     @cached_property
@@ -258,7 +275,9 @@ class LinearizedStep:
         try:
             self._refuse()
             source = self.source("slopes", lambda: step_program(self.arguments, self.exact, True))
-            return _BySlopes(compile_slopes(source, "off", threads=self._count, wait=self.wait))
+            return _BySlopes(
+                compile_slopes(source, "off", threads=self._count, wait=self.wait, before=self._finish_step)
+            )
         except (KernelUnavailable, ProgramError) as error:
             self._note = f"; {error}" if self.backend in PRECISIONS else ""
             return _ByCasadi(step_functions(self.arguments)[1], self._count)

@@ -95,6 +95,14 @@ class RolloutStages:
         none: list[Array] = [np.zeros(0)] * 3
         columns = [np.concatenate(each) for each in zip(*parts, strict=True)] if parts else none
         self.lower, self.upper, self.penalties = columns[0], columns[1], columns[2]
+        always = [each.at == "always" for each in problem.constraints]
+        self.lasting = np.repeat(np.array(always, bool), [len(lower) for lower, _, _ in parts])
+
+    def sharing(self, rollout: Rollout) -> RolloutStages:
+        """Return the stages of a rollout with an equal step, which is not compiled again."""
+        step = self._linearization.step
+        linearization = Linearization(rollout, step=step)
+        return RolloutStages(rollout, step.backend, step.threads, step.exact, self._priced, linearization)
 
     def begin(self, x: Array, time: float) -> None:
         """Let motions begin at a state (nx,) and time [s]; requires a fixed duration and no sums."""
@@ -208,9 +216,16 @@ class RolloutStages:
 
     _rolled: PolicyRollout | None = None
 
-    def prepare(self) -> None:
+    def stretch(self, z: Array) -> float:
+        """Return the duration of the motion of z divided by that in the file."""
+        problem, columns = self.rollout.problem, self.rollout.parameters.columns
+        if not problem.free_duration:
+            return 1.0
+        return float(self.parameters(z[None])[0][columns[DURATION]][0]) / problem.simulation.duration
+
+    def prepare(self, slopes: bool) -> None:
         """Implement ``StagedProblem.prepare``."""
-        self._linearization.step.prepare()
+        self._linearization.step.prepare(slopes)
 
     def linearize(self, motion: StagedMotion) -> Linearized:
         """Return the derivatives of all steps."""
@@ -460,7 +475,7 @@ def guessed_states(stages: RolloutStages, guess: GuessedMotion, z: Array, ticks:
     states, times = moved[ticks], np.asarray(ticks * dt, float)
     states[~np.isfinite(states).all(axis=1)] = moved[1]
     off, names = np.zeros((len(ticks), stages.tangent_size)), list(stages.tangent.names)
-    now, stretch = _quantities(stages, guess, states, z), _stretch(stages, z)
+    now, stretch = _quantities(stages, guess, states, z), stages.stretch(z)
 
     def move(name: str, ahead: Array) -> None:
         for entry, column in zip(_entries(name, names), ahead.T, strict=True):
@@ -484,14 +499,6 @@ def _entries(name: str, names: list[str]) -> Iterator[int]:
     field = words.get(field, field) if jointed else "turn" if field == "orientation" else field
     count = sum(each.startswith(f"{owner}.{field}[") for each in names)
     return (names.index(f"{owner}.{field}[{k}]") for k in range(count))
-
-
-def _stretch(stages: RolloutStages, z: Array) -> float:
-    """Return the duration of the motion of z divided by that in the file."""
-    problem, columns = stages.rollout.problem, stages.rollout.parameters.columns
-    if not problem.free_duration:
-        return 1.0
-    return float(stages.parameters(z[None])[0][columns[DURATION]][0]) / problem.simulation.duration
 
 
 def _quantities(stages: RolloutStages, guess: GuessedMotion, states: Array, z: Array) -> dict[str, Array]:

@@ -12,8 +12,8 @@ import numpy as np
 
 from symphys.codegen.backends import Description
 from symphys.codegen.backends.calls import row_by_row
-from symphys.problem import Problem
 from symphys.shooting import StagedMotion, Values, WithoutResiduals, costates
+from symphys.transcription.formula_names import spans
 from symphys.transcription.motion_values import motion_values
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
@@ -57,22 +57,28 @@ class StepEvaluator(WithoutResiduals):
     def _slope(self, motion: StagedMotion) -> Array:
         """Return the gradient (n,) of the merit about a motion."""
         staged = self.staged()
-        slopes = staged.linearize(motion)
-        costs = staged.expand(motion, np.zeros_like(staged.penalties), 2 * staged.penalties)
+        slopes, penalties = staged.linearize(motion), staged.penalties
+        stretched = self.rollout.problem.free_duration and staged.lasting.any()
+        if stretched:  # what holds always is weighted by the time step
+            penalties = penalties * np.where(staged.lasting, staged.stretch(motion.z), 1.0)
+        costs = staged.expand(motion, np.zeros_like(penalties), 2 * penalties)
         after, first = costates(slopes.a, costs.x[:-1], costs.x[-1], staged.recursion)
         by_inputs = costs.u + (after[:, None] @ slopes.b)[:, 0]
         slope = np.asarray(staged.weights.T @ by_inputs.ravel())
         slope[staged.statics] += costs.s + (after[:, None] @ slopes.c)[:, 0].sum(axis=0) + slopes.start.T @ first
+        if stretched:
+            limits = staged.measure(motion.z[None], motion.x[None], motion.u[None])[1][0]
+            beyond = limits - np.clip(limits, staged.lower, staged.upper)
+            slope[self._duration] += np.sum((penalties * beyond**2)[staged.lasting]) / motion.z[self._duration]
         return slope
+
+    @cached_property
+    def _duration(self) -> int:
+        """Return the entry of z that is the duration."""
+        variables = self.rollout.problem.variables
+        places = zip(variables, spans(variables), strict=True)
+        return next(first for variable, (first, _) in places if variable.kind == "duration")
 
     @cached_property
     def _formulas(self) -> ca.Function:
         return motion_values(self.rollout)
-
-
-def evaluated_by_steps(problem: Problem) -> bool:
-    """Whether merits are those of the staged problem.
-
-    There penalties of what holds always are weighted by the time step of the file, not by that of a free duration.
-    """
-    return not (problem.free_duration and any(limit.at == "always" for limit in problem.constraints))
