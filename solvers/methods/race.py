@@ -281,18 +281,23 @@ class Race:
             else:
                 continue
             guessed = guessed or np.array_equal(start, guess)
-            if (yield from self._finishing(start)):
+            if (yield from self._finishing(start, FINISH)):
                 return
-        if not guessed and (yield from self._finishing(guess)):
+            if not guessed:
+                guessed = True
+                if (yield from self._finishing(guess, RELAX)):
+                    return
+        if not guessed and (yield from self._finishing(guess, RELAX)):
             return
         best = self._best()
         assert best is not None, "there was a guess"
         yield POLISH, best.z
 
-    def _finishing(self, start: Array) -> Generator[tuple[str, Array], RacePart, bool]:
-        """Say how the finisher goes on from ``start`` (n,); return whether the race is over."""
+    def _finishing(self, start: Array, first: str) -> Generator[tuple[str, Array], RacePart, bool]:
+        """Say how the finisher goes on from ``start`` (n,), as ``first`` does; return whether the race is over."""
         asks = not self.parts or not math.isnan(self.parts[0].max_violation)
-        kind, before, relaxed = FINISH if asks else RELAX, math.inf, len(self.problem.smoothing) == 1
+        kind = first if asks else RELAX
+        before, relaxed = math.inf, len(self.problem.smoothing) == 1 or kind == RELAX
         while True:
             found = yield kind, start
             if self._over(found):

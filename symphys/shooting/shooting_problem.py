@@ -258,7 +258,7 @@ class ShootingProblem:
             more than one state. None: there is none, as of problems with scenarios.
         by_steps: evaluates by the steps of ``staged``, for solvers that compile no rollout; None: there is none.
         asking: (z (n,)) -> the same steps with targets and constraints weighted by their tolerances, and costs by so
-            little that those of z count for a tenth of a tolerance. None: nothing is asked for, or nobody can say.
+            little that those of z count for a thousandth of a tolerance. None: nothing is asked for, or nobody can say.
         measure: (objectives (batch,), errors (batch, k)) -> (batch,) by which points are compared in place of their
             merits, for methods that take no gradient of these. None: by their merits.
         guessed_states: (z (n,), numbers (M,) of states from 1 on, smoothing) -> (M, nx) where the motion is guessed to

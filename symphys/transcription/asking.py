@@ -16,8 +16,8 @@ from symphys.types import Array
 if TYPE_CHECKING:
     from symphys.transcription.staged.staged_problem import RolloutStages
 
-COST_SHARE = 0.1
-"""What the costs of a point count for at most, in units of what a target that misses by its tolerance does."""
+COST_SHARE = 0.001
+"""What costs count for at most, in units of a target that misses by its tolerance: more would use tolerances up."""
 LASTING = 0.1
 """Share of the motion for which a violation of what holds always lasts to count 1."""
 
