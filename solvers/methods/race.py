@@ -53,7 +53,7 @@ MARGIN = 0.5
 FAR = 1e100
 """[tolerances] Errors are compared up to here."""
 BETTER = 0.6
-"""Share of the merit of the last start of the finisher below which it starts again."""
+"""Share of the distance of the last start of the finisher below which it starts again."""
 NEARER = 0.8
 """Share of the ``distance`` of a point of the finisher below which it starts again from one near it."""
 FIRST_ROUNDS = 4
@@ -68,8 +68,6 @@ USED_UP = "the finisher's iterations are used up: raise `finisher_iterations`"
 NEAR_SIGMA = 0.3
 """First standard deviation of a search near what the finisher has found, in units of that of the first search."""
 NAME, SEARCH, NEAR, FINISH, RELAX, POLISH = "race", "search", "near", "finish", "relax", "polish"
-
-
 SEARCHES = SEARCH, NEAR
 
 
@@ -272,21 +270,14 @@ class Race:
             if found.confirmed:
                 yield POLISH, found.z
                 return
-            if number + 1 < alone:
+            if number + 1 < alone or found.distance >= BETTER * tried:
                 continue
-            if found.distance < BETTER * tried:
-                tried, start = found.distance, found.z
-            elif not guessed:
-                start = guess
-            else:
-                continue
-            guessed = guessed or np.array_equal(start, guess)
-            if (yield from self._finishing(start, FINISH)):
+            tried, guessed = found.distance, guessed or np.array_equal(found.z, guess)
+            if (yield from self._finishing(found.z, FINISH)):
                 return
-            if not guessed:
-                guessed = True
-                if (yield from self._finishing(guess, RELAX)):
-                    return
+            if not guessed and (yield from self._finishing(guess, RELAX)):
+                return
+            guessed = True
         if not guessed and (yield from self._finishing(guess, RELAX)):
             return
         best = self._best()

@@ -93,17 +93,17 @@ class Transcription:
         """
         from symphys.transcription.simulation import recorded, simulate
 
-        found = None if self._known.doubted else recorded(self.rollout, self.arrays(z, smoothing))
+        found = None if self._cache.doubted else recorded(self.rollout, self.arrays(z, smoothing))
         if found is None:
-            self._known.doubted, self._known.last = True, None
+            self._cache.doubted, self._cache.last = True, None
             found = simulate(self.rollout, self._recorder, np.array(z, float), smoothing)
         return found
 
     def arrays(self, z: Array, smoothing: float = 0.0) -> RolloutArrays:
         """Return states and arguments of the motion of z, which may be not finite; the last ones are cached."""
-        key, last = (np.asarray(z, np.float64).tobytes(), smoothing), self._known.last
+        key, last = (np.asarray(z, np.float64).tobytes(), smoothing), self._cache.last
         if last is None or last[0] != key:
-            last = self._known.last = key, self._simulated(np.array(z, float), smoothing)
+            last = self._cache.last = key, self._simulated(np.array(z, float), smoothing)
         return last[1]
 
     def _simulated(self, z: Array, smoothing: float) -> RolloutArrays:
@@ -111,7 +111,7 @@ class Transcription:
         _, given, p = (np.array(part) for part in self._start(z))
         dt = float(np.ravel(rollout.parameters.step_length(self.problem.simulation, p.ravel()))[0])
         time = np.arange(rollout.steps + 1, dtype=np.float64) * dt
-        if self._known.doubted or (smoothing and steps.step.exact):
+        if self._cache.doubted or (smoothing and steps.step.exact):
             x, u = (np.array(part).T for part in self._recorder(z, smoothing)[:2])
         else:
             x = steps.states(z[None], smoothing)[0]
@@ -122,8 +122,8 @@ class Transcription:
         return RolloutArrays(z, smoothing, x, u, given.T, p.ravel(), time)
 
     @cached_property
-    def _known(self) -> _Known:
-        return _Known()
+    def _cache(self) -> _Cache:
+        return _Cache()
 
     def motion(self, z: Array, x: Array, u: Array) -> Trajectory:
         """Return the motion of states (N + 1, nx) with inputs (N, m) of variables and the parameters of z (n,)."""
@@ -167,10 +167,10 @@ class Transcription:
         return CachedProbe(self._probe_values, self._probe_gradient)
 
     def _probe_values(self, Z: Array) -> Array:
-        known = self.shooting.evaluator.value(Z, 0.0).probe if self._known.gives_probes else None
+        known = self.shooting.evaluator.value(Z, 0.0).probe if self._cache.gives_probes else None
         if known is not None:
             return known
-        self._known.gives_probes = False
+        self._cache.gives_probes = False
         X = self.steps().states(np.asarray(Z, float), 0.0)
         return np.array(row_by_row(self._motion_values, Z, X)[-1][:, 0])
 
@@ -244,8 +244,8 @@ class Transcription:
         return recorder(self.rollout)
 
 
-class _Known:
-    """What a transcription remembers.
+class _Cache:
+    """The last motion, and what evaluations have shown of the kernels.
 
     Attributes:
         last: the last motion, with its z and smoothing.

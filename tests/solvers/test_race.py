@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from worlds.staged_toys import boxed, pendulum
-from worlds.toys import counted, failing, quadratic, rosenbrock, solve, stop_at, target, through_json, toy
+from worlds.toys import constrained, counted, failing, quadratic, rosenbrock, solve, stop_at, target, through_json, toy
 
 from symphys.errors import SymphysError
 from symphys.shooting import ShootingProblem
@@ -30,9 +30,9 @@ def mesa(**more: Any) -> ShootingProblem:
     return toy(2, miss, errors=lambda z, s: ca.norm_2(miss(z, s)) / 1e-6, **more)
 
 
-def level() -> ShootingProblem:
+def level(**more: Any) -> ShootingProblem:
     """The same everywhere."""
-    return toy(2, lambda z, s: 2 + 0 * z, errors=lambda z, s: 5 + 0 * z[0])
+    return toy(2, lambda z, s: 2 + 0 * z, errors=lambda z, s: 5 + 0 * z[0], **more)
 
 
 def same(a: Outcome, b: Outcome) -> None:
@@ -60,6 +60,14 @@ def test_without_anything_to_meet_it_ends_as_its_finisher_does(problem: Shooting
     found, alone = (solve(name, problem) for name in ("race", "least_squares"))
     assert found.status is alone.status is Status.CONVERGED
     assert found.z == pytest.approx(alone.z, abs=1e-4)
+
+
+def test_a_limit_is_met_where_its_penalty_alone_is_not_enough() -> None:
+    """Penalty solvers end beyond the limit; the race keeps a point that meets it and costs little more than 2."""
+    found, alone = (solve(name, constrained()) for name in ("race", "least_squares"))
+    assert alone.status is Status.CONVERGED and alone.z.sum() > 1.005
+    assert found.z.sum() == pytest.approx(1, abs=1e-3)
+    assert np.sum((found.z - [2, 1]) ** 2) == pytest.approx(2, rel=2e-2)
 
 
 def test_controls_over_time_are_finished_by_ilqr() -> None:
@@ -124,9 +132,11 @@ def test_it_is_that_of_its_seed() -> None:
     assert not np.array_equal(first.z, other.z)
 
 
-def test_work_and_time_are_those_of_its_parts() -> None:
+@pytest.mark.parametrize("make", [mesa, level])
+def test_work_and_time_are_those_of_its_parts(make: Any) -> None:
+    """What is met exactly needs no smoothing; what is missed goes through all stages."""
     rows: list[TraceRow] = []
-    problem, count = counted(mesa(smoothing=(0.1, 0.0)))
+    problem, count = counted(make(smoothing=(0.1, 0.0)))
     found = solve("race", problem, options=SMALL, monitor=rows.append)
     assert rows == list(found.trace)
     assert [row.iteration for row in rows] == list(range(len(rows)))
@@ -136,7 +146,7 @@ def test_work_and_time_are_those_of_its_parts() -> None:
     assert found.counts.rollouts == count.count["value"] + count.count["residuals"]
     assert found.counts.jacobians == count.count["jacobian"]
     assert Counts(*map(sum, zip(*(astuple(each.counts) for each in found.stages), strict=True))) == found.counts
-    assert found.stages[-1].smoothing == 0.0
+    assert [each.smoothing for each in found.stages] == ([0.0] if make is mesa else [0.1, 0.0])
     assert np.array_equal(found.stages[-1].z, found.z)
 
 

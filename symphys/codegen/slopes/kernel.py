@@ -221,7 +221,7 @@ def compile_slopes(
     cache: Cache | None = None,
     threads: int | None = None,
     wait: bool = True,
-    before: Callable[[], None] = lambda: None,
+    before: Callable[[], None] | None = None,
 ) -> SlopeKernel:
     """Build the Jacobian of an output of a program by z, in double precision, or take it from the cache.
 
@@ -231,7 +231,7 @@ def compile_slopes(
         cache: where kernels are kept; None: the user's.
         threads: how many blocks of points are computed at once; None: one for each processor.
         wait: for the compiler; else see ``build.compiled``.
-        before: called before the compiler starts, which other kernels may still need.
+        before: called before the compiler starts, to wait for kernels that are compiled first; None: for none.
 
     Raises:
         KernelUnavailable: with one line that says why; the caller falls back.
@@ -254,7 +254,8 @@ def compile_slopes(
     kept = KeptSlopes(whole, planned, texts_of(parts), len(planned.functions), operations)
     if key is not None:
         keep(key, kept.write, cache)
-    before()
+    if before is not None:
+        before()
     # begin with an interpreter where the compiler takes long
     if not waits(operations, wait) and kept_library(kept.texts, cache) is None:
         with suppress(KernelUnavailable):

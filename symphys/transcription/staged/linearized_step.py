@@ -71,6 +71,7 @@ class LinearizedStep:
     _note: str = field(default="", init=False)
     _step_note: str = field(default="", init=False)
     _seconds: float = field(default=0.0, init=False)
+    _before_slopes: Callable[[], None] | None = field(default=None, init=False)
 
     @cached_property
     def arguments(self) -> StepArguments:
@@ -231,21 +232,16 @@ class LinearizedStep:
     def prepare(self, slopes: bool) -> None:
         """Compile the step; with ``slopes`` begin to compile these, once the step no longer needs the processors."""
         began = perf_counter()
-        self._begin_step()
+        kernel = self._step.kernel if isinstance(self._step, _ByKernel) else None
+        widths = kernel.widths if isinstance(kernel, ProcessorKernel) else None
+        if widths is not None:
+            widths.begin()
+            self._before_slopes = widths.finish
         if slopes:
-            _ = self._off
-        self._finish_step()
+            _ = self._off  # planned while the step is being compiled
+        if widths is not None:
+            widths.finish()
         self._seconds += perf_counter() - began
-
-    def _begin_step(self) -> None:
-        step = self._step
-        if isinstance(step, _ByKernel) and isinstance(step.kernel, ProcessorKernel):
-            step.kernel.widths.begin()
-
-    def _finish_step(self) -> None:
-        step = self.__dict__.get("_step")
-        if isinstance(step, _ByKernel) and isinstance(step.kernel, ProcessorKernel):
-            step.kernel.widths.finish()
 
     @property
     def evaluator(self) -> Description:
@@ -276,7 +272,7 @@ class LinearizedStep:
             self._refuse()
             source = self.source("slopes", lambda: step_program(self.arguments, self.exact, True))
             return _BySlopes(
-                compile_slopes(source, "off", threads=self._count, wait=self.wait, before=self._finish_step)
+                compile_slopes(source, "off", threads=self._count, wait=self.wait, before=self._before_slopes)
             )
         except (KernelUnavailable, ProgramError) as error:
             self._note = f"; {error}" if self.backend in PRECISIONS else ""
