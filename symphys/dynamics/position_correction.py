@@ -260,19 +260,50 @@ def _push(
     old: Expr,
     share: float,
 ) -> tuple[tuple[TreeDisplacement, ...], Expr]:
-    free, _ = _unbounded_push(constraint, contact, moved, old, share)
-    # at 0 the slope is that of ``free``: a body that exactly touches is held by the surface
-    new = constraint.near * ca.if_else(ca.logic_or(lasts, free >= 0), free, 0)
+    law = PushLaw(constraint.near, constraint.normal_mass, constraint.separates, lasts, share)
+    new = law.response(_gap_after(constraint, contact, moved), JointImpulse(old)).numbers
     return _displace_pair(constraint, along, (new - old) * constraint.normal), new
 
 
-def _unbounded_push(
-    constraint: ContactConstraint, contact: Contact, moved: Displacements, old: Expr, share: float
-) -> tuple[Expr, Expr]:
-    """Return the push that closes the gap, of either sign, and the effective mass."""
-    gap = contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else ZERO_DISPLACEMENT) + constraint.slack
-    mass = constraint.normal_mass * constraint.separates
-    return old - share * gap * mass, mass
+def _gap_after(constraint: ContactConstraint, contact: Contact, moved: Displacements) -> Expr:
+    """Return the gap [m] after displacements, but for overlap that is rounding."""
+    return contact.geometry.gap_after(moved[0], moved[1] if len(moved) > 1 else ZERO_DISPLACEMENT) + constraint.slack
+
+
+@dataclass(frozen=True)
+class PushLaw:
+    """The push that closes a gap; an ``ImpulseLaw``.
+
+    Attributes:
+        near: 0 if the surfaces are too far apart to act.
+        mass: effective mass along the normal [kg].
+        separates: 1 if a push separates the surfaces.
+        lasts: whether the gap is closed from either side.
+        share: of an overlap that is taken back.
+    """
+
+    near: Expr
+    mass: Expr
+    separates: Expr
+    lasts: Expr
+    share: float
+
+    def response(self, seen: Expr, old: JointImpulse) -> JointImpulse:
+        """Implement ``ImpulseLaw.response``; ``seen``: the gap [m]."""
+        # at 0 the slope is that of what is free: a body that exactly touches is held by the surface
+        free = self._free(seen, old)
+        return JointImpulse(self.near * ca.if_else(ca.logic_or(self.lasts, free >= 0), free, 0))
+
+    def linearised(self, seen: Expr, old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
+        """Implement ``ImpulseLaw.linearised``: a (1,) and B (1, 1)."""
+        free, mass = self._free(seen, old), self.mass * self.separates
+        acts = self.near * self.separates * either(self.lasts, by.within(free, mass))
+        gives = 1 - acts + acts * mass * by.softness
+        return (self.response(seen, old).numbers - old.numbers) / gives, acts * self.share * mass / gives
+
+    def _free(self, gap: Expr, old: JointImpulse) -> Expr:
+        """Return the push that closes the gap, of either sign."""
+        return old.numbers - self.share * gap * (self.mass * self.separates)
 
 
 def _displace_pair(
@@ -325,15 +356,14 @@ class Push:
         )
         return after, JointImpulse(new)
 
-    def linearised(
-        self, along: tuple[TreeDisplacement, ...], old: JointImpulse, by: Linearisation
-    ) -> tuple[Expr, Expr]:
-        """Return a (1,) and B (1, 1); see ``newton_start``."""
-        free, mass = _unbounded_push(self.constraint, self.contact, self._moved(along), old.numbers, self.share)
-        acts = self.constraint.near * self.constraint.separates * either(self.lasts, by.within(free, mass))
-        pushed = self.constraint.near * ca.if_else(ca.logic_or(self.lasts, free >= 0), free, 0)
-        gives = 1 - acts + acts * mass * by.softness
-        return (pushed - old.numbers) / gives, acts * self.share * mass / gives
+    def seen(self, along: tuple[TreeDisplacement, ...]) -> Expr:
+        """Return the gap after displacements (1,) [m]."""
+        return _gap_after(self.constraint, self.contact, self._moved(along))
+
+    def alone(self) -> PushLaw:
+        """Implement ``VelocityConstraint.alone``."""
+        contact = self.constraint
+        return PushLaw(contact.near, contact.normal_mass, contact.separates, self.lasts, self.share)
 
     def _moved(self, along: tuple[TreeDisplacement, ...]) -> Displacements:
         return tuple(displaced(jacobian, own) for jacobian, own in zip(self.jacobians, along, strict=True))

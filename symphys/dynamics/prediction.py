@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import casadi as ca
 
+from symphys.dynamics.arguments import surface_as_arguments
 from symphys.dynamics.collision import Contact, collide
 from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.dynamics.context import State, StepContext
@@ -37,10 +38,10 @@ def along_paths(
     """Apply ``look`` to the two surfaces of each pair, on their bodies' paths."""
     found: list[T] = []
     for (first, second), _ in groupby(context.world.pairs, key=lambda pair: (pair.first, pair.second)):
-        surfaces = context.world.surface(first), context.world.surface(second)
+        one, other = (surface_as_arguments(context.world.surface(side)) for side in (first, second))
         a = motions[_index(first.body)].predicted_path()
         b = at_rest(duration) if second.body is None else motions[second.body].predicted_path()
-        found += look(*surfaces, a, b)
+        found += look(one, other, a, b)
     return found
 
 

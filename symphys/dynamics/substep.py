@@ -8,6 +8,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.dynamics.arguments import law_as_arguments
 from symphys.dynamics.articulated.forward_kinematics import FinalPose
 from symphys.dynamics.collision import Contact
 from symphys.dynamics.collision.contact_geometry import Displacement
@@ -108,7 +109,7 @@ def advance(
         moving, force = tuple(trees.motions[i] for i in bodies), x[f"{pair.name}.force"]
         same, lagging = trees.same(bodies), _lagging(context, x, bodies)
         conditions = SubstepFlags(off, plastic, force, same, coupled, near, lagging, x["lag"])
-        constraint = prepare(context.settings, pair.law, contact, moving, duration, conditions)
+        constraint = prepare(context.settings, law_as_arguments(pair.law), contact, moving, duration, conditions)
         constraints.append(trees.placed(bodies, constraint))
     jointed, joints, fitted = joint_constraints(context, x, trees, paths, duration, kick)
 

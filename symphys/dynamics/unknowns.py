@@ -64,12 +64,30 @@ class Linearisation:
     """
 
     softness: Expr
-    centre: float
+    centre: Expr
     blur: Expr
 
     def within(self, distance: Expr, mass: Expr) -> Expr:
         """Return 1 if an impulse is inside a bound by ``distance`` [N s], 0 if beyond it, and between near it."""
         return ramp(distance, ca.sqrt(ca.fmax(mass, 0) + NO_MASS) * self.blur)
+
+
+class ImpulseLaw(Protocol):
+    """The law of a constraint apart from its bodies: the impulse that it gives for what it looks at."""
+
+    def response(self, seen: Expr, old: AnyImpulse) -> AnyImpulse:
+        """Return the accumulated impulse after a projection; ``old``: before it."""
+        ...
+
+    def linearised(self, seen: Expr, old: AnyImpulse, by: Linearisation) -> tuple[Expr, Expr]:
+        """Return a (k,) and B (k, m): the k numbers of its impulse change by a - B d rates.
+
+        Args:
+            seen: what the constraint looks at.
+            old: the accumulated impulse.
+            by: what is common to all constraints.
+        """
+        ...
 
 
 class VelocityConstraint(Protocol):
@@ -84,17 +102,15 @@ class VelocityConstraint(Protocol):
         ...
 
     def rates(self, momenta: AllVelocities) -> Expr:
-        """Return the velocities that the projection looks at (m,)."""
+        """Return the velocities along the constraint (m,)."""
         ...
 
-    def linearised(self, momenta: AllVelocities, old: AnyImpulse, by: Linearisation) -> tuple[Expr, Expr]:
-        """Return a (k,) and B (k, m): the k numbers of its impulse change by a - B d rates.
+    def seen(self, momenta: AllVelocities) -> Expr:
+        """Return what the projection looks at: its rates, or the gap after displacements."""
+        ...
 
-        Args:
-            momenta: of the bodies.
-            old: the accumulated impulse.
-            by: what is common to all constraints.
-        """
+    def alone(self) -> ImpulseLaw:
+        """Return the constraint without its bodies, and without what its law does not need."""
         ...
 
 

@@ -13,6 +13,7 @@ without an impulse gives none.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -60,6 +61,11 @@ class ContactImpulse:
     def count(self) -> int:
         """Return the number of components of load and friction."""
         return 4
+
+    @property
+    def numbers(self) -> Expr:
+        """Return load and friction (4,)."""
+        return ca.vertcat(self.normal, self.tangent)
 
     def like(self, numbers: Expr) -> ContactImpulse:
         """Return an impulse with these numbers: load and friction (4,)."""
@@ -180,22 +186,33 @@ class ContactConstraint:
         linear, angular = impulse.linear(self.impulse_normal), impulse.angular(self.impulse_normal)
         return body_term.apply_impulse(self.terms, momenta, linear, angular, self.same)
 
-    rates = slip
+    rates = seen = slip
 
-    def linearised(self, momenta: tuple[Any, ...], old: ContactImpulse, by: Linearisation) -> tuple[Expr, Expr]:
-        """Return the projections linearised at these momenta, for ``newton_start``."""
-        return linearised(self, self.slip(momenta), old, by)
+    def alone(self) -> ContactConstraint:
+        """Implement ``VelocityConstraint.alone``."""
+        unused = "delay", "leaving", "lasts", "load", "slack", "struck", "paradox", "spin_mass", "roll_mass"
+        nothing: dict[str, Any] = dict.fromkeys(unused, NEVER)
+        return replace(self, law=Law(), terms=(), soft=None, **nothing)
+
+    def linearised(self, seen: Expr, old: ContactImpulse, by: Linearisation) -> tuple[Expr, Expr]:
+        """Implement ``ImpulseLaw.linearised``."""
+        return linearised(self, seen, old, by)
+
+    def response(self, seen: Expr, old: ContactImpulse) -> ContactImpulse:
+        """Implement ``ImpulseLaw.response``: load and friction; torsion and rolling stay as they are."""
+        normal, tangent = (self.near * force for force in _forces(self, seen, old))
+        return ContactImpulse(normal, tangent, old.spin, old.roll)
 
     def project(self, momenta: tuple[Any, ...], old: ContactImpulse) -> tuple[tuple[Any, ...], ContactImpulse]:
         """Project each of its impulses once, one after the other."""
-        zero = ca.SX.zeros(3)
-        normal, tangent = (self.near * force for force in _forces(self, self.slip(momenta), old))
-        momenta = self.apply(momenta, ContactImpulse(normal - old.normal, tangent - old.tangent, ca.SX(0), zero))
+        zero, new = ca.SX.zeros(3), self.response(self.slip(momenta), old)
+        change = ContactImpulse(new.normal - old.normal, new.tangent - old.tangent, ca.SX(0), zero)
+        momenta = self.apply(momenta, change)
         if not self.law.spins:
-            return momenta, ContactImpulse(normal, tangent, old.spin, old.roll)
-        spin, roll = (self.near * torque for torque in _torques(self, momenta, old, normal))
+            return momenta, new
+        spin, roll = (self.near * torque for torque in _torques(self, momenta, old, new.normal))
         momenta = self.apply(momenta, ContactImpulse(ca.SX(0), zero, spin - old.spin, roll - old.roll))
-        return momenta, ContactImpulse(normal, tangent, spin, roll)
+        return momenta, replace(new, spin=spin, roll=roll)
 
 
 def _forces(contact: ContactConstraint, slip: Expr, old: ContactImpulse) -> tuple[Expr, Expr]:

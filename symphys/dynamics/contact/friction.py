@@ -61,7 +61,7 @@ class FrictionStep:
     mass: Expr
     smoothing: Expr
     softness: Expr
-    centre: float
+    centre: Expr
     slope: Slope
 
 

@@ -11,6 +11,8 @@ Each constraint says how its projection answers a change of velocities: d impuls
 matrix M and the responses H to impulses, (M + M H B J) d velocities = M H a: a system as large as the group's
 velocities, however many points there are. A rigid constraint would have an infinite B. With ``COMPLIANCE`` loads that
 are open are those of least sum of squares; the last steps, about the loads that were found, take back what it gave way.
+What a constraint answers is a law without its bodies, and J has only the columns that it depends on. So points on
+different legs share their functions.
 
 Such steps need not converge: bodies may be squeezed between two surfaces, and torsion, rolling and what friction does
 to a coupled contact are left to the sweeps. So each step stays within a reach of energy, and the sweeps begin with the
@@ -37,11 +39,13 @@ from symphys.dynamics.contact.constraint import ContactConstraint
 from symphys.dynamics.context import StepContext
 from symphys.dynamics.joints.assembly import KinematicTrees
 from symphys.dynamics.motion import PredictedMotion, apply
-from symphys.dynamics.tracing.decorator import traced
+from symphys.dynamics.tracing.decorator import contiguous, shared, traced
+from symphys.dynamics.tracing.pytree import TracedMatrix, outline
 from symphys.dynamics.unknowns import (
     COMPLIANCE,
     AnyImpulse,
     GeneralizedVelocities,
+    ImpulseLaw,
     Iterate,
     Linearisation,
     Momentum,
@@ -82,13 +86,13 @@ class Group:
 
 
 @dataclass(frozen=True)
-class ConstraintOperators:
-    """Jacobian and impulse response of a constraint on the N velocities of its bodies.
+class Lever:
+    """Jacobian and impulse response of a constraint.
 
     Attributes:
-        rates: (m, N) J.
-        responses: (N, k) H, to unit impulses.
-        momenta: (N, k) M H.
+        rates: (m, c) J, by the c velocities that it depends on.
+        responses: (n, k) H, of the n velocities of its bodies to unit impulses.
+        momenta: (n, k) M H.
     """
 
     rates: Expr
@@ -98,12 +102,24 @@ class ConstraintOperators:
 
 @dataclass(frozen=True)
 class Member:
-    """A constraint of a group: its number, its carriers among those of the group, each once, and its lever."""
+    """A constraint of a group.
+
+    Attributes:
+        number: among all constraints.
+        placed: the constraint.
+        carriers: of its bodies, each once.
+        law: it, without its bodies.
+        lever: of it.
+        rows, columns: where the velocities of its bodies, and those that it depends on, are among those of the group.
+    """
 
     number: int
     placed: PlacedConstraint
-    own: tuple[int, ...]
-    lever: ConstraintOperators
+    carriers: tuple[int, ...]
+    law: ImpulseLaw
+    lever: Lever
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
 
 
 def open_groups(context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State]) -> list[Group]:
@@ -155,17 +171,20 @@ def solve_together(
         softness: of contacts; see ``contact_softness``.
         centres: of each step 1 if loads of that softness are counted from 0, 0 if from those that were found.
     """
-    # operators of each constraint, residual energy of the start and its trust radius
+    # lever of each constraint, residual energy of the start and its trust radius
     metric = _metric(trees, group.carriers, start.momenta)
     members = [_member(group, number, constraints[number], metric, start) for number in group.constraints]
     own = tuple(start.momenta[i] for i in group.carriers)
-    after = missed = _residual_energy(metric, members, start)
+    seen = [_seen_by(each, start) for each in members]
+    after = missed = _residual_energy(members, seen, start)
     reach = _trust_radius(metric, own, missed, len(members))
     # Newton steps; of two iterates the one of less residual energy is kept, between them a mean
     best = now = start
     for centre in centres:
-        now = _newton_step(group, metric, members, now, Linearisation(softness, centre, _slope_width(after)), reach)
-        after = _residual_energy(metric, members, now)
+        by = contiguous(Linearisation(softness, ca.SX(centre), _slope_width(after)), constants=True)
+        now = _newton_step(metric, members, seen, now, by, reach)
+        seen = [_seen_by(each, now) for each in members]
+        after = _residual_energy(members, seen, now)
         share = _acceptance(after, missed, reach)
         best, missed = _blend(group, share, now, best), _mean(share, after, missed)
     return best
@@ -173,17 +192,41 @@ def solve_together(
 
 def _member(group: Group, number: int, placed: PlacedConstraint, metric: tuple[Expr, ...], start: Iterate) -> Member:
     carriers = tuple(dict.fromkeys(placed.carriers))
-    own = tuple(group.carriers.index(i) for i in carriers)
     sides = tuple(carriers.index(i) for i in placed.carriers)
-    states, masses = tuple(start.momenta[i] for i in carriers), tuple(metric[k] for k in own)
-    lever = _operators(placed.constraint, start.impulses[number], states, sides, masses)
-    return Member(number, placed, own, lever)
+    states = tuple(start.momenta[i] for i in carriers)
+    masses = tuple(metric[group.carriers.index(i)] for i in carriers)
+    rates, responses = _jacobians(placed.constraint, start.impulses[number], states, sides)
+    # where its velocities are among those of the group
+    sizes = [_size(start.momenta[i]) for i in group.carriers]
+    firsts = dict(zip(group.carriers, accumulate(sizes, initial=0), strict=False))
+    rows = tuple(firsts[i] + k for i, state in zip(carriers, states, strict=True) for k in range(_size(state)))
+    used = _columns_of(rates)
+    lever = Lever(_only_columns(rates, used), responses, _momenta(masses, responses))
+    return Member(number, placed, carriers, placed.constraint.alone(), lever, rows, tuple(rows[k] for k in used))
+
+
+def _columns_of(matrix: Expr) -> tuple[int, ...]:
+    """Return the columns of a matrix that have entries."""
+    leaf = matrix.leaf if isinstance(matrix, TracedMatrix) else outline(matrix)
+    if leaf.pattern is None:
+        return tuple(range(leaf.columns))
+    return tuple(sorted({place // leaf.rows for place in leaf.pattern}))
+
+
+@traced
+def _only_columns(matrix: Expr, columns: tuple[int, ...]) -> Expr:
+    return matrix[:, list(columns)]
+
+
+def _seen_by(member: Member, now: Iterate) -> Expr:
+    """Return what a constraint looks at."""
+    return _seen(member.placed.constraint, tuple(now.momenta[i] for i in member.placed.carriers))
 
 
 def _newton_step(
-    group: Group,
     metric: tuple[Expr, ...],
     members: Sequence[Member],
+    seen: Sequence[Expr],
     now: Iterate,
     by: Linearisation,
     reach: Expr,
@@ -191,37 +234,34 @@ def _newton_step(
     """Make a step of Newton's method, shortened so that it stays within ``reach`` [J]."""
     # linear response of each constraint: d impulse = a - B J d velocities
     momenta, impulses = list(now.momenta), list(now.impulses)
-    answers = []
-    for each in members:
-        states = tuple(momenta[i] for i in each.placed.carriers)
-        answers.append(_linear_response(each.placed.constraint, each.lever, states, impulses[each.number], by))
+    answers = [
+        _linear_response(each.law, each.lever, looked, impulses[each.number], by)
+        for each, looked in zip(members, seen, strict=True)
+    ]
     # (M + M H B J) d velocities = M H a
-    changes = _velocity_changes(
-        metric, tuple((each.own, *part[:2]) for each, part in zip(members, answers, strict=True))
-    )
+    parts = ((each.rows, each.columns, *part[:2]) for each, part in zip(members, answers, strict=True))
+    changes = _velocity_changes(metric, tuple(parts))
     given = [
-        _impulse_change(each.lever, a, b, tuple(changes[k] for k in each.own))
+        _impulse_change(each.lever, a, b, _entries(changes, each.columns))
         for each, (_, _, a, b) in zip(members, answers, strict=True)
     ]
     # length of the step
-    share = _share(tuple((each.lever, part) for each, part in zip(members, given, strict=True)), reach)
+    energies = tuple(_energy(each.lever, part) for each, part in zip(members, given, strict=True))
+    share = _share(energies, reach)
     for each, part in zip(members, given, strict=True):
-        carriers = tuple(group.carriers[k] for k in each.own)
-        states = tuple(momenta[i] for i in carriers)
+        states = tuple(momenta[i] for i in each.carriers)
         moved, impulses[each.number] = _advance(each.lever, part, share, states, impulses[each.number])
-        for i, state in zip(carriers, moved, strict=True):
+        for i, state in zip(each.carriers, moved, strict=True):
             momenta[i] = state
     return Iterate(tuple(momenta), tuple(impulses), tuple(impulses))
 
 
-def _residual_energy(metric: tuple[Expr, ...], members: Sequence[Member], now: Iterate) -> Expr:
+def _residual_energy(members: Sequence[Member], seen: Sequence[Expr], now: Iterate) -> Expr:
     """Return twice the energy [J] that a projection of each constraint would change, all from the same velocities."""
-    found = []
-    for each in members:
-        carriers = tuple(dict.fromkeys(each.placed.carriers))
-        sides = tuple(carriers.index(i) for i in each.placed.carriers)
-        states, masses = tuple(now.momenta[i] for i in carriers), tuple(metric[k] for k in each.own)
-        found.append(_constraint_residual(each.placed.constraint, states, sides, now.impulses[each.number], masses))
+    found = (
+        _residual(each.law, each.lever, looked, now.impulses[each.number])
+        for each, looked in zip(members, seen, strict=True)
+    )
     return _sum(tuple(found))
 
 
@@ -267,13 +307,10 @@ def _softness(masses: tuple[Expr, ...]) -> Expr:
 
 
 @traced
-def _operators(
-    constraint: VelocityConstraint,
-    impulse: AnyImpulse,
-    states: States,
-    sides: tuple[int, ...],
-    metric: tuple[Expr, ...],
-) -> ConstraintOperators:
+def _jacobians(
+    constraint: VelocityConstraint, impulse: AnyImpulse, states: States, sides: tuple[int, ...]
+) -> tuple[Expr, Expr]:
+    """Return J (m, n) and H (n, k) of a constraint."""
     sizes = [_size(state) for state in states]
     velocities = ca.SX.sym("v", sum(sizes))
     cut = _split_states(velocities, states)
@@ -283,7 +320,12 @@ def _operators(
     after = constraint.apply(tuple(at_rest[k] for k in sides), impulse.like(numbers))
     by_carrier = dict(zip(sides, after, strict=True))
     responses = ca.jacobian(ca.vertcat(*(_flatten(by_carrier[k]) for k in range(len(states)))), numbers)
-    return ConstraintOperators(rates, responses, ca.mtimes(ca.diagcat(*metric), responses))
+    return rates, responses
+
+
+@shared
+def _momenta(metric: tuple[Expr, ...], responses: Expr) -> Expr:
+    return ca.mtimes(ca.diagcat(*metric), responses)
 
 
 def _split_states(velocities: Expr, states: States) -> list[State]:
@@ -308,76 +350,82 @@ def _flatten(state: State) -> Expr:
     return ca.vertcat(state.linear if isinstance(state, Displacement) else state.velocity, state.angular)
 
 
-@traced
+@shared
+def _seen(constraint: VelocityConstraint, states: States) -> Expr:
+    return constraint.seen(states)
+
+
+@shared
 def _linear_response(
-    constraint: VelocityConstraint, lever: ConstraintOperators, momenta: States, old: AnyImpulse, by: Linearisation
+    law: ImpulseLaw, lever: Lever, seen: Expr, old: AnyImpulse, by: Linearisation
 ) -> tuple[Expr, Expr, Expr, Expr]:
     """Return M H B J, M H a, a and B."""
-    a, b = constraint.linearised(momenta, old, by)
+    a, b = law.linearised(seen, old, by)
     return ca.mtimes(ca.mtimes(lever.momenta, b), lever.rates), ca.mtimes(lever.momenta, a), a, b
 
 
 @traced
 def _velocity_changes(
-    metric: tuple[Expr, ...], parts: tuple[tuple[tuple[int, ...], Expr, Expr], ...]
-) -> tuple[Expr, ...]:
-    """Return the changes of the velocities of each carrier."""
+    metric: tuple[Expr, ...], parts: tuple[tuple[tuple[int, ...], tuple[int, ...], Expr, Expr], ...]
+) -> Expr:
+    """Return the changes of the velocities of a group, of one carrier after the other."""
     # matrix and right hand side of the group
-    sizes = [each.shape[0] for each in metric]
-    starts = [0, *accumulate(sizes)]
     matrix: Expr = ca.diagcat(*metric)
-    right: Expr = ca.SX(starts[-1], 1)
-    for own, block, load in parts:
-        places = [j for k in own for j in range(starts[k], starts[k + 1])]
-        matrix[places, places] += block
-        right[places] += load
+    n = matrix.size1()
+    right: Expr = ca.SX(n, 1)
+    for rows, columns, block, load in parts:
+        matrix[list(rows), list(columns)] += block
+        right[list(rows)] += load
     # sparse elimination
-    n = starts[-1]
-    rows = [{j: matrix[i, j] for j in range(n) if matrix.has_nz(i, j)} for i in range(n)]
-    solved = factorise(rows).solve({i: right[i] for i in range(n)})
-    return tuple(ca.vertcat(*(solved[i] for i in range(starts[k], starts[k + 1]))) for k in range(len(sizes)))
+    solved = factorise([{j: matrix[i, j] for j in range(n) if matrix.has_nz(i, j)} for i in range(n)])
+    found = solved.solve({i: right[i] for i in range(n)})
+    return ca.vertcat(*(found[i] for i in range(n)))
 
 
 @traced
-def _impulse_change(lever: ConstraintOperators, a: Expr, b: Expr, changes: tuple[Expr, ...]) -> Expr:
+def _entries(column: Expr, places: tuple[int, ...]) -> Expr:
+    return column[list(places)]
+
+
+@shared
+def _impulse_change(lever: Lever, a: Expr, b: Expr, changes: Expr) -> Expr:
     """Return the change of an impulse (k,)."""
-    return a - ca.mtimes(b, ca.mtimes(lever.rates, ca.vertcat(*changes)))
+    return a - ca.mtimes(b, ca.mtimes(lever.rates, changes))
 
 
 @traced
 def _trust_radius(metric: tuple[Expr, ...], states: States, missed: Expr, count: int) -> Expr:
     """Return the energy [J] that bounds a step, from that of the velocities and the sum of those of all projections."""
-    return MAX_ENERGY_RATIO * (_energy(metric, ca.vertcat(*map(_flatten, states))) + count * missed) + MIN_ENERGY
+    velocities = ca.vertcat(*map(_flatten, states))
+    energy = ca.fmax(ca.dot(velocities, ca.mtimes(ca.diagcat(*metric), velocities)), 0)
+    return MAX_ENERGY_RATIO * (energy + count * missed) + MIN_ENERGY
+
+
+@shared
+def _energy(lever: Lever, given: Expr) -> Expr:
+    return _energy_of(lever, given)
+
+
+def _energy_of(lever: Lever, given: Expr) -> Expr:
+    """Return twice the energy [J] that an impulse (k,) alone brings; rounding does not make it negative."""
+    return ca.fmax(ca.dot(ca.mtimes(lever.responses, given), ca.mtimes(lever.momenta, given)), 0)
 
 
 @traced
-def _share(parts: tuple[tuple[ConstraintOperators, Expr], ...], reach: Expr) -> Expr:
+def _share(energies: tuple[Expr, ...], reach: Expr) -> Expr:
     """Return the length of a step, at most 1, for which each constraint's own change stays bounded."""
-    energies = (ca.dot(ca.mtimes(lever.responses, x), ca.mtimes(lever.momenta, x)) for lever, x in parts)
     return ca.sqrt(reach / ca.fmax(reach, sum(energies)))
 
 
-@traced
-def _advance(
-    lever: ConstraintOperators, given: Expr, share: Expr, momenta: States, old: AnyImpulse
-) -> tuple[States, AnyImpulse]:
+@shared
+def _advance(lever: Lever, given: Expr, share: Expr, momenta: States, old: AnyImpulse) -> tuple[States, AnyImpulse]:
     after = ca.vertcat(*map(_flatten, momenta)) + share * ca.mtimes(lever.responses, given)
     return tuple(_split_states(after, momenta)), old.plus(old.like(share * given))
 
 
-@traced
-def _constraint_residual(
-    constraint: VelocityConstraint, states: States, sides: tuple[int, ...], old: AnyImpulse, metric: tuple[Expr, ...]
-) -> Expr:
-    after, _ = constraint.project(tuple(states[k] for k in sides), old)
-    by_carrier = dict(zip(sides, after, strict=True))
-    change = ca.vertcat(*(_flatten(by_carrier[k]) - _flatten(state) for k, state in enumerate(states)))
-    return _energy(metric, change)
-
-
-def _energy(metric: tuple[Expr, ...], velocities: Expr) -> Expr:
-    """Return twice the kinetic energy [J], which rounding does not make negative."""
-    return ca.fmax(ca.dot(velocities, ca.mtimes(ca.diagcat(*metric), velocities)), 0)
+@shared
+def _residual(law: ImpulseLaw, lever: Lever, seen: Expr, old: AnyImpulse) -> Expr:
+    return _energy_of(lever, law.response(seen, old).numbers - old.numbers)
 
 
 @traced
@@ -407,6 +455,6 @@ def _mean_state(share: Expr, now: State, best: State) -> State:
     return _split_states(_mean(share, _flatten(now), _flatten(best)), (best,))[0]
 
 
-@traced
+@shared
 def _mean_impulse(share: Expr, now: AnyImpulse, best: AnyImpulse) -> AnyImpulse:
     return now.plus(best.minus(now).times(1 - share))

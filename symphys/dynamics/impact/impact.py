@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
+from symphys.dynamics.arguments import law_as_arguments
 from symphys.dynamics.collision import Contact
 from symphys.dynamics.contact.body_term import Motions, at_touch, body_terms
 from symphys.dynamics.contact.constraint import INACTIVE_NORMAL_SPEED, ZERO_IMPULSE, ContactConstraint, ContactImpulse
@@ -146,7 +147,7 @@ def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
     ):
         bodies = bodies_of(pair)
         moving = tuple(trees.motions[i] for i in bodies)
-        arguments = pair.law, contact, moving, struck, split.impact, trees.same(bodies), coupled, near
+        arguments = law_as_arguments(pair.law), contact, moving, struck, split.impact, trees.same(bodies), coupled, near
         constraints.append(trees.placed(bodies, _constraint(context.settings, *arguments)))
     # sweeps over contacts and the locks of loops, with restitution that adds no energy (23)
     locks = locks_at(context, trees)

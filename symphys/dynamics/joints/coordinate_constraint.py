@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 
 from symphys.dynamics.contact.body_term import BodyTerm
-from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
+from symphys.dynamics.joints.joint_impulse import NO_DIRECTIONS, Directions, JointImpulse, apply_impulse, speeds
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import COMPLIANCE, GeneralizedVelocities, Linearisation
 from symphys.maths.smoothing import at_least, at_most, positive_slope
@@ -98,11 +98,22 @@ class CoordinateConstraint:
         new, change = self.answer(self.rate(momenta), old.numbers)
         return self.apply(momenta, JointImpulse(change)), JointImpulse(new)
 
-    rates = rate
+    rates = seen = rate
 
-    def linearised(self, momenta: tuple[Any, ...], old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
-        """Return a (1,) and B (1, 1); see ``newton_start``."""
-        wanted = self.keep * old.numbers - self.offset - self.slope * self.rate(momenta)
+    def alone(self) -> CoordinateConstraint:
+        """Implement ``VelocityConstraint.alone``."""
+        return CoordinateConstraint(
+            *((), NO_DIRECTIONS, NO_DIRECTIONS, self.keep, self.slope, self.offset, self.low, self.high, self.width),
+            *(self.same, None, None, ca.SX(0), ca.SX(0)),
+        )
+
+    def response(self, seen: Expr, old: JointImpulse) -> JointImpulse:
+        """Implement ``ImpulseLaw.response``."""
+        return JointImpulse(self.answer(seen, old.numbers)[0])
+
+    def linearised(self, seen: Expr, old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
+        """Implement ``ImpulseLaw.linearised``: a (1,) and B (1, 1)."""
+        wanted = self.keep * old.numbers - self.offset - self.slope * seen
         new, follows = self.bounded(wanted), self._follows(wanted, by)
         gives = 1 - follows * self.keep + COMPLIANCE
         return (

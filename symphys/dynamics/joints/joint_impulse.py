@@ -71,6 +71,10 @@ class Directions:
         return linear, angular if self.leads is None else angular + ca.mtimes(self.leads.T, numbers[:m, 0])
 
 
+NO_DIRECTIONS = Directions(None, ca.SX(0, 3))
+"""Stand for directions where only the law of a constraint counts."""
+
+
 def speeds(terms: tuple[BodyTerm, ...], directions: Directions, momenta: tuple[Any, ...]) -> Expr:
     """Return how fast the first body moves against the second along the directions (n,)."""
     linear, angular = ca.SX.zeros(3), ca.SX.zeros(3)

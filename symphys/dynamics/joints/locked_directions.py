@@ -8,7 +8,7 @@ import casadi as ca
 
 from symphys.dynamics.articulated.factorisation import factorise
 from symphys.dynamics.contact.body_term import BodyTerm
-from symphys.dynamics.joints.joint_impulse import Directions, JointImpulse, apply_impulse, speeds
+from symphys.dynamics.joints.joint_impulse import NO_DIRECTIONS, Directions, JointImpulse, apply_impulse, speeds
 from symphys.dynamics.unknowns import COMPLIANCE, Linearisation
 from symphys.records import dataclass
 from symphys.types import Expr
@@ -76,18 +76,31 @@ class LockConstraint:
 
     def project(self, momenta: tuple[Any, ...], old: JointImpulse) -> tuple[tuple[Any, ...], JointImpulse]:
         """Implement ``VelocityConstraint.project``."""
-        miss = speeds(self.terms, self.velocity_directions, momenta) - self.target + self.softness * old.numbers
-        change = JointImpulse(-ca.mtimes(self.mass, miss))
+        change = self._change(self.rates(momenta), old)
         return self.apply(momenta, change), old.plus(change)
+
+    def _change(self, rates: Expr, old: JointImpulse) -> JointImpulse:
+        return JointImpulse(-ca.mtimes(self.mass, rates - self.target + self.softness * old.numbers))
 
     def rates(self, momenta: tuple[Any, ...]) -> Expr:
         """Return the velocities along the directions (n,)."""
         return speeds(self.terms, self.velocity_directions, momenta)
 
-    def linearised(self, momenta: tuple[Any, ...], old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
-        """Return the impulse change a (n,) and its slope B (n, n) by the velocities; see ``newton_start``."""
+    seen = rates
+
+    def alone(self) -> LockConstraint:
+        """Implement ``VelocityConstraint.alone``."""
+        numbers = self.mass, self.softness, self.target, ca.SX(0), ca.SX(0)
+        return LockConstraint((), NO_DIRECTIONS, NO_DIRECTIONS, *numbers, self.same)
+
+    def response(self, seen: Expr, old: JointImpulse) -> JointImpulse:
+        """Implement ``ImpulseLaw.response``."""
+        return old.plus(self._change(seen, old))
+
+    def linearised(self, seen: Expr, old: JointImpulse, by: Linearisation) -> tuple[Expr, Expr]:
+        """Implement ``ImpulseLaw.linearised``: a (n,) and B (n, n)."""
         soft = COMPLIANCE / ca.diag(self.mass)
-        miss = self.rates(momenta) - self.target + (self.softness + by.centre * soft) * old.numbers
+        miss = seen - self.target + (self.softness + by.centre * soft) * old.numbers
         stiff = ca.diag(1 / (self.softness + soft))
         return -ca.mtimes(stiff, miss), stiff
 

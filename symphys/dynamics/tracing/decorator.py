@@ -8,11 +8,13 @@ depend on its arguments alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import wraps
 from typing import Any, ParamSpec, Protocol, TypeVar
+
+import casadi as ca
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -30,11 +32,15 @@ class Tracing(Protocol):
         """Call ``function(*arguments, **named)``."""
         ...
 
+    def share(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Return the arguments of a ``shared`` function, placed so that few functions are needed."""
+        ...
+
     def section(self, word: Any) -> None:
         """Allow all calls that depend on ``word`` to be jumped over together."""
         ...
 
-    def contiguous(self, tree: T) -> T:
+    def contiguous(self, tree: T, constants: bool = False) -> T:
         """Store a tree contiguously."""
         ...
 
@@ -67,6 +73,22 @@ def traced(function: Callable[P, T]) -> Callable[P, T]:
     return call
 
 
+def shared(function: Callable[P, T]) -> Callable[P, T]:
+    """Return a traced function that is long and called with arguments that lie in many ways.
+
+    Where copies of the arguments let calls share one function, a recorder copies them.
+    """
+
+    @wraps(function)
+    def call(*arguments: P.args, **named: P.kwargs) -> T:
+        tracer = _TRACER.get()
+        if tracer is None:
+            return function(*arguments, **named)
+        return tracer.call(function, tracer.share(function, arguments), named)
+
+    return call
+
+
 def guard(word: T) -> T:
     """Mark a predicate, 0 or 1: a kernel skips calls that have no effect where it is 0.
 
@@ -86,10 +108,26 @@ def section(word: T) -> T:
     return word
 
 
-def contiguous(tree: T) -> T:
+def contiguous(tree: T, constants: bool = False) -> T:
     """Return the tree, stored contiguously between calls so that it can substitute results of a call."""
     tracer = _TRACER.get()
-    return tree if tracer is None else tracer.contiguous(tree)
+    return tree if tracer is None else tracer.contiguous(tree, constants)
+
+
+def as_arguments(values: Any) -> Any:
+    """Return numbers, and tuples and dicts of them, as arguments: calls that differ in them share a function.
+
+    Zeros and ones stay constants, which cost nothing.
+    """
+    return values if _TRACER.get() is None else contiguous(_symbolic(values), True)
+
+
+def _symbolic(values: Any) -> Any:
+    if isinstance(values, Mapping):
+        return {name: _symbolic(value) for name, value in values.items()}
+    if isinstance(values, tuple):
+        return tuple(map(_symbolic, values))
+    return ca.SX(values) if isinstance(values, int | float) and values not in (0, 1) else values
 
 
 def repeat(count: int, once: Callable[[C, T], T], context: C, state: T) -> T:

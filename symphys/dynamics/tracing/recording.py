@@ -9,12 +9,11 @@ results that none uses.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import count
 from typing import Any, NamedTuple, TypeVar
 
 import casadi as ca
 
-from symphys.dynamics.tracing.pytree import TracedMatrix, flatten, outline, slots_of, unflatten
+from symphys.dynamics.tracing.pytree import TracedMatrix, flatten, outline, unflatten
 from symphys.dynamics.tracing.trace import Tracer
 from symphys.types import Expr
 
@@ -45,6 +44,10 @@ class TracedCall(NamedTuple):
     section: Any = None
 
 
+MAX_ALIKE_FUNCTIONS = 2
+"""Functions for calls of a shared one that differ in no more than where their arguments lie; others take copies."""
+
+
 class Recorder(Tracer):
     """Records the calls of a step."""
 
@@ -57,6 +60,9 @@ class Recorder(Tracer):
         self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
         self._outputs: dict[int, tuple[ca.Function, tuple[int, ...]]] = {}
+        self._met: dict[Callable[..., Any], set[int]] = {}
+        self._alike_calls: dict[Any, set[int]] = {}
+        self._copies: dict[int, tuple[Any, Any]] = {}
         self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
 
     def argument(self, name: str, symbols: Expr) -> None:
@@ -75,30 +81,40 @@ class Recorder(Tracer):
         if not isinstance(code, float):
             self.sections.append((self._slots[code[0]], code[1]))
 
-    def contiguous(self, tree: T) -> T:
-        """Return the tree with each of its parts in a slot of its own."""
+    def share(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Implement ``Tracer.share``."""
+        number, _ = self._structures.of(arguments)
+        met = self._met.setdefault(function, set())
+        if number in met:
+            return arguments
         leaves: list[Expr] = []
-        shape = flatten(tree, leaves)
-        columns: dict[int, list[tuple[int, int]]] = {}
-        codes = [leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf) for leaf in leaves]
-        for slot, each in zip(slots_of(shape), codes, strict=True):
-            columns.setdefault(slot, []).extend(code for code in each if not isinstance(code, float))
-        used: dict[int, int] = {}
-        for column in columns.values():
-            for number, _ in column:
-                used.setdefault(number, len(used))
-        symbols = [ca.SX.sym("a", self._sizes[k]) for k in used]
-        results = [ca.vertcat(*(symbols[used[k]][j] for k, j in column)) for column in columns.values() if column]
-        new = iter(
-            self._apply(self._cache.shared(ca.Function("piece", symbols, results)), list(used)) if results else ()
-        )
-        taken = {slot: (next(new), count()) for slot, column in columns.items() if column}
-        found = []
-        for slot, leaf, each in zip(slots_of(shape), leaves, codes, strict=True):
-            moved = [c if isinstance(c, float) else (taken[slot][0], next(taken[slot][1])) for c in each]
-            found.append(TracedMatrix(leaf.leaf if isinstance(leaf, TracedMatrix) else outline(leaf), tuple(moved)))
-        together: T = unflatten(shape, iter(found))
-        return together
+        shape = flatten(arguments, leaves)
+        constants = tuple(tuple(c if isinstance(c, float) else None for c in self._codes_of(leaf)) for leaf in leaves)
+        alike = self._alike_calls.setdefault((function, shape, constants), set())
+        if len(alike) >= MAX_ALIKE_FUNCTIONS:
+            return tuple(map(self._gathered, arguments))
+        met.add(number)
+        alike.add(number)
+        return arguments
+
+    def _gathered(self, tree: Any) -> Any:
+        """Return a tree whose parts fill slots of their own, copied once unless it lies so."""
+        if type(tree) is tuple:
+            return tuple(map(self._gathered, tree))
+        known = self._copies.get(id(tree))
+        if known is None:
+            known = self._copies[id(tree)] = tree, tree if self._fills_slots(tree) else self.contiguous(tree)
+        return known[1]
+
+    def _fills_slots(self, tree: Any) -> bool:
+        """Whether each part of a tree fills a slot of its own."""
+        slots = set[int]()
+        columns: Any = self._laid_out(tree).columns(constants=False).values()
+        for slot, column in ((column[0][0], column) for column in columns if column):
+            if slot in slots or column != [(slot, k) for k in range(self._sizes[slot])]:
+                return False
+            slots.add(slot)
+        return True
 
     def give(self, name: str, values: Sequence[Expr]) -> TracedVector:
         """Record a call that puts values side by side."""

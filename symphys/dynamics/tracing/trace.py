@@ -22,7 +22,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from typing import Any, TypeVar
+from itertools import count, repeat
+from typing import Any, NamedTuple, TypeVar
 
 import casadi as ca
 
@@ -239,6 +240,20 @@ def _trace_cache() -> TraceCache:
     return _CACHE
 
 
+class _LaidOut(NamedTuple):
+    """A tree: its shape, and the part, the outline and the codes of each of its matrices."""
+
+    shape: Any
+    matrices: list[tuple[int, Leaf, tuple[Code, ...]]]
+
+    def columns(self, constants: bool) -> dict[int, list[Code]]:
+        """Return the codes of each part, without ``constants`` unless they are asked for."""
+        found: dict[int, list[Code]] = {}
+        for part, _, codes in self.matrices:
+            found.setdefault(part, []).extend(code for code in codes if constants or not isinstance(code, float))
+        return found
+
+
 class Tracer(ABC):
     """Calls traced functions; see ``decorator``."""
 
@@ -269,9 +284,46 @@ class Tracer(ABC):
         """Ignore a predicate; only a recorder makes sections."""
         del word
 
-    def contiguous(self, tree: T) -> T:
-        """Return the tree unchanged."""
-        return tree
+    def share(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+        """Return the arguments unchanged; only a recorder copies any."""
+        del function
+        return arguments
+
+    def _codes_of(self, leaf: Expr) -> tuple[Code, ...]:
+        return leaf.codes if isinstance(leaf, TracedMatrix) else self._codes(leaf)
+
+    def _laid_out(self, tree: Any) -> _LaidOut:
+        leaves: list[Expr] = []
+        shape = flatten(tree, leaves)
+        matrices = [
+            (part, leaf.leaf if isinstance(leaf, TracedMatrix) else outline(leaf), self._codes_of(leaf))
+            for part, leaf in zip(slots_of(shape), leaves, strict=True)
+        ]
+        return _LaidOut(shape, matrices)
+
+    def contiguous(self, tree: T, constants: bool = False) -> T:
+        """Return the tree with each of its parts in a slot of its own; ``constants``: these too."""
+        laid_out = self._laid_out(tree)
+        columns = {part: column for part, column in laid_out.columns(constants).items() if column}
+        if not columns:
+            return tree
+        used: dict[int, int] = {}
+        for code in (code for column in columns.values() for code in column):
+            if not isinstance(code, float):
+                used.setdefault(code[0], len(used))
+        symbols = [ca.SX.sym("a", self._sizes[slot]) for slot in used]
+        results = [
+            ca.vertcat(*(ca.SX(c) if isinstance(c, float) else symbols[used[c[0]]][c[1]] for c in column))
+            for column in columns.values()
+        ]
+        new = self._apply(self._cache.shared(ca.Function("piece", symbols, results)), list(used))
+        places = {part: zip(repeat(slot), count(), strict=False) for part, slot in zip(columns, new, strict=True)}
+        found = []
+        for part, leaf, codes in laid_out.matrices:
+            moved = (c if isinstance(c, float) and not constants else next(places[part]) for c in codes)
+            found.append(TracedMatrix(leaf, tuple(moved)))
+        together: T = unflatten(laid_out.shape, iter(found))
+        return together
 
     @abstractmethod
     def _apply(self, function: ca.Function, slots: Sequence[int]) -> Sequence[int]:
@@ -387,6 +439,10 @@ def _argument(symbols: Sequence[Expr], entries: Sequence[Sequence[Expr]], leaf: 
 
 class InlineTracer(Tracer):
     """All calls in one expression."""
+
+    def contiguous(self, tree: T, constants: bool = False) -> T:
+        """Return the tree, with its constants as results of a call: their arithmetic is that of a recorder's calls."""
+        return super().contiguous(tree, True) if constants else tree
 
     def _adopt(self, column: Expr) -> None:
         self.take(column)

@@ -10,8 +10,14 @@ import pytest
 from tools.repeats import first, thorough
 
 from symphys.dynamics.functions import TracedStep, step_function, trace_step
-from symphys.dynamics.tracing.decorator import repeat, traced, tracing
-from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector, without_dead_code
+from symphys.dynamics.tracing.decorator import repeat, shared, traced, tracing
+from symphys.dynamics.tracing.recording import (
+    MAX_ALIKE_FUNCTIONS,
+    Recorder,
+    TracedCall,
+    TracedVector,
+    without_dead_code,
+)
 from symphys.maths.verbatim import verbatim
 from symphys.model.shapes import Box, Capsule, Fixture, Plane, Sphere, Terrain
 from symphys.model.state_layout import Layout, initial_state
@@ -105,6 +111,36 @@ def test_equal_parts_share_their_functions() -> None:
 
     assert distinct(11, 10) == distinct(2, 10) == distinct(2, 40)
     assert distinct(30, 10) == distinct(20, 10)  # with so many pairs there is a broad phase
+
+
+def test_feet_at_other_places_share_their_functions() -> None:
+    """Feet of one body differ in where they are and how large, not in what is computed."""
+
+    def operations(count: int) -> int:
+        feet = tuple(Sphere(0.01 + 0.001 * k, (0.1 + 0.01 * k, 0.2 - 0.03 * k, -0.1 - 0.001 * k)) for k in range(count))
+        world = make_world([Body("a", 1.0, (0.02, 0.03, 0.04), feet)], [Plane.ground()], Law(0.5))
+        pieces = {piece.function.__hash__(): piece.function for piece in trace_step(world, Scheme(sweeps=4)).calls}
+        return sum(function.n_instructions() for function in pieces.values())
+
+    assert operations(8) < 1.08 * operations(6)  # what is left takes sums over all of them
+
+
+def test_a_shared_function_takes_copies_where_its_arguments_lie_in_many_ways() -> None:
+    recorder, columns = Recorder(), [ca.SX.sym("x", size) for size in range(3, 9)]
+    for k, column in enumerate(columns):
+        recorder.argument(f"x{k}", column)
+
+    @shared
+    def product(a: ca.SX, b: ca.SX) -> ca.SX:
+        return a * b
+
+    with tracing(recorder):
+        for column in columns:
+            product(column[0], column[2])
+    pieces = [call.function for call in recorder.calls]
+    multiplying = [piece for piece in pieces if ca.OP_MUL in map(piece.instruction_id, range(piece.n_instructions()))]
+    assert len(multiplying) == len(columns)
+    assert len({piece.__hash__() for piece in multiplying}) == MAX_ALIKE_FUNCTIONS + 1  # one takes copies
 
 
 def test_equal_parts_share_a_function_and_numbers_in_passing_are_no_part_of_it() -> None:
