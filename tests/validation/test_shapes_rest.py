@@ -150,3 +150,36 @@ def test_five_boxes_stand(sweeps: int, masses: list[float], gap: float) -> None:
     error, velocity = tower(tower_lab(5, sweeps), masses, gap, 10.0)
     assert error < 1e-7
     assert velocity < STILL
+
+
+PEDESTAL = Fixture("pedestal", Box((0.5, 0.5, 0.2), (0, 0, -0.2)))
+TABLE = Fixture("table", Box((2.0, 2.0, 0.2), (-2.0, 0, -0.2)))
+PLANK, BEAM = block("b", (0.8, 0.08, 0.06)), Fixture("beam", Box((1.0, 0.06, 0.1), (0, 0, -0.1)))
+
+
+def put_down(body: Body, ground: Static, x: float, yaw: float) -> dict[str, Any]:
+    """The states of 0.6 s of a box that is put down turned."""
+    height = body.shapes[0].half_sizes[2]  # type: ignore[union-attr]
+    start = {"b.position": [x, 0, height], "b.orientation": turned_by([0, 0, 1], yaw)}
+    return Lab(make_world([body], [ground], Law(0.5)), Scheme()).states(start, 0.6)
+
+
+@pytest.mark.parametrize(
+    ("body", "ground", "yaw"),
+    [
+        (BODIES["cube"][0], PEDESTAL, 0.6),  # the faces share an octagon
+        pytest.param(PLANK, BEAM, 0.35, marks=pytest.mark.slow),  # a long parallelogram
+        pytest.param(BODIES["cube"][0], PEDESTAL, np.pi / 4, marks=pytest.mark.slow),
+    ],
+)
+def test_four_points_carry_what_faces_of_many_corners_share(body: Body, ground: Static, yaw: float) -> None:
+    states = put_down(body, ground, 0.0, yaw)
+    assert max(drift(states, "b")) < 1e-6
+    assert unrest(states, "b") < 1e-12
+
+
+@pytest.mark.parametrize(("beyond", "falls"), [(-0.001, False), (0.001, True)])
+def test_a_turned_box_falls_when_its_middle_is_past_an_edge(beyond: float, falls: bool) -> None:
+    """It hangs over an edge with one corner: the region that carries it has five."""
+    _, turned = drift(put_down(BODIES["cube"][0], TABLE, beyond, 0.4), "b")
+    assert (turned > 0.1) == falls

@@ -384,7 +384,7 @@ def _velocity_changes(
 
 @traced
 def _entries(column: Expr, places: tuple[int, ...]) -> Expr:
-    return column[list(places)]
+    return column[list(places), 0]
 
 
 @shared

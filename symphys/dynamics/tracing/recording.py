@@ -60,7 +60,7 @@ class Recorder(Tracer):
         self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
         self._outputs: dict[int, tuple[ca.Function, tuple[int, ...]]] = {}
-        self._met: dict[Callable[..., Any], set[int]] = {}
+        self._copied: dict[tuple[Callable[..., Any], int], bool] = {}
         self._alike_calls: dict[Any, set[int]] = {}
         self._copies: dict[int, tuple[Any, Any]] = {}
         self._given: dict[tuple[int, tuple[int, ...]], Sequence[int]] = {}
@@ -84,18 +84,21 @@ class Recorder(Tracer):
     def share(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, ...]:
         """Implement ``Tracer.share``."""
         number, _ = self._structures.of(arguments)
-        met = self._met.setdefault(function, set())
-        if number in met:
-            return arguments
+        copied = self._copied.get((function, number))
+        if copied is None:
+            copied = self._copied[function, number] = self._lies_anew(function, number, arguments)
+        return tuple(map(self._gathered, arguments)) if copied else arguments
+
+    def _lies_anew(self, function: Callable[..., Any], number: int, arguments: tuple[Any, ...]) -> bool:
+        """Whether there were enough calls that differ from this one in no more than where their arguments lie."""
         leaves: list[Expr] = []
         shape = flatten(arguments, leaves)
         constants = tuple(tuple(c if isinstance(c, float) else None for c in self._codes_of(leaf)) for leaf in leaves)
         alike = self._alike_calls.setdefault((function, shape, constants), set())
         if len(alike) >= MAX_ALIKE_FUNCTIONS:
-            return tuple(map(self._gathered, arguments))
-        met.add(number)
+            return True
         alike.add(number)
-        return arguments
+        return False
 
     def _gathered(self, tree: Any) -> Any:
         """Return a tree whose parts fill slots of their own, copied once unless it lies so."""

@@ -17,6 +17,7 @@ import numpy as np
 from symphys.importing.tables.pose import at_start
 from symphys.importing.tables.reading import ModelReading, numbers
 from symphys.importing.tables.shapes import Shapes
+from symphys.model.shapes import SURFACES, points_of_kinds
 from symphys.model.world import COMBINE, mujoco_tangent
 from symphys.types import Array
 
@@ -30,13 +31,6 @@ Tables = Mapping[str, dict[str, Any]]
 Statement = tuple[tuple[str, Any], ...]
 """The keys of a [[pair]] table; empty where none is needed."""
 NO_CONTACT: Statement = (("collide", False),)
-POINT_COUNTS = {
-    "sphere": {"sphere": 1, "box": 1, "capsule": 1, "cylinder": 1, "ellipsoid": 1, "convex": 1},
-    "box": {"box": 16, "capsule": 8},
-    "capsule": {"capsule": 5, "cylinder": 3, "ellipsoid": 3},
-    "plane": {"sphere": 1, "box": 8, "capsule": 2, "cylinder": 6, "ellipsoid": 1, "convex": 8},
-}
-"""Number of points in which two shapes may touch; terrain is like a plane. Other pairs have no rule."""
 MAX_POINTS = 2000
 """Points of contact that a world may have."""
 MAX_START_OVERLAP = 5e-4
@@ -244,7 +238,7 @@ def kinds_of(table: Mapping[str, Any]) -> Counter[str]:
 
 def contact_points(one: str, other: str) -> int:
     """Return the number of contact points of two kinds of surfaces; 0: no rule covers them."""
-    return POINT_COUNTS.get(one, {}).get(other, 0) or POINT_COUNTS.get(other, {}).get(one, 0)
+    return points_of_kinds(SURFACES[one], SURFACES[other])
 
 
 def few_enough(

@@ -34,7 +34,7 @@ class Box(SolidShape):
     optional_keys: ClassVar[tuple[SizeKey, ...]] = (
         SizeKey("edge", "radius of its edges where it touches planes and terrain [m]; 0: sharp"),
     )
-    contact_points: ClassVar[Mapping[str, int]] = {"plane": 8, "terrain": 8, "box": 16}
+    contact_points: ClassVar[Mapping[str, int]] = {"plane": 8, "terrain": 8, "box": 4}
 
     half_sizes: tuple[Scalar, ...]
     centre: tuple[Scalar, ...] = (0.0, 0.0, 0.0)

@@ -6,6 +6,10 @@ edges of the one cross edges of the other: the corners of the region that both f
 boxes are expected to meet, or at the end of the step. A box that slides over the seam of two boards meets their tops
 alone (``box_geometry.first_overlap``).
 
+The region has eight corners at most, and four where faces along each other lie on each other. Four points carry what
+they carry: the deepest, the one farthest from it, the one farthest from the line through both, and the one farthest
+outside these three. If the region has more corners a box may lean over one that is left out by what its height makes.
+
 What it cannot do: two pairs of faces that meet in the same step; boxes that have sunk into each other deeper than
 about half of the thinner one may be pushed out at another side. Where edges cross, the point of contact stays where it
 was on both bodies for the rest of the step.
@@ -14,6 +18,7 @@ was on both bodies for the rest of the step.
 from __future__ import annotations
 
 from dataclasses import replace
+from math import cos, sin
 
 import casadi as ca
 
@@ -25,7 +30,7 @@ from symphys.dynamics.collision.box_geometry import (
     moving_box,
     nearest_face,
 )
-from symphys.dynamics.collision.contact_geometry import Contact, flipped
+from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.witness_points import Witness, contact_of
 from symphys.model.shapes import Box
@@ -36,6 +41,16 @@ RIM_SHARE = 0.001
 """Share of a face's size by which a corner may lie beyond its rim and count as a point of the rim. So no candidate
 appears or disappears as boxes that lie flush creep by rounding; it is given up only where others have long been at the
 same place."""
+MIN_SPREAD = 1e-4
+"""Share of the boxes' size by which points lie apart, and off the line of two others, to count beside them."""
+TILT = 0.01
+"""[rad] how much deeper by distance a point has to be to come first."""
+OUTERMOST = cos(0.9), sin(0.9)
+"""Direction along a face in which the first of equally deep points lies; along none that faces often have."""
+FAVOUR = 0.999
+"""Factor on distances at one side of a line, so that of two that are equal rounding does not choose."""
+FAR = 1e3
+"""Times the boxes' size: more than any distance."""
 MIN_EDGE_CHANGE = 1e-9
 """[m] an edge that changes less than this across a strip counts as parallel to it."""
 
@@ -74,21 +89,96 @@ def approach_of(near: BoxOverlap, bodies: tuple[PredictedPath, PredictedPath], s
     return BoxApproach(bodies, near.direction, near.time, near.apart, ca.fmax(near.distance, 0) + size)
 
 
+@dataclass(frozen=True)
+class FacePoint:
+    """A corner of the region that two faces cover.
+
+    Attributes:
+        points: paths of the points on both boxes.
+        normal: path of the direction across it, from the second box to the first.
+        on: 1 if there is such a corner.
+    """
+
+    points: tuple[Parabola, Parabola]
+    normal: Parabola
+    on: Expr
+
+    def flipped(self) -> FacePoint:
+        """Return the corner as seen from the other box."""
+        return FacePoint((self.points[1], self.points[0]), -1 * self.normal, self.on)
+
+
 def box_box(first: Box, second: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
-    """Return sixteen points: the corners of each face over the other, and where their edges cross."""
+    """Return four points of the region that both faces cover."""
     one, other = moving_box(first, a), moving_box(second, b)
     near = first_overlap(one, other, *faces_and_edges(one, other), a.dt)
-    approach = approach_of(near, (a, b), sum(first.half_sizes) + sum(second.half_sizes))
+    size = sum(first.half_sizes) + sum(second.half_sizes)
+    approach = approach_of(near, (a, b), size)
     normal, time = approach.normal.at(near.time), near.time
     face, ground = nearest_face(one, -normal, time), nearest_face(other, normal, time)
-    return [
+    candidates = [
         *corners_over(face, ground, approach),
-        *map(flipped, corners_over(ground, face, approach.flipped())),
-        *edges_across(face.corners(), ground, approach),
+        *(each.flipped() for each in corners_over(ground, face, approach.flipped())),
+        *crossings(face.corners(), ground, approach),
     ]
+    found = spread_out(candidates, ground, time, size)
+    return [approach.contact(each.points, each.normal, each.on) for each in found]
 
 
-def corners_over(face: Face, ground: Face, approach: BoxApproach) -> list[Contact]:
+def spread_out(candidates: list[FacePoint], ground: Face, t: Expr, size: Expr) -> list[FacePoint]:
+    """Return four of the candidates that carry what all carry; see the module.
+
+    Args:
+        candidates: of both faces.
+        ground: the second of these.
+        t: when they are looked at [s].
+        size: of the boxes [m].
+    """
+    least, u, v = MIN_SPREAD * size, ground.u.at(t), ground.v.at(t)
+    places = [(ca.dot(u, each.points[1].at(t)), ca.dot(v, each.points[1].at(t))) for each in candidates]
+    heights = [ca.dot(each.normal.at(t), (each.points[0] - each.points[1]).at(t)) for each in candidates]
+
+    def choose(scores: list[Expr], above: Expr) -> tuple[FacePoint, Expr, Expr]:
+        """Return the candidate of the highest score, if that is above a bound, and its place."""
+        best, free, shares = ca.SX(-FAR * size), ca.SX(1), []
+        for score, each in zip(scores, candidates, strict=True):
+            best = ca.fmax(best, ca.if_else(each.on, score, -FAR * size))
+        for score, each in zip(scores, candidates, strict=True):
+            shares.append(ca.logic_and(ca.logic_and(free, each.on), score >= best))
+            free = ca.logic_and(free, ca.logic_not(shares[-1]))
+        on = ca.logic_and(ca.logic_not(free), best > above)
+        paths = [(*each.points, each.normal) for each in candidates]
+        first, second, normal = (summed(shares, each) for each in zip(*paths, strict=True))
+        x, y = (sum(share * place[k] for share, place in zip(shares, places, strict=True)) for k in range(2))
+        return FacePoint((first, second), normal, on), x, y
+
+    c, s = OUTERMOST
+    one, x0, y0 = choose([c * x + s * y - z / TILT for (x, y), z in zip(places, heights, strict=True)], -FAR * size)
+    two, x1, y1 = choose([ca.sqrt((x - x0) ** 2 + (y - y0) ** 2 + least**2) for x, y in places], 2 * least)
+    beside = [beyond(x, y, (x0, y0), (x1, y1), least) for x, y in places]
+    three, x2, y2 = choose([ca.fmax(out, -FAVOUR * out) for out in beside], least)
+    turn = ca.if_else(beyond(x2, y2, (x0, y0), (x1, y1), least) > 0, 1, -1)
+    sides = ((x1, y1), (x0, y0)), ((x0, y0), (x2, y2)), ((x2, y2), (x1, y1))
+    outside = [[turn * beyond(x, y, *side, least) for x, y in places] for side in sides]
+    four, *_ = choose([ca.fmax(ca.fmax(i, j), k) for i, j, k in zip(*outside, strict=True)], least)
+    return [one, two, three, four]
+
+
+def summed(shares: list[Expr], paths: tuple[Parabola, ...]) -> Parabola:
+    """Return the sum of shares of paths."""
+    total: Parabola = shares[0] * paths[0]
+    for share, each in zip(shares[1:], paths[1:], strict=True):
+        total = total + share * each
+    return total
+
+
+def beyond(x: Expr, y: Expr, start: tuple[Expr, Expr], end: tuple[Expr, Expr], least: Expr) -> Expr:
+    """Return how far a place is to the left of a line; lines shorter than ``least`` have no direction."""
+    along, across = end[0] - start[0], end[1] - start[1]
+    return (along * (y - start[1]) - across * (x - start[0])) / ca.sqrt(along * along + across * across + least**2)
+
+
+def corners_over(face: Face, ground: Face, approach: BoxApproach) -> list[FacePoint]:
     """Return the corners of a face over the other."""
     found, t = [], approach.time
     for corner in face.corners():
@@ -99,7 +189,7 @@ def corners_over(face: Face, ground: Face, approach: BoxApproach) -> list[Contac
         )
         at_x, at_y = clamp(x, ground.half_u), clamp(y, ground.half_v)
         over = corner + (at_x - x) * ground.u + (at_y - y) * ground.v
-        found.append(approach.contact((over, ground.point(at_x, at_y)), ground.normal, inside))
+        found.append(FacePoint((over, ground.point(at_x, at_y)), ground.normal, inside))
     return found
 
 
@@ -108,7 +198,13 @@ def clamp(x: Expr, half: Expr) -> Expr:
     return ca.fmin(ca.fmax(x, -half), half)
 
 
-def edges_across(corners: list[Parabola], ground: Face, approach: BoxApproach, radius: Expr = 0.0) -> list[Contact]:
+def edges_across(corners: list[Parabola], ground: Face, approach: BoxApproach, radius: Expr) -> list[Contact]:
+    """Return the contacts of ``crossings``, of edges that are round with a radius."""
+    found = crossings(corners, ground, approach)
+    return [approach.contact(each.points, each.normal, each.on, radius) for each in found]
+
+
+def crossings(corners: list[Parabola], ground: Face, approach: BoxApproach) -> list[FacePoint]:
     """Return where edges, of a closed polygon or single, enter and leave the region over a face."""
     flat = [seen_along(corner.at(approach.time), ground, approach) for corner in corners]
     found = []
@@ -122,7 +218,7 @@ def edges_across(corners: list[Parabola], ground: Face, approach: BoxApproach, r
             at = ca.fmin(ca.fmax(share, 0), 1)
             point = (1 - at) * corners[start] + at * corners[end]
             foot = ground.point(x0 + at * (x1 - x0), y0 + at * (y1 - y0))
-            found.append(approach.contact((point, foot), approach.normal, on, radius))
+            found.append(FacePoint((point, foot), approach.normal, on))
     return found
 
 
