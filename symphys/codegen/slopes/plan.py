@@ -41,6 +41,8 @@ COUNT_CORRECTION = 0.95
 """Correction of the operations counted for a slope: products with 1 are none. Measured in large calls: 0.99."""
 MAX_SLOPES = 6000
 """Slopes of a call beyond which it is not asked whether a table of them is less."""
+MAX_TABLE_OPERATIONS = 20_000
+"""Operations that make a table, beyond which compiling them takes longer than a table saves."""
 
 
 Key = tuple[int, int]
@@ -134,6 +136,8 @@ def _cheaper(
         return graph, taped
     table = functions.adjoint(function, inputs, outputs, tabled=True)
     other = functions.taped(function, table)
+    if other is not None and other.forward.operations > MAX_TABLE_OPERATIONS:
+        return graph, taped
     return (table, other) if _operations(table, other) < most else (graph, taped)
 
 

@@ -71,9 +71,15 @@ SEPARATE_POINTS = frozenset({(Capsule, Plane), (Box, Plane), (Capsule, Capsule)}
 """Pairs whose points have little in common: each is computed by itself, so that it may be far by itself."""
 
 
+IN_PARTS = frozenset({(Box, Box)})
+"""Pairs whose rules call traced functions."""
+
+
 def collide(first: Surface, second: Surface, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """Return the contacts of two surfaces, carried along a and b, in this step: one for each point."""
     kinds = type(first), type(second)
+    if kinds in IN_PARTS:
+        return RULES[kinds](first, second, a, b)
     if kinds in SEPARATE_POINTS:
         return [_point(k, first, second, a, b) for k in range(points_of_kinds(*kinds))]
     return _points(first, second, a, b)

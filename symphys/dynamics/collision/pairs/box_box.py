@@ -33,6 +33,7 @@ from symphys.dynamics.collision.box_geometry import (
 from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
 from symphys.dynamics.collision.witness_points import Witness, contact_of
+from symphys.dynamics.tracing.decorator import traced
 from symphys.model.shapes import Box
 from symphys.records import dataclass
 from symphys.types import Expr
@@ -110,6 +111,14 @@ class FacePoint:
 
 def box_box(first: Box, second: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """Return four points of the region that both faces cover."""
+    approach, points = _shared_region(first, second, a, b)
+    return [_contact(approach, point) for point in points]
+
+
+@traced
+def _shared_region(
+    first: Box, second: Box, a: PredictedPath, b: PredictedPath
+) -> tuple[BoxApproach, tuple[FacePoint, ...]]:
     one, other = moving_box(first, a), moving_box(second, b)
     near = first_overlap(one, other, *faces_and_edges(one, other), a.dt)
     size = sum(first.half_sizes) + sum(second.half_sizes)
@@ -121,8 +130,12 @@ def box_box(first: Box, second: Box, a: PredictedPath, b: PredictedPath) -> list
         *(each.flipped() for each in corners_over(ground, face, approach.flipped())),
         *crossings(face.corners(), ground, approach),
     ]
-    found = spread_out(candidates, ground, time, size)
-    return [approach.contact(each.points, each.normal, each.on) for each in found]
+    return approach, tuple(spread_out(candidates, ground, time, size))
+
+
+@traced
+def _contact(approach: BoxApproach, point: FacePoint) -> Contact:
+    return approach.contact(point.points, point.normal, point.on)
 
 
 def spread_out(candidates: list[FacePoint], ground: Face, t: Expr, size: Expr) -> list[FacePoint]:
