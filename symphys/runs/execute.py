@@ -201,7 +201,9 @@ def solve(
     if chosen.by_steps(transcription.shooting):
         transcription = transcription.by_steps
     confirms = partial(confirmed, transcription) if chosen.confirms else None
-    shooting = replace(transcription.shooting, multipliers=job.guess.multipliers, confirms=confirms)
+    finer = partial(trust.finer_errors, transcription) if chosen.confirms else None
+    shooting = replace(transcription.shooting, confirms=confirms, finer_errors=finer)
+    shooting = replace(shooting, multipliers=job.guess.multipliers)
     log(f"evaluated by {transcription.backend}")
     for note in job.guess.notes:
         log(f"guess from {job.guess.folder}: {note}")

@@ -264,6 +264,7 @@ class ShootingProblem:
         guessed_states: (z (n,), numbers (M,) of states from 1 on, smoothing) -> (M, nx) where the motion is guessed to
             pass. None: where the rollout of z leads.
         confirms: (z (n,)) -> whether what meets everything still does with finer time steps; None: nobody can say.
+        finer_errors: (z (n,)) -> (k,) the errors with finer time steps, each the largest; None: nobody can say.
         multipliers: those that a solve of this or a like problem ended with where its guess is, see
             ``Outcome.multipliers``; empty where none are known.
     """
@@ -287,6 +288,7 @@ class ShootingProblem:
     measure: Measure | None = None
     guessed_states: GuessedStates | None = None
     confirms: Callable[[Array], bool] | None = None
+    finer_errors: Callable[[Array], Array] | None = None
     multipliers: Mapping[str, Array] = field(default_factory=dict)
 
     @property

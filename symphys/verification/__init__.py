@@ -4,6 +4,6 @@ Its numbers are explained in words by ``symphys.findings``.
 """
 
 from symphys.verification.examination import examine, survey
-from symphys.verification.refinement import finer_values
+from symphys.verification.refinement import finer_errors, finer_values
 
-__all__ = ["examine", "finer_values", "survey"]
+__all__ = ["examine", "finer_errors", "finer_values", "survey"]

@@ -91,6 +91,12 @@ def finer_values(transcription: Transcription, z: Array) -> list[dict[str, Any]]
     return rows
 
 
+def finer_errors(transcription: Transcription, z: Array) -> Array:
+    """Return (k,) error / tolerance of each check with dt / 2 and dt / 4, the larger one; NaN where one is."""
+    verdicts = (finer_problem(transcription, what).judge(z) for what in (FINER_DT, FINEST_DT))
+    return np.asarray(np.max([[check.ratio for check in verdict.checks] for verdict in verdicts], axis=0))
+
+
 def follows(judged: Assessment, row: dict[str, Any]) -> bool:
     """Whether dt / 4 agrees if dt / 2, the ``row`` of ``refine``, does: where errors shrink like dt or faster.
 

@@ -16,7 +16,7 @@ from symphys.shooting import ShootingProblem
 from symphys.solvers import Counts, Outcome, Status, TraceRow
 from symphys.solvers.core.convergence import PLATEAU_ADVICE
 from symphys.solvers.core.subspace import search_space
-from symphys.solvers.methods.race import distance
+from symphys.solvers.methods.race import CHECKED, FAR, UNCHECKED, WithFinerSteps, distance
 
 SMALL = {"generations": 3, "population": 8, "rounds": 4}
 
@@ -101,6 +101,25 @@ def test_what_does_not_hold_with_finer_steps_does_not_end_it() -> None:
     assert any(each > 0 for each in asked)
     never = solve("race", replace(problem, confirms=lambda z: False), options=SMALL)
     assert never.status is Status.MET
+
+
+def test_a_search_counts_as_met_what_is_met_with_finer_steps_too() -> None:
+    """The best few of those that meet everything are tried; of others nobody knows."""
+    problem = toy(1, lambda z, s: z, errors=lambda z, s: ca.fabs(z))
+    asked = list[float]()
+
+    def finer(z: Any) -> Any:
+        asked.append(float(z[0]))
+        return np.array([3.0 if z[0] < 0.2 else np.nan if z[0] < 0.3 else 0.4])
+
+    checked = WithFinerSteps(problem, finer, lambda objectives, errors: objectives)
+    Z = np.array([[0.9], [0.1], [2.0], [0.2], [0.5], [0.4]])
+    errors = checked.value(Z, 0.0).errors[:, 0]
+    assert asked == [0.1, 0.2, 0.4, 0.5][:CHECKED]
+    assert errors.tolist() == [UNCHECKED, 3.0, 2.0, FAR, 0.5, 0.4]
+    assert checked.value(Z, 0.1).errors[:, 0].tolist() == pytest.approx(np.abs(Z[:, 0]))
+    found = solve("race", replace(mesa(), finer_errors=lambda z: np.zeros(1)), options=SMALL)
+    same(found, solve("race", mesa(), options=SMALL))
 
 
 def test_costs_do_not_keep_it_from_what_is_asked_for() -> None:
