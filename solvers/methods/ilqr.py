@@ -14,7 +14,7 @@ import numpy as np
 from symphys.records import dataclass
 from symphys.shooting import Linearized, ShootingProblem, StagedMotion, StagedProblem
 from symphys.solvers.core.checkpoint import revive
-from symphys.solvers.core.convergence import MIN_RELATIVE_DECREASE, Progress, converged, not_finite, stationary
+from symphys.solvers.core.convergence import Progress, converged, not_finite, stationary
 from symphys.solvers.core.driver import make_solver, stage_of
 from symphys.solvers.core.evaluator import CountingEvaluator
 from symphys.solvers.core.interface import Iteration, Method, StageContext
@@ -48,8 +48,7 @@ class IlqrOptions(SolverOptions):
         iterations: linearisations at most, in each stage of smoothing.
         damping: first lambda, added to the curvature of the objective by each knot, in units of its scale.
         tolerance: converged where the expected fall is below tolerance * (1 + |objective|).
-        patience: stalled where the objective has not fallen by ``progress`` in so many iterations; 0 goes on.
-        progress: least fall of the objective, as a share of it, that counts.
+        patience: stalled where the objective has not fallen by 1e-5 of itself in so many iterations; 0 goes on.
         penalty: first penalty of the constraints, as a factor on their own.
         growth: factor on the penalty where constraints do not come nearer.
     """
@@ -58,7 +57,6 @@ class IlqrOptions(SolverOptions):
     damping: float = 1e-4
     tolerance: float = 1e-9
     patience: int = 20
-    progress: float = MIN_RELATIVE_DECREASE
     penalty: float = 1.0
     growth: float = 10.0
 
@@ -66,7 +64,6 @@ class IlqrOptions(SolverOptions):
         """Raise ValueError, which names the option and what would be valid."""
         super().__post_init__()
         at_least(0, iterations=self.iterations, tolerance=self.tolerance, patience=self.patience)
-        require(0 <= self.progress < 1, "progress", "in [0, 1)")
         require(0 < self.damping < math.inf, "damping", "above 0")
         require(0 < self.penalty < math.inf, "penalty", "above 0")
         require(1 < self.growth < math.inf, "growth", "above 1")
@@ -177,8 +174,7 @@ class Ilqr(Method[IlqrState]):
         point = self.evaluator.along(self._motion(after.z))
         if not point.finite:
             return not_finite(point)
-        progress = before.progress.after(after.value, self.options.progress)
-        state = replace(after, iteration=before.iteration + 1, progress=progress)
+        state = replace(after, iteration=before.iteration + 1, progress=before.progress.after(after.value))
         norm = self.evaluator.stationarity(before.z, policy.gradient)
         return self._iteration(point, state, norm, float(np.linalg.norm(after.z - before.z)))
 

@@ -61,8 +61,8 @@ NEARER = 0.8
 """Share of the ``distance`` of a point of the finisher below which it starts again from one near it."""
 FIRST_ROUNDS = 4
 """Rounds of the search for controls over time before the finisher starts, whose slopes are compiled meanwhile."""
-PATIENCE, PROGRESS = 10, 0.05
-"""Iterations in which what is missed has to fall by this share, else the finisher gives up a start."""
+PATIENCE = 10
+"""Iterations without progress after which the finisher gives up a start."""
 NO_LIMIT = 10**12
 """Evaluations of a search, which its rounds limit."""
 SEEDS = 100_000
@@ -397,7 +397,7 @@ class Race:
                 validation=0,
             )
             return self.cma if wide else cma(), replace(self.compared, smoothing=last), sought
-        patience: dict[str, Any] = {"patience": PATIENCE} if self.finisher is ILQR else {}
+        patience = {"patience": PATIENCE} if self.finisher is ILQR else {}
         if kind == POLISH:
             own = self.finisher.Options(iterations=options.finisher_iterations, **patience)
             return self.finisher, replace(self.problem, smoothing=last), own
@@ -407,7 +407,6 @@ class Race:
         if self.finisher is ILQR and self.problem.asking is not None:
             staged = self.problem.asking(start)
             meeting = replace(meeting, staged=lambda: staged, measure=self.compared.measure)
-            patience["progress"] = PROGRESS
         return self.finisher, meeting, self.finisher.Options(iterations=options.finisher_iterations, **patience)
 
     def _measure(self, objectives: Array, errors: Array) -> Array:
