@@ -164,7 +164,7 @@ def test_a_mesh_may_be_fitted_by_shapes_that_touch_each_other(monkeypatch: pytes
     mujoco.mju_quat2Mat(wanted, np.array([0.6, 0.8, 0, 0]))
     assert own.reshape(3, 3) == pytest.approx(turn @ wanted.reshape(3, 3), abs=1e-12)
     assert "mesh bar: 2 box 1 mm too small, 2 mm too large" in texts(findings, "approximated")
-    assert len(problem_of(tables).world().pairs) == 16 + 1 + 1 + 1
+    assert len(problem_of(tables).world().pairs) == 4 + 1 + 1 + 1
 
 
 def part_of(body: dict[str, object]) -> dict[str, dict[str, object]]:

@@ -58,9 +58,9 @@ def test_number_contributors_and_remedy_are_named(refused: Refused, names: Names
 
 def test_groups_and_compounds_are_called_by_name(refused: Refused) -> None:
     two = "{ parts = [{ box = { size = [1, 1, 1] } }, { capsule = { radius = 0.1, length = 1 } }] }"
-    message = str(refused(text=BASE + crowd(20, 'group = "pins"') + crowd(1, shape=two).replace("b0", "tower")))
-    assert f"20 boxes of pins against each other: {190 * EACH}" in message
-    assert f"20 boxes of pins against tower: {20 * (EACH + TOUCH)}" in message
+    message = str(refused(text=BASE + crowd(40, 'group = "pins"') + crowd(1, shape=two).replace("b0", "tower")))
+    assert f"40 boxes of pins against each other: {780 * EACH}" in message
+    assert f"40 boxes of pins against tower: {40 * (EACH + TOUCH)}" in message
 
 
 def test_spheres_are_not_advised_to_be_spheres(refused: Refused) -> None:
