@@ -50,9 +50,10 @@ COST_WEIGHT = 0.5
 """What costs count for at most in the logarithm of ``distance``: enough to lead where nothing else moves."""
 MARGIN = 0.5
 """[tolerances] What misses by less is not improved: finer time steps change it by that much and it is still met."""
-CHECKED, UNCHECKED = 4, 1.001
-"""How many points of an evaluation that meet everything are tried with finer time steps, and the least error of others.
-"""
+CHECKED = 4
+"""Points of an evaluation that meet everything, at most, which are tried with finer time steps."""
+UNCHECKED = 1.001
+"""[tolerances] The least error of others that meet everything."""
 FAR = 1e100
 """[tolerances] Errors are compared up to here."""
 BETTER = 0.6

@@ -8,6 +8,7 @@ the rate after it: keep b K/(1 + b K), slope b/(1 + b K), offset a/(1 + b K), wi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -102,10 +103,11 @@ class CoordinateConstraint:
 
     def alone(self) -> CoordinateConstraint:
         """Implement ``VelocityConstraint.alone``."""
-        return CoordinateConstraint(
-            *((), NO_DIRECTIONS, NO_DIRECTIONS, self.keep, self.slope, self.offset, self.low, self.high, self.width),
-            *(self.same, None, None, ca.SX(0), ca.SX(0)),
+        zero, law = (
+            ca.SX(0),
+            replace(self, terms=(), velocity_directions=NO_DIRECTIONS, impulse_directions=NO_DIRECTIONS),
         )
+        return replace(law, of_tree=None, left=None, inverse_mobility=zero, landing=zero, drive=None, jump=None)
 
     def response(self, seen: Expr, old: JointImpulse) -> JointImpulse:
         """Implement ``ImpulseLaw.response``."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -90,8 +91,8 @@ class LockConstraint:
 
     def alone(self) -> LockConstraint:
         """Implement ``VelocityConstraint.alone``."""
-        numbers = self.mass, self.softness, self.target, ca.SX(0), ca.SX(0)
-        return LockConstraint((), NO_DIRECTIONS, NO_DIRECTIONS, *numbers, self.same)
+        law = replace(self, terms=(), velocity_directions=NO_DIRECTIONS, impulse_directions=NO_DIRECTIONS)
+        return replace(law, error=ca.SX(0), axes=ca.SX(0), lasting=None)
 
     def response(self, seen: Expr, old: JointImpulse) -> JointImpulse:
         """Implement ``ImpulseLaw.response``."""

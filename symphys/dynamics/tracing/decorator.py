@@ -109,7 +109,10 @@ def section(word: T) -> T:
 
 
 def contiguous(tree: T, constants: bool = False) -> T:
-    """Return the tree, stored contiguously between calls so that it can substitute results of a call."""
+    """Return the tree, stored contiguously between calls so that it can substitute results of a call.
+
+    ``constants``: these become numbers of calls too, so that calls which differ in them share a function.
+    """
     tracer = _TRACER.get()
     return tree if tracer is None else tracer.contiguous(tree, constants)
 
@@ -119,7 +122,7 @@ def as_arguments(values: Any) -> Any:
 
     Zeros and ones stay constants, which cost nothing.
     """
-    return values if _TRACER.get() is None else contiguous(_symbolic(values), True)
+    return values if _TRACER.get() is None else contiguous(_symbolic(values), constants=True)
 
 
 def _symbolic(values: Any) -> Any:

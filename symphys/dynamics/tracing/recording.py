@@ -86,10 +86,10 @@ class Recorder(Tracer):
         number, _ = self._structures.of(arguments)
         copied = self._copied.get((function, number))
         if copied is None:
-            copied = self._copied[function, number] = self._lies_anew(function, number, arguments)
+            copied = self._copied[function, number] = self._takes_copies(function, number, arguments)
         return tuple(map(self._gathered, arguments)) if copied else arguments
 
-    def _lies_anew(self, function: Callable[..., Any], number: int, arguments: tuple[Any, ...]) -> bool:
+    def _takes_copies(self, function: Callable[..., Any], number: int, arguments: tuple[Any, ...]) -> bool:
         """Whether there were enough calls that differ from this one in no more than where their arguments lie."""
         leaves: list[Expr] = []
         shape = flatten(arguments, leaves)
