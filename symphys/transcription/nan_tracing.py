@@ -15,10 +15,10 @@ from symphys.records import dataclass
 from symphys.transcription.recorded_parts import (
     RolloutArrays,
     formula_arguments,
-    instants,
     part_numbers,
 )
 from symphys.transcription.rollout import Rollout
+from symphys.transcription.terms import Occasions, instant, part_occasions, problem_terms
 from symphys.types import Array
 
 OPERATION_FORMATS = {
@@ -223,27 +223,13 @@ def _cause(found: NonFiniteOperation | None, names: Sequence[Columns], results: 
 
 def _instants(rollout: Rollout) -> Iterator[tuple[str, Objective, Formula, int, int]]:
     """Yield (kind, objective, formula, number of the state, number of the inputs) of all evaluations of formulas."""
-    problem, steps = rollout.problem, rollout.steps
-    groups = (
-        ("cost", problem.costs),
-        ("target", problem.targets),
-        ("constraint", problem.constraints),
-        ("output", problem.outputs),
-    )
-    for kind, asked in ((kind, asked) for kind, group in groups for asked in group):
-        formula = asked.formula
-        for part in formula.parts:
-            yield from ((kind, asked, part.formula, k, row) for k, row in instants(rollout, part))
-        if asked.at != "always":
-            k = rollout.tick(asked.at)
-            yield kind, asked, formula, k, min(k, steps - 1)
-            continue
-        during = asked.during if isinstance(asked, Cost | Constraint) else None
-        first, last = (0, steps) if during is None else during.ticks(steps)
-        if kind == "cost":
-            yield from ((kind, asked, formula, k, k) for k in range(first, last))
-        if kind == "constraint" or rollout.moves(formula):
-            yield from ((kind, asked, formula, k, k - 1) for k in range(first + 1, last + 1))
+    found: list[tuple[Objective, Occasions]] = [(term.table, term.occasions) for term in problem_terms(rollout)]
+    found += [(output, instant(rollout, output.at)) for output in rollout.problem.outputs]
+    for asked, occasions in found:
+        kind = type(asked).__name__.lower()
+        for part in asked.formula.parts:
+            yield from ((kind, asked, part.formula, k, row) for k, row in part_occasions(rollout, part).pairs)
+        yield from ((kind, asked, asked.formula, k, row) for k, row in occasions.pairs)
 
 
 def _formula_arguments(rollout: Rollout, arrays: RolloutArrays, formula: Formula, k: int, row: int) -> list[Array]:

@@ -1,7 +1,8 @@
 """Costs, targets and constraints along a rollout: the objective, its residuals, and the judged errors.
 
-``terms`` formulates them once, of the symbols of ``FormulaSamples``. Casadi's virtual machine puts expressions of a
-rollout in their place, a kernel the places of its vector, and rollouts with large nets put arrays there.
+``terms`` evaluates those of ``symphys.transcription.terms`` along a whole motion, of the symbols of ``FormulaSamples``.
+Casadi's virtual machine puts expressions of a rollout in their place, a kernel the places of its vector, and rollouts
+with large nets put arrays there.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ import numpy as np
 
 from symphys.expression import Formula, MotionPart
 from symphys.maths.smoothing import length
-from symphys.problem import Constraint, Cost, Phase, Problem, Target
+from symphys.problem import Constraint, Problem
 from symphys.records import dataclass
 from symphys.transcription.rollout import Rollout
-from symphys.types import Expr
+from symphys.transcription.terms import Occasions, Term, instant, part_occasions, problem_terms
+from symphys.types import Array, Expr
 
 MIN_SEPARATE_SUM = 512
 """Least number of terms of a sum that may be computed outside the function of all terms."""
@@ -60,10 +62,10 @@ class FormulaSamples:
         moments = [symbol for pair in self.moments.values() for symbol in pair]
         return [self.z, self.p, *moments, *self.series.values(), *self.totals.values()]
 
-    def at(self, formula: Formula, when: str | float) -> Expr:
-        """Return the value (m,) of a formula at the end or at the step nearest to a time; inputs are that step's."""
-        k = self.rollout.tick(when)
-        key = k, min(k, self.steps - 1)
+    def at(self, formula: Formula, occasion: Occasions) -> Expr:
+        """Return the value (m,) of a formula at one instant."""
+        (key,) = occasion.pairs
+        k, _ = key
         if key not in self.moments:
             x0, given = self.rollout.x0, self.rollout.given
             self.moments[key] = ca.MX.sym("x", x0.shape[0]), ca.MX.sym("u", given.shape[0])
@@ -73,14 +75,11 @@ class FormulaSamples:
 
     def _part(self, part: MotionPart) -> Expr:
         """Return the value (m,) of a part over the whole motion; integrals follow the rule of running costs."""
+        occasions = part_occasions(self.rollout, part)
         if part.kind in ("start", "end"):
-            return self.at(part.formula, 0.0 if part.kind == "start" else "end")
-        average = _mean(ca.horzcat(*map(self.values, self.over_steps(part.formula))))
+            return self.at(part.formula, occasions)
+        average = _mean(ca.horzcat(*(self.values((part.formula, side)) for side in occasions.sides)))
         return average if part.kind == "average" else self.interval * self.steps * average
-
-    def over_steps(self, formula: Formula) -> tuple[Series, ...]:
-        """Return the series whose mean is the time average; two (trapezoid) for moving quantities."""
-        return tuple((formula, shift) for shift in ((0, 1) if self.rollout.moves(formula) else (0,)))
 
     def values(self, series: Series) -> Expr:
         """Return the values (m, N) of a series."""
@@ -119,8 +118,8 @@ class Terms:
     penalties: Expr
     errors: Expr
     constraints: Expr
-    lower: np.ndarray[Any, np.dtype[np.float64]]
-    upper: np.ndarray[Any, np.dtype[np.float64]]
+    lower: Array
+    upper: Array
     names: tuple[str, ...]
     outputs: Expr
     means: Expr
@@ -146,15 +145,18 @@ def terms(samples: FormulaSamples) -> Terms:
     """Return the terms of a problem as expressions of the symbols of its samples."""
     problem = samples.problem
     # Evaluate all formulas.
-    costs = [_cost(samples, cost) for cost in problem.costs]
-    targets = [(target, samples.at(target.formula, target.at)) for target in problem.targets]
-    limits = [_Limit(samples, constraint) for constraint in problem.constraints]
+    asked = problem_terms(samples.rollout)
+    first, last = len(problem.costs), len(problem.costs) + len(problem.targets)
+    costs = [_cost(samples, term) for term in asked[:first]]
+    targets = [samples.at(term.formula, term.occasions) for term in asked[first:last]]
+    limits = [_Limit(samples, term) for term in asked[last:]]
     # Objective = costs + squared residuals of targets; penalties are squared violations.
-    residuals = [np.sqrt(target.weight) * value for target, value in targets]
+    residuals = [np.sqrt(term.weight) * value for term, value in zip(asked[first:last], targets, strict=True)]
     objective = sum((cost.value for cost in costs), ca.MX(0)) + sum(
         (ca.sumsqr(residual) for residual in residuals), ca.MX(0)
     )
-    errors = [_miss(target, value) for target, value in targets] + [limit.error for limit in limits]
+    errors = [length(value) / target.tolerance for target, value in zip(problem.targets, targets, strict=True)]
+    errors += [limit.error for limit in limits]
     if problem.goal is not None:
         errors.append(goal_error(objective, problem.goal))
     squares = [cost.residual for cost in costs]
@@ -170,10 +172,8 @@ def terms(samples: FormulaSamples) -> Terms:
         lower=np.concatenate([limit.lower for limit in limits] or [np.zeros(0)]),
         upper=np.concatenate([limit.upper for limit in limits] or [np.zeros(0)]),
         names=tuple(limit.name for limit in limits for _ in range(limit.lower.size)),
-        outputs=_stack([samples.at(output.formula, output.at) for output in problem.outputs]),
-        means=_stack(
-            [cost.mean for cost in costs] + [value for _, value in targets] + [limit.mean for limit in limits]
-        ),
+        outputs=_stack([samples.at(each.formula, instant(samples.rollout, each.at)) for each in problem.outputs]),
+        means=_stack([cost.mean for cost in costs] + targets + [limit.mean for limit in limits]),
     )
 
 
@@ -182,29 +182,16 @@ def has_squares(problem: Problem) -> bool:
     return all(cost.squares for cost in problem.costs) and bool(problem.costs or problem.targets or problem.constraints)
 
 
-Bounds = tuple[tuple[str, ...], np.ndarray[Any, np.dtype[np.float64]], np.ndarray[Any, np.dtype[np.float64]]]
-
-
-def bounds(problem: Problem, size_of: Callable[[Formula], int]) -> Bounds:
-    """Return names, lower and upper bounds of ``Terms``, without its expressions; ``size_of`` formulas."""
+def bounds(rollout: Rollout) -> tuple[tuple[str, ...], Array, Array]:
+    """Return names, lower and upper bounds of ``Terms``, without its expressions."""
     names, lower, upper = list[str](), [np.zeros(0)], [np.zeros(0)]
-    steps = problem.simulation.steps
-    for constraint in problem.constraints:
-        size = size_of(constraint.formula)
-        count = 1
-        if constraint.at == "always":
-            first, last = (0, steps) if constraint.during is None else constraint.during.ticks(steps)
-            count = last - first
-        low, high = _bounds(constraint, size, count)
-        names += [constraint.name] * low.size
-        lower.append(low)
-        upper.append(high)
+    for term in problem_terms(rollout):
+        if term.kind == "limit":
+            low, high = term.bounds(int(rollout.compiled(term.formula).size1_out(0)))
+            names += [term.table.name] * low.size
+            lower.append(low)
+            upper.append(high)
     return tuple(names), np.concatenate(lower), np.concatenate(upper)
-
-
-def _bounds(constraint: Constraint, size: int, count: int) -> Any:
-    """Return lower and upper bounds (size count,) of ``count`` values of a constraint."""
-    return (np.tile(np.broadcast_to(bound, (size,)), count) for bound in (constraint.lower, constraint.upper))
 
 
 def goal_error(objective: Any, goal: float) -> Any:
@@ -231,13 +218,11 @@ def _mean(samples: Expr) -> Expr:
     return ca.sum2(samples) / samples.shape[1]
 
 
-def within(samples: Expr, phase: Phase | None, steps: int) -> tuple[Expr, int]:
-    """Return the columns of a phase, of one series (N) or two (2N), and the number of its steps."""
-    if phase is None:
-        return samples, steps
-    first, last = phase.ticks(steps)
-    parts = [samples[:, start + first : start + last] for start in range(0, samples.shape[1], steps)]
-    return ca.horzcat(*parts), last - first
+def _over_time(samples: FormulaSamples, term: Term) -> Expr:
+    """Return the values (m, evaluations) of a running term."""
+    series = [samples.values((term.formula, side)) for side in term.occasions.sides]
+    steps = term.occasions.steps
+    return ca.horzcat(*(each if len(steps) == samples.steps else each[:, steps.start : steps.stop] for each in series))
 
 
 class _Cost(NamedTuple):
@@ -248,19 +233,19 @@ class _Cost(NamedTuple):
     mean: Expr
 
 
-def _cost(samples: FormulaSamples, cost: Cost) -> _Cost:
-    if cost.at != "always":
-        return _weighed(cost, samples.at(cost.formula, cost.at), cost.weight)
-    series = samples.over_steps(cost.formula)
-    values, steps = within(ca.horzcat(*map(samples.values, series)), cost.during, samples.steps)
-    weight = cost.weight * samples.interval * steps / values.shape[1]
-    whole = cost.during is None and not (cost.squares and samples.problem.free_duration)
-    return _weighed(cost, values, weight, (lambda scale: samples.sums(series, scale)) if whole else None)
+def _cost(samples: FormulaSamples, term: Term) -> _Cost:
+    if not term.running:
+        return _weighed(term, samples.at(term.formula, term.occasions), term.weight)
+    values, steps = _over_time(samples, term), len(term.occasions.steps)
+    weight = term.weight * samples.interval * steps / values.shape[1]
+    series = tuple((term.formula, side) for side in term.occasions.sides)
+    whole = steps == samples.steps and not (term.kind == "squares" and samples.problem.free_duration)
+    return _weighed(term, values, weight, (lambda scale: samples.sums(series, scale)) if whole else None)
 
 
-def _weighed(cost: Cost, values: Expr, weight: Any, sums: Sums | None = None) -> _Cost:
+def _weighed(term: Term, values: Expr, weight: Any, sums: Sums | None = None) -> _Cost:
     """Return a cost of values (m, samples); ``sums`` computes sums by scale outside this function."""
-    scale = ca.sqrt(weight) if cost.squares else None
+    scale = ca.sqrt(weight) if term.kind == "squares" else None
     total, squares = plain_sums(values, scale) if sums is None else sums(scale)
     mean = total / values.shape[1]
     if scale is None:
@@ -268,28 +253,20 @@ def _weighed(cost: Cost, values: Expr, weight: Any, sums: Sums | None = None) ->
     return _Cost(squares, scale * ca.vec(values), mean)
 
 
-def _miss(target: Target, value: Expr) -> Expr:
-    return length(value) / target.tolerance
-
-
 class _Limit:
     """One constraint: its values and their mean, bounds, penalty residuals and error."""
 
-    def __init__(self, samples: FormulaSamples, constraint: Constraint) -> None:
-        always = constraint.at == "always"
-        if always:
-            values, _ = within(samples.values((constraint.formula, 1)), constraint.during, samples.steps)
-        else:
-            values = samples.at(constraint.formula, constraint.at)
-        count = values.shape[1]
-        self.name = constraint.name
+    def __init__(self, samples: FormulaSamples, term: Term) -> None:
+        table = term.table
+        assert isinstance(table, Constraint)
+        values = _over_time(samples, term) if term.running else samples.at(term.formula, term.occasions)
+        self.name = table.name
         self.value, self.mean = ca.vec(values), _mean(values)
-        size = values.shape[0]
-        self.lower, self.upper = _bounds(constraint, size, count)
+        self.lower, self.upper = term.bounds(int(values.shape[0]))
         violation = self._violation()
-        self.penalty = ca.sqrt(constraint.penalty * (samples.interval if always else 1.0)) * violation
+        self.penalty = ca.sqrt(term.weight * (samples.interval if term.running else 1.0)) * violation
         total: Expr = ca.sum1(violation)
-        self.error = ca.if_else(total >= 0, ca.mmax(violation), total) / constraint.tolerance  # mmax hides a NaN
+        self.error = ca.if_else(total >= 0, ca.mmax(violation), total) / table.tolerance  # mmax hides a NaN
 
     def _violation(self) -> Expr:
         """Return (c,) >= 0: the distance of each value from its bounds."""

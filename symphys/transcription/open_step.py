@@ -28,6 +28,7 @@ from symphys.transcription.formula_names import input_names
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.sampler import Sampler
 from symphys.transcription.stage import BatchStep, Stage, Value, sense_function
+from symphys.transcription.terms import problem_terms
 from symphys.types import Array, Expr
 
 
@@ -256,26 +257,21 @@ def costs(rollout: Rollout, value: Value) -> tuple[Expr, Expr]:
 
     Over all steps of a horizon both add up to the objective.
     """
-    problem, dt = rollout.problem, rollout.dt
     running: Expr = ca.DM(0)
-    ticks = moments(problem)
-    single: list[Expr] = [ca.DM(0) for _ in ticks]
-    for each in asked(problem):
-        squares = each.squares if isinstance(each, Cost) else True
-        if each.at == "always":
-            shifts = (0, 1) if rollout.moves(each.formula) else (0,)
-            for shift in shifts:
-                running = running + each.weight * dt / len(shifts) * size(value(each.formula, shift), squares)
-        else:
-            tick = rollout.tick(each.at)
-            found = value(each.formula, 1 if tick == problem.simulation.steps else 0)
-            single[ticks.index(tick)] = single[ticks.index(tick)] + each.weight * size(found, squares)
-    return running, ca.vertcat(ca.DM(0, 1), *single)
-
-
-def size(value: Expr, squares: bool) -> Expr:
-    """Return the cost of a value: its square, or itself."""
-    return ca.sumsqr(value) if squares else value
+    single: dict[int, Expr] = {tick: ca.DM(0) for tick in moments(rollout.problem)}
+    for term in problem_terms(rollout):
+        if term.kind == "limit":
+            continue
+        sides = term.occasions.sides
+        weight = term.weight * rollout.dt / len(sides) if term.running else term.weight
+        for side in sides:
+            found = value(term.formula, side)
+            cost = weight * (ca.sumsqr(found) if term.kind == "squares" else found)
+            if term.running:
+                running = running + cost
+            else:
+                single[term.occasions.steps.start + side] += cost
+    return running, ca.vertcat(ca.DM(0, 1), *single.values())
 
 
 def open_stage(rollout: Rollout, sensors: Sequence[str]) -> Stage:

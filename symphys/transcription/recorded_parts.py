@@ -7,6 +7,7 @@ import numpy as np
 from symphys.expression import Formula, MotionPart
 from symphys.records import dataclass
 from symphys.transcription.rollout import Rollout
+from symphys.transcription.terms import part_occasions
 from symphys.types import Array
 
 
@@ -61,18 +62,11 @@ def part_numbers(rollout: Rollout, arrays: RolloutArrays, formula: Formula) -> l
 def _numbers(rollout: Rollout, arrays: RolloutArrays, part: MotionPart) -> Array:
     """Evaluate a part (m,)."""
     compiled = rollout.compiled(part.formula)
-    found = [np.array(compiled(*formula_arguments(arrays, k, row))).ravel() for k, row in instants(rollout, part)]
+    found = [
+        np.array(compiled(*formula_arguments(arrays, k, row))).ravel() for k, row in part_occasions(rollout, part).pairs
+    ]
     total = np.mean(found, axis=0)
     return np.asarray(total * arrays.time[-1] if part.kind == "integral" else total)
-
-
-def instants(rollout: Rollout, part: MotionPart) -> list[tuple[int, int]]:
-    """Return the numbers of the states and of the inputs at which the formula of a part is evaluated."""
-    steps = rollout.steps
-    if part.kind in ("start", "end"):
-        return [(0, 0)] if part.kind == "start" else [(steps, steps - 1)]
-    after = [(k + 1, k) for k in range(steps)] if rollout.moves(part.formula) else []
-    return [(k, k) for k in range(steps)] + after
 
 
 def formula_arguments(arrays: RolloutArrays, k: int, row: int) -> list[Array]:

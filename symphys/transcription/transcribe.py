@@ -111,7 +111,7 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
     began = perf_counter()
     rollout = symbolic_rollout(problem)
     functions = ExpressionFunctions(rollout)
-    names, lower, upper = bounds(problem, lambda formula: int(rollout.compiled(formula).size1_out(0)))
+    names, lower, upper = bounds(rollout)
     built = perf_counter() - began
     require_backend(backend)
     chosen = cache(lambda: _evaluating(rollout, functions, exact, backend, threads))

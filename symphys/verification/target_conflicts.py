@@ -18,7 +18,8 @@ from symphys.problem import Target
 from symphys.records import dataclass
 from symphys.shooting import ShootingProblem, VariableBlock
 from symphys.transcription import Record, Rollout, Transcription
-from symphys.transcription.recorded_parts import RolloutArrays, part_numbers
+from symphys.transcription.recorded_parts import RolloutArrays, formula_arguments, part_numbers
+from symphys.transcription.terms import instant
 from symphys.types import Array
 from symphys.verification.sensitivity_growth import DIRECTIONS
 
@@ -145,10 +146,8 @@ def target_samples(rollout: Rollout, arrays: RolloutArrays, functions: Sequence[
     """Evaluate every target of a rollout, whose formulas are compiled to ``functions``."""
     found = []
     for target, function in zip(rollout.problem.targets, functions, strict=True):
-        k = rollout.tick(target.at)
-        u = arrays.u[min(k, rollout.steps - 1)]
-        parts = part_numbers(rollout, arrays, target.formula)
-        arguments = (arrays.x[k], u, arrays.p, arrays.time[k : k + 1], arrays.z, *parts)
+        ((k, row),) = instant(rollout, target.at).pairs
+        arguments = (*formula_arguments(arrays, k, row), *part_numbers(rollout, arrays, target.formula))
         found.append(TargetSample(target, function, k, arguments, np.array(function(*arguments)).ravel()))
     return found
 

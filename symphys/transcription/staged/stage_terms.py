@@ -1,7 +1,8 @@
 """Costs, targets, constraints and sums of a problem as functions of one step: state, input, state after.
 
-Every term is evaluated at some steps. There it looks at the state before the step or at the state after it, with the
-input of the step. Inputs that controllers or force laws drive follow from the state before the step.
+They are those of ``symphys.transcription.terms``. Every term is evaluated at some steps. There it looks at the state
+before the step or at the state after it, with the input of the step. Inputs that controllers or force laws drive
+follow from the state before the step.
 
 What formulas take of a whole motion is carried beside its state. A part ``integral(f)`` or ``average(f)`` is a sum
 along the motion, by the rule of running costs. An input of the first step, and whatever a formula reads at an instant
@@ -28,6 +29,7 @@ from symphys.suggest import quote
 from symphys.transcription.formula_names import spans
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.tangent import Tangent
+from symphys.transcription.terms import Term, over_time, problem_terms
 from symphys.types import Array, Expr, Ints
 
 
@@ -67,15 +69,14 @@ class MotionSums:
         key = kind, formula.text, tick
         if key not in self._known:
             steps, first = self.rollout.steps, len(self.sums)
-            before, after = np.zeros(steps), np.zeros(steps)
+            weights = np.zeros((2, steps))
             if kind == "held":
-                before[tick] = 1.0
-            elif self.rollout.moves(formula):
-                before[:] = after[:] = 0.5 / steps
+                weights[0, tick] = 1.0
             else:
-                before[:] = 1.0 / steps
+                sides = over_time(self.rollout, formula).sides
+                weights[list(sides)] = 1.0 / len(sides) / steps
             size = int(self.rollout.compiled(formula).size1_out(0))
-            self.sums += [MotionSum(formula, i, before, after) for i in range(size)]
+            self.sums += [MotionSum(formula, i, *weights) for i in range(size)]
             self._known[key] = slice(first, first + size)
         return self._known[key]
 
@@ -341,40 +342,31 @@ class _Terms:
         self.free = self.rollout.problem.free_duration
 
     def all(self) -> Iterator[StageTerm]:
-        problem = self.rollout.problem
-        for cost in problem.costs:
-            kind: Kind = "squares" if cost.squares else "cost"
-            if cost.at == "always":
-                sides = (False, True) if self.rollout.moves(cost.formula) else (False,)
-                for after in sides:
-                    yield self._running(cost.name, kind, cost.weight / len(sides), cost.formula, cost.during, after)
+        for term in problem_terms(self.rollout):
+            if term.running:
+                yield from (self._running(term, bool(side)) for side in term.occasions.sides)
             else:
-                yield self._instant(cost.name, kind, cost.weight, cost.formula, cost.at)
-        for target in problem.targets:
-            yield self._instant(target.name, "squares", target.weight, target.formula, target.at)
-        for limit in problem.constraints:
-            if limit.at == "always":
-                yield self._running(limit.name, "limit", limit.penalty, limit.formula, limit.during, True)
-            else:
-                yield self._instant(limit.name, "limit", limit.penalty, limit.formula, limit.at)
+                yield self._instant(term)
 
-    def _running(self, name: str, kind: Kind, weight: float, formula: Formula, phase: Any, after: bool) -> StageTerm:
-        """Make a term at all steps, or at those of a phase; a varying time step is part of the value."""
-        steps = np.arange(*(phase.ticks(self.rollout.steps) if phase else (0, self.rollout.steps)))
-        value, dt = self.symbols.value(formula, after), self.symbols.interval
+    def _running(self, term: Term, after: bool) -> StageTerm:
+        """Make a term at one side of its steps; a varying time step is part of the value."""
+        name, kind, steps = term.table.name, term.kind, np.array(term.occasions.steps, np.int64)
+        weight, key = term.weight / len(term.occasions.sides), self._key(term.formula, kind, after)
+        value, dt = self.symbols.value(term.formula, after), self.symbols.interval
         if not self.free or kind == "limit":
-            return StageTerm(name, kind, weight * self.rollout.dt, steps, after, value, self._key(formula, kind, after))
+            return StageTerm(name, kind, weight * self.rollout.dt, steps, after, value, key)
         value = value * (ca.sqrt(dt) if kind == "squares" else dt)
-        return StageTerm(name, kind, weight, steps, after, value, (*self._key(formula, kind, after), "running"))
+        return StageTerm(name, kind, weight, steps, after, value, (*key, "running"))
 
-    def _instant(self, name: str, kind: Kind, weight: float, formula: Formula, when: str | float) -> StageTerm:
-        tick, last = self.rollout.tick(when), self.rollout.steps
+    def _instant(self, term: Term) -> StageTerm:
+        ((tick, step),) = term.occasions.pairs
+        formula, kind, last = term.formula, term.kind, self.rollout.steps
         if not formula.parts:
             value, key = self.symbols.value(formula, tick == last), self._key(formula, kind, tick == last)
         else:
             value, key = self.symbols.at_end(formula, tick), (formula.text, kind, tick)
-            tick = tick if self.symbols.sums.local(formula, tick) else last
-        return StageTerm(name, kind, weight, np.array([min(tick, last - 1)]), tick == last, value, key)
+            tick, step = (tick, step) if self.symbols.sums.local(formula, tick) else (last, last - 1)
+        return StageTerm(term.table.name, kind, term.weight, np.array([step]), tick == last, value, key)
 
     def _key(self, formula: Formula, kind: Kind, after: bool) -> tuple[object, ...]:
         return formula.text, kind, after and not self.symbols.of_step.isdisjoint(formula.names)

@@ -12,9 +12,10 @@ import numpy as np
 from symphys.codegen.backends import BEST, PRECISIONS, Description
 from symphys.dynamics.observation import SensedState, joint_turn, named_sensors, sensor_readings
 from symphys.model.state_layout import Layout
-from symphys.problem import DURATION, Constraint, GuessedMotion
+from symphys.problem import DURATION, GuessedMotion
 from symphys.problem.guess import ball_joints, guessable, is_orientation, rate_of, turn_between
 from symphys.shooting import AffinePolicy, CompiledRecursion, Expansion, Followed, Linearized, StagedMotion
+from symphys.transcription.objective import bounds
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.expansion import ExpansionSums, SquareStack, square_stacks
 from symphys.transcription.staged.linearization import Linearization, statics_of
@@ -75,7 +76,6 @@ class RolloutStages:
             exact: whether it is for smoothing 0 only.
             priced: whether motions under a policy come with their merits, and an iteration shall take least time.
         """
-        problem = rollout.problem
         self.rollout, self.steps = rollout, rollout.steps
         self.statics = statics_of(rollout)
         self._linearization = linearization or Linearization(rollout, backend, threads, exact, wait=priced)
@@ -90,13 +90,12 @@ class RolloutStages:
         self._knots = int(rollout.p.shape[0]) + which, places
         self.input_size = self.weights.shape[0] // self.steps
         self.squares = all(term.kind != "cost" for term in self.terms)
-        found = zip(problem.constraints, (term for term in self.terms if term.kind == "limit"), strict=True)
-        parts = [_limit(each, term, rollout.dt) for each, term in found]
-        none: list[Array] = [np.zeros(0)] * 3
-        columns = [np.concatenate(each) for each in zip(*parts, strict=True)] if parts else none
-        self.lower, self.upper, self.penalties = columns[0], columns[1], columns[2]
-        always = [each.at == "always" for each in problem.constraints]
-        self.lasting = np.repeat(np.array(always, bool), [len(lower) for lower, _, _ in parts])
+        _, self.lower, self.upper = bounds(rollout)
+        limits = [term for term in self.terms if term.kind == "limit"]
+        counts = [len(term.steps) * term.size for term in limits]
+        self.penalties = np.repeat(np.array([term.weight for term in limits], float), counts)
+        always = [each.at == "always" for each in rollout.problem.constraints]
+        self.lasting = np.repeat(np.array(always, bool), counts)
 
     def sharing(self, rollout: Rollout) -> RolloutStages:
         """Return the stages of a rollout with an equal step, which is not compiled again."""
@@ -456,13 +455,6 @@ def _input_weights(rollout: Rollout, named: Ints, statics: Ints) -> tuple[Any, t
     columns = np.concatenate([columns, named[which]])
     values = np.concatenate([np.array(slope.nonzeros()), np.ones(len(which))])
     return csr_array((values, (rows, columns)), shape=(steps * inputs, int(slope.shape[1]))), (which, at)
-
-
-def _limit(limit: Constraint, term: StageTerm, dt: float) -> tuple[Array, Array, Array]:
-    """Return (T * r,) bounds and weights of squared violations, tick by tick."""
-    ticks = len(term.steps)
-    lower, upper = (np.tile(np.broadcast_to(end, (term.size,)), ticks) for end in (limit.lower, limit.upper))
-    return lower, upper, np.full(len(lower), limit.penalty * (dt if limit.at == "always" else 1.0))
 
 
 def guessed_states(stages: RolloutStages, guess: GuessedMotion, z: Array, ticks: Ints, smoothing: float) -> Array:
