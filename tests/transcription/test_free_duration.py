@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from tools.repeats import first
 
 from symphys import problems
 from symphys.errors import ProblemError, SymphysError
@@ -87,8 +86,8 @@ def free(name: str, **settings: Any) -> Problem:
     return load_problem(path, settings)
 
 
-@pytest.mark.slow
-@first("name", ["parcel", "quadruped_shift"])
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["parcel", "quadruped_shift"])
 def test_a_free_duration_at_the_value_of_the_file_changes_nothing(name: str, tmp_path: Any) -> None:
     settings = {"simulation.duration": 0.2}
     made = transcribe(free(name, folder=tmp_path, **settings), backend="casadi")

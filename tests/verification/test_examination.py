@@ -59,7 +59,7 @@ def test_wrong_gradients_are_rejected(throw):
     assert max(errors) > 1e-2
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_jump_is_told_from_a_wrong_gradient():
     """The kick of the guess meets the crate after 0.05 s, the very end of a step: either side agrees."""
     knock = transcribe(load_problem(find("knock"), {"simulation.duration": 0.3}), backend="casadi")
