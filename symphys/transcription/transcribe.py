@@ -98,6 +98,8 @@ def transcribe_finer(known: Transcription, simulation: Simulation) -> Transcript
     found = transcribe(replace(known.problem, simulation=simulation), backend="casadi")
     if has_large_nets(known.problem):
         return found
+    if simulation.sweeps != known.problem.simulation.sweeps:  # another step, of which reports are asked for too
+        found.simulate_by_reports()
     own, step = found.steps(), known.steps().step
     same = step_identity(own.rollout, own.step.exact)
     if same is None or same != step_identity(step.rollout, step.exact):

@@ -96,14 +96,21 @@ class Transcription:
         found = None if self._cache.doubted else recorded(self.rollout, self.arrays(z, smoothing))
         if found is None:
             self._cache.doubted, self._cache.last = True, None
-            found = simulate(self.rollout, self._recorder, np.array(z, float), smoothing)
+            found = simulate(self.rollout, self._reported, np.array(z, float), smoothing)
         return found
 
     def arrays(self, z: Array, smoothing: float = 0.0) -> RolloutArrays:
         """Return states and arguments of the motion of z, which may be not finite; the last ones are cached."""
-        key, last = (np.asarray(z, np.float64).tobytes(), smoothing), self._cache.last
+        key, last = _key(z, smoothing), self._cache.last
         if last is None or last[0] != key:
             last = self._cache.last = key, self._simulated(np.array(z, float), smoothing)
+        return last[1]
+
+    def _reported(self, z: Array, smoothing: float) -> list[Array]:
+        """Return the results of ``recorder``; the last ones are cached."""
+        key, last = _key(z, smoothing), self._cache.reported
+        if last is None or last[0] != key:
+            last = self._cache.reported = key, [np.array(part) for part in self._recorder(z, smoothing)]
         return last[1]
 
     def _simulated(self, z: Array, smoothing: float) -> RolloutArrays:
@@ -112,7 +119,7 @@ class Transcription:
         dt = float(np.ravel(rollout.parameters.step_length(self.problem.simulation, p.ravel()))[0])
         time = np.arange(rollout.steps + 1, dtype=np.float64) * dt
         if self._cache.doubted or (smoothing and steps.step.exact):
-            x, u = (np.array(part).T for part in self._recorder(z, smoothing)[:2])
+            x, u = (part.T for part in self._reported(z, smoothing)[:2])
         else:
             x = steps.states(z[None], smoothing)[0]
             u = given.T
@@ -120,6 +127,10 @@ class Transcription:
                 found = rollout.feedback.map(rollout.steps)(x[:-1].T, given, np.tile(p, rollout.steps), time[None, :-1])
                 u = np.array(found).T
         return RolloutArrays(z, smoothing, x, u, given.T, p.ravel(), time)
+
+    def simulate_by_reports(self) -> None:
+        """Simulate by the functions that report what happened, on casadi's virtual machine, and build no others."""
+        self._cache.doubted = True
 
     @cached_property
     def _cache(self) -> _Cache:
@@ -244,18 +255,28 @@ class Transcription:
         return recorder(self.rollout)
 
 
+Key = tuple[bytes, float]
+"""z and smoothing."""
+
+
+def _key(z: Array, smoothing: float) -> Key:
+    return np.asarray(z, np.float64).tobytes(), smoothing
+
+
 class _Cache:
     """The last motion, and what evaluations have shown of the kernels.
 
     Attributes:
         last: the last motion, with its z and smoothing.
+        reported: likewise the last results of the virtual machine's rollout.
         doubted: whether the virtual machine has taken a step elsewhere than the kernel: then it takes all of them.
         gives_probes: whether values of the evaluator come with the probe, as those of kernels do.
     """
 
     def __init__(self) -> None:
         """Begin with nothing."""
-        self.last: tuple[tuple[bytes, float], RolloutArrays] | None = None
+        self.last: tuple[Key, RolloutArrays] | None = None
+        self.reported: tuple[Key, list[Array]] | None = None
         self.doubted, self.gives_probes = False, True
 
 

@@ -21,8 +21,8 @@ Values = Callable[[Array], Array]
 
 DIFFERENCE_STEPS = (1e-4, 1e-5, 1e-6)
 """Steps of the central differences, as shares of the scale; the best counts, and a wrong slope passes none."""
-EVERY_COMPONENT = 12
-"""Variables up to this size are differenced component by component, larger ones along as many random directions."""
+EVERY_COMPONENT, RANDOM_DIRECTIONS = 12, 4
+"""Variables up to this size are differenced component by component, larger ones along so many random directions."""
 SIDE_CHECK_ERROR = 1e-4
 """Relative error of central differences from which each side is examined by itself."""
 Tell = Callable[[str], None]
@@ -93,7 +93,7 @@ def _directions(block: VariableBlock, size: int, n: int) -> Array:
     """Return unit steps (k, n) in the scale of each component, or random combinations of many."""
     inside = np.eye(size)
     if size > EVERY_COMPONENT:
-        inside = np.random.default_rng(1).standard_normal((EVERY_COMPONENT, size))
+        inside = np.random.default_rng(1).standard_normal((RANDOM_DIRECTIONS, size))
         inside /= np.linalg.norm(inside, axis=1, keepdims=True)
     whole = np.zeros((len(inside), n))
     whole[:, block.start : block.stop] = inside * block.scale

@@ -248,10 +248,10 @@ def smoothed(transcription: Transcription, record: Record) -> list[dict[str, Any
 
 def _moved(record: Record, transcription: Transcription, smoothing: float) -> float:
     """Return the "moved" of a smoothing; NaN if there is no such motion, or no body moves."""
-    place = record.motion.position
+    place, world = record.motion.position, transcription.rollout.world
     way = float(np.linalg.norm(place - place[0], axis=2).max(initial=0.0))
-    try:
-        other = transcription.simulate(record.z, smoothing).position
-    except NotFinite:
+    x, layout = transcription.arrays(record.z, smoothing).x, Layout(world)
+    if not (way and np.isfinite(x).all()):
         return float("nan")
-    return float(np.linalg.norm(other - place, axis=2).max(initial=0.0)) / way if way else float("nan")
+    other = np.stack([x[:, layout[f"{body.name}.position"]] for body in world.bodies], axis=1)
+    return float(np.linalg.norm(other - place, axis=2).max(initial=0.0)) / way

@@ -49,7 +49,13 @@ MAX_ALIKE_FUNCTIONS = 2
 
 
 class Recorder(Tracer):
-    """Records the calls of a step."""
+    """Records the calls of a step.
+
+    Attributes:
+        calls: in their order.
+        guards, sections: the words that ``guards`` reads.
+        named: the slots of the arguments.
+    """
 
     def __init__(self) -> None:
         """Start without calls."""
@@ -57,6 +63,7 @@ class Recorder(Tracer):
         self.calls: list[TracedCall] = []
         self.guards: list[TracedVector] = []
         self.sections: list[tuple[TracedVector, int]] = []
+        self.named: dict[str, int] = {}
         self._slots: list[TracedVector] = []
         self._adopted: list[Expr] = []
         self._outputs: dict[int, tuple[ca.Function, tuple[int, ...]]] = {}
@@ -67,7 +74,8 @@ class Recorder(Tracer):
 
     def argument(self, name: str, symbols: Expr) -> None:
         """Add a slot for an argument of the step."""
-        self._slots.append(TracedVector(name, symbols.numel(), self.take(symbols)))
+        self.named[name] = self.take(symbols)
+        self._slots.append(TracedVector(name, symbols.numel(), self.named[name]))
 
     def guard(self, word: Any) -> None:
         """Implement ``decorator.guard``; a constant guards nothing."""
