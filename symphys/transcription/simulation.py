@@ -32,13 +32,31 @@ class Record:
     motion: Trajectory
 
 
-def recorder(rollout: Rollout) -> ca.Function:
-    """Return (z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded, ambiguous, paradox) over time."""
-    x, u, happened = rollout.rolled(rollout.report)
-    return ca.Function("record", [rollout.z, rollout.smoothing], [x, u, rollout.given, rollout.p, *happened])
+def recorder(rollout: Rollout) -> Callable[[Array, float], list[Array]]:
+    """Return (z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded, ambiguous, paradox) over time.
+
+    One step is called after the other: a function of all of them would take longer to build than to evaluate.
+    """
+    results = [rollout.x0, rollout.given, rollout.p, ca.MX(rollout.interval)]
+    start, step = ca.Function("start", [rollout.z], results), rollout.close(rollout.report)
+
+    def record(z: Array, smoothing: float) -> list[Array]:
+        x0, given, p, interval = start.call([z])
+        inputs = given
+        if rollout.feedback is not None:
+            inputs = ca.vertcat(given, ca.DM(np.arange(rollout.steps)).T * interval)
+        now, columns = x0, list[list[Any]]()
+        for k in range(rollout.steps):
+            columns.append(step.call([now, inputs[:, k], p, smoothing]))
+            now = columns[-1][0]
+        after, *others = (np.array(ca.horzcat(*each)) for each in zip(*columns, strict=True))
+        u = np.array(given) if rollout.feedback is None else others.pop()
+        return [np.hstack([np.array(x0), after]), u, np.array(given), np.array(p), *others]
+
+    return record
 
 
-def simulate(rollout: Rollout, record: Callable[..., Any], z: Array, smoothing: float) -> Record:
+def simulate(rollout: Rollout, record: Callable[[Array, float], Sequence[Array]], z: Array, smoothing: float) -> Record:
     """Simulate z; NotFinite, with place and cause, if a number is not finite."""
     x, u, given, p, *happened = (np.array(part).T for part in record(z, smoothing))
     dt = rollout.parameters.step_length(rollout.problem.simulation, p.ravel())

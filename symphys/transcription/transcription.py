@@ -110,7 +110,7 @@ class Transcription:
         """Return the results of ``recorder``; the last ones are cached."""
         key, last = _key(z, smoothing), self._cache.reported
         if last is None or last[0] != key:
-            last = self._cache.reported = key, [np.array(part) for part in self._recorder(z, smoothing)]
+            last = self._cache.reported = key, self._recorder(z, smoothing)
         return last[1]
 
     def _simulated(self, z: Array, smoothing: float) -> RolloutArrays:
@@ -249,7 +249,7 @@ class Transcription:
         return probe_slopes(self.rollout)
 
     @cached_property
-    def _recorder(self) -> ca.Function:
+    def _recorder(self) -> Callable[[Array, float], list[Array]]:
         from symphys.transcription.simulation import recorder
 
         return recorder(self.rollout)

@@ -444,10 +444,9 @@ def slope_plan(program: Program, output: str, lanes: int) -> SlopePlan:
     backward = [pull for pull in reversed(found) if pull]
     places, values = AdjointPlaces(program, target, backward), PointPlaces()
     blocks = []
-    adjoints = _adjoints(backward, places, values, functions)
+    adjoints, left = _adjoints(backward, places, values, functions), LeftWords(program, backward)
     for rows, taken in row_blocks(program, target, backward, lanes, functions):
-        left = _left(program, [pull for pull, on in zip(backward, taken, strict=True) if on])
-        ranges = sorted({each for place in left for each in places.ranges(place)})
+        ranges = sorted({each for place in left.of(taken) for each in places.ranges(place)})
         blocks.append(RowBlock(rows, taken, table(ranges, 2)))
     return SlopePlan(
         tuple(functions.listed),
@@ -497,15 +496,30 @@ def table(rows: Sequence[Sequence[int]], columns: int) -> Ints:
     return np.array(rows, np.int64).reshape(-1, columns)
 
 
-def _left(program: Program, pulls: Sequence[Pull]) -> list[Place]:
-    """Return places that these adjoints write, and do not read and zero; without that of z."""
-    read = np.zeros(program.size, bool)
-    read[program.z.offset : program.z.offset + program.z.size] = True
-    for pull in pulls:
-        for place in pull.marked("outputs"):
-            read[place.offset : place.offset + place.size] = True
-    written = dict.fromkeys(key for pull in pulls for key in pull.written)
-    return [Place(*key) for key in written if not read[key[0] : sum(key)].all()]
+class LeftWords:
+    """Words that some adjoints write, and none of them reads and zeroes."""
+
+    def __init__(self, program: Program, pulls: Sequence[Pull]) -> None:
+        """Collect what each of the adjoints reads and writes."""
+        self._program, keys = program, dict[tuple[int, int], int]()
+        read = [(k, place.offset, place.size) for k, pull in enumerate(pulls) for place in pull.marked("outputs")]
+        written = [(k, keys.setdefault(key, len(keys))) for k, pull in enumerate(pulls) for key in pull.written]
+        self._read, self._written, self._keys = table(read, 3).T, table(written, 2).T, table([*keys], 2)
+
+    def of(self, taken: Bools) -> list[Place]:
+        """Return the places of which some words are left by those that are ``taken`` (k,); without that of z."""
+        size, z = self._program.size, self._program.z
+        which, start, count = self._read
+        here, change = taken[which], np.zeros(size + 1, np.int64)
+        np.add.at(change, start[here], 1)
+        np.add.at(change, (start + count)[here], -1)
+        unread = np.cumsum(change)[:size] == 0
+        unread[z.offset : z.offset + z.size] = False
+        before = np.concatenate([[0], np.cumsum(unread)])
+        which, key = self._written
+        starts, counts = self._keys[np.unique(key[taken[which]])].T
+        some = before[starts + counts] > before[starts]
+        return [Place(*each) for each in zip(starts[some].tolist(), counts[some].tolist(), strict=True)]
 
 
 def _push(call: FunctionCall, pull: Pull | None, functions: DistinctFunctions) -> list[int]:
@@ -533,12 +547,13 @@ def row_blocks(
     """Group rows into blocks, each row beside those with which it shares most adjoints; return those of each block."""
     taken = _taken(program, target, backward, functions)
     work = np.array([pull.work for pull in backward], float)
-    left, blocks = list(range(target.size)), []
-    while left:
-        rows = [left.pop(int(np.argmax(taken[left] @ work)))]
-        union = taken[rows[0]].copy()
-        while left and len(rows) < lanes:
-            rows.append(left.pop(int(np.argmax(taken[left] @ np.where(union, work, -work)))))
+    left, blocks, shares = np.ones(target.size, bool), [], taken.astype(float)
+    while left.any():
+        rows, union = list[int](), np.zeros(len(backward), bool)
+        while left.any() and len(rows) < lanes:
+            gain = shares @ (np.where(union, work, -work) if rows else work)
+            rows.append(int(np.argmax(np.where(left, gain, -np.inf))))
+            left[rows[-1]] = False
             union |= taken[rows[-1]]
         blocks.append((rows, union))
     return blocks
@@ -546,20 +561,20 @@ def row_blocks(
 
 def _taken(program: Program, target: Place, backward: Sequence[Pull], functions: DistinctFunctions) -> Bools:
     """Return the matrix (rows, adjoints): which adjoints a seed on each word of the output reaches."""
-    useful = np.zeros((target.size, program.size), np.float32)
-    useful[:, target.offset : target.offset + target.size] = np.eye(target.size)
-    found, known = np.zeros((target.size, len(backward)), bool), dict[int, NDArray[np.float32]]()
+    useful = np.zeros((program.size, target.size), np.float32)
+    useful[target.offset : target.offset + target.size] = np.eye(target.size)
+    found, known = np.zeros((len(backward), target.size), bool), dict[int, NDArray[np.float32]]()
     for i, pull in enumerate(backward):
         reach = pull.reach
         outputs = np.concatenate([place.words(1)[0] for place in reach.call.outputs])
         inputs = np.concatenate([place.words(1)[0] for place in reach.call.inputs])
         graph = functions.forward(reach.call.function)
         if id(graph) not in known:
-            known[id(graph)] = graph.sparsity().astype(np.float32)
+            known[id(graph)] = graph.sparsity().astype(np.float32).T
         on = np.concatenate(
             [np.full(place.size, mark) for place, mark in zip(reach.call.outputs, pull.outputs, strict=True)]
         )
-        seeded = useful[:, outputs] * on
-        found[:, i] = seeded.any(axis=1)
-        useful[:, inputs] = np.maximum(useful[:, inputs], np.minimum(seeded @ known[id(graph)], 1))
-    return found
+        seeded = useful[outputs] * on[:, None]
+        found[i] = seeded.any(axis=0)
+        useful[inputs] = np.maximum(useful[inputs], np.minimum(known[id(graph)] @ seeded, 1))
+    return np.ascontiguousarray(found.T)
