@@ -299,13 +299,15 @@ def judge(
 ) -> Judgement:
     """Roll the solution out exactly and examine it; ``tell`` as in ``solve``."""
     tell(JUDGING)
+    counts = outcome.counts
+    derived = bool(counts.gradients or counts.jacobians or counts.hessians)
     try:
         taken = transcription.record(outcome.z)  # where steps are compared with the virtual machine's
         verdict = transcription.judge(outcome.z)
         examined: dict[str, Any] | None = None
         if outcome.status is not Status.INTERRUPTED:
             examined = (
-                trust.examine(transcription, taken.z, tell, whole=False)
+                trust.examine(transcription, taken.z, tell, whole=False, slopes=derived)
                 if examine
                 else trust.survey(transcription, taken)
             )

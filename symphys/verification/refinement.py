@@ -48,6 +48,7 @@ def refine(
     tell: Callable[[str], None] = lambda what: None,
     whole: bool = True,
     settled: bool = False,
+    slopes: bool = True,
 ) -> dict[str, Any]:
     """Judge ``z`` in finer discretisations; ``tell`` is called with the name of each before it is simulated.
 
@@ -58,6 +59,7 @@ def refine(
         whole: whether all are done. Else dt / 4 is left out where it follows from dt / 2, see ``follows``, twice the
             sweeps where impulses have settled, and all gradients but that of dt / 2, which take longest.
         settled: whether they have.
+        slopes: whether gradients are compared.
 
     Returns:
         "refined": for dt / 2, dt / 4 and twice the sweeps the "objective", the "worst" error / tolerance, and
@@ -66,20 +68,21 @@ def refine(
         "order": of convergence in dt, of the "objective" and of the "gradient"; None where it cannot be seen.
     """
     judged = transcription.judge(z)
-    slopes, objectives, rows = [transcription.probe.gradient(z)], [judged.objective], list[dict[str, Any]]()
+    gradients = [transcription.probe.gradient(z)] if slopes else []
+    objectives, rows = [judged.objective], list[dict[str, Any]]()
     for what in TOLD:
         if not whole and (settled if what == MORE_SWEEPS else what == FINEST_DT and follows(judged, rows[0])):
             continue
         tell(TOLD[what])
         finer, changes = finer_problem(transcription, what), dict[str, float | None]()
         verdict = finer.judge(z)
-        if whole or what == FINER_DT:
+        if slopes and (whole or what == FINER_DT):
             slope = finer.probe.gradient(z)
-            changes = {block.name: change(block, slopes[0], slope) for block in transcription.shooting.blocks}
-            slopes += [slope] * (what != MORE_SWEEPS)
+            changes = {block.name: change(block, gradients[0], slope) for block in transcription.shooting.blocks}
+            gradients += [slope] * (what != MORE_SWEEPS)
         objectives += [verdict.objective] * (what != MORE_SWEEPS)
         rows.append({"what": what, "objective": verdict.objective, "worst": verdict.worst, "gradient": changes})
-    return {"refined": rows, "order": {"objective": order(objectives), "gradient": order(slopes)}}
+    return {"refined": rows, "order": {"objective": order(objectives), "gradient": order(gradients)}}
 
 
 def finer_values(transcription: Transcription, z: Array) -> list[dict[str, Any]]:

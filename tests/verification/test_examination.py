@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -89,6 +91,23 @@ def test_examination_reports_refinements_and_contacts(throw):
     assert found["deepest"] < 1e-9
     assert found["multiple_impacts"] == 0
     assert found["fault"] == ""
+
+
+@pytest.mark.parametrize("loose", [True, False])
+def test_what_a_search_has_met_is_examined_by_values(throw, loose):
+    """Its derivatives are only where finer simulations, or the motion itself, miss something."""
+    problem, made = throw.problem, throw
+    if loose:
+        wide = [
+            tuple(replace(each, tolerance=1e3) for each in group) for group in (problem.targets, problem.constraints)
+        ]
+        made = transcribe(replace(problem, targets=wide[0], constraints=wide[1]), backend="casadi")
+    found, whole = examine(made, THROW, whole=False, slopes=False), examine(made, THROW, whole=False)
+    assert made.judge(THROW).solved is loose
+    assert [bool(each["gradient"]) for each in (found, whole)] == [not loose, True]
+    assert ["growth" in each for each in (found, whole)] == [not loose, True]
+    assert [row["worst"] for row in found["refined"]] == [row["worst"] for row in whole["refined"]]
+    assert (found["residual"], found["misses"]) == (whole["residual"], whole["misses"])
 
 
 @pytest.mark.slow

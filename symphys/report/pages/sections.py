@@ -63,6 +63,10 @@ ONLY_MOTION = (
     "Only the motion was examined. “symphys check --at” this folder also examines its gradient, finer time steps and "
     "the growth of changes."
 )
+ONLY_VALUES = (
+    "The solver took no derivatives, and none was examined. “symphys check --at” this folder compares them with "
+    "differences, and examines the growth of changes."
+)
 HOW_FAR = "How far to trust this"
 HOW_GROWN = (
     "By how much a small change of the state at time t is magnified until the end: distances in m, velocities in m/s, "
@@ -260,10 +264,12 @@ def trusted(run: Run, charts: Mapping[str, Chart]) -> Html:
         unknown = tag("p", NOT_EXAMINED) if run.readable else ""
         return card(HOW_FAR, unknown, anchor="trust")
     rows = [[pill(line.level, MARKS[line.level]), line.what, line.number, line.meaning] for line in lines]
+    known = run.examination
+    unexamined = "" if known.gradient else ONLY_VALUES if known.refined else ONLY_MOTION
     return card(
         HOW_FAR,
         tag("p", advice(run.examination, judged)),
-        tag("p", ONLY_MOTION) if not run.examination.gradient else "",
+        tag("p", unexamined) if unexamined else "",
         table(["", "check", "value", "interpretation"], rows, "tttt", "Verification"),
         step_note(run.examination),
         named_figure(charts, "growth", HOW_GROWN),
@@ -292,7 +298,7 @@ def refined(trust: Examination, judged: Judged) -> Html:
         "details",
         tag("summary", "Refined and smoothed, as numbers"),
         table(header, rows, "tnnt", "Answers"),
-        table(gradients, changes, "tnnt" + "n" * (len(gradients) - 4), "Gradients"),
+        table(gradients, changes, "tnnt" + "n" * (len(gradients) - 4), "Gradients") if changes else "",
         tag("p", HOW_REFINED, class_="caption"),
     )
 
