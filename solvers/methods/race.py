@@ -68,6 +68,7 @@ NO_LIMIT = 10**12
 """Evaluations of a search, which its rounds limit."""
 SEEDS = 100_000
 """Between the seeds of searches that begin anew."""
+LOWEST = "everything is met, and from there no step lowers what it costs: good enough, or at a kink"
 USED_UP = "the finisher's iterations are used up: raise `finisher_iterations`"
 NEAR_SIGMA = 0.3
 """First standard deviation of a search near what the finisher has found, in units of that of the first search."""
@@ -479,6 +480,8 @@ class Race:
         ended = best if best.kind not in SEARCHES else last
         ended = self.parts[-1] if self.parts[-1].status.fatal else ended
         status, advice = ended.status, ended.advice if ended.status is not Status.BUDGET else USED_UP
+        if best.confirmed and status is Status.STALLED:
+            advice = LOWEST
         if reason:
             status, advice = reason.status, reason.advice
         elif best.met and self.problem.stop_when_met:
