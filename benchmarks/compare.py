@@ -12,6 +12,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -160,7 +161,7 @@ def stages(name: str) -> dict[str, float]:
     from symphys.solvers import solver
     from symphys.transcription import transcribe
 
-    shooting = transcribe(problem(name), threads=1).shooting
+    shooting = transcribe(replace(problem(name), scenarios=None), threads=1).shooting  # samples have no stages
     staged, chosen = shooting.staged(), solver("ilqr")
     motion = staged.roll_out(shooting.start(0), 0.0)
     slopes = staged.linearize(motion)
