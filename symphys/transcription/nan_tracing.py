@@ -18,7 +18,7 @@ from symphys.transcription.recorded_parts import (
     part_numbers,
 )
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.terms import Occasions, instant, part_occasions, problem_terms
+from symphys.transcription.terms import EvaluationPoints, instant, part_points, problem_terms
 from symphys.types import Array
 
 OPERATION_FORMATS = {
@@ -223,13 +223,13 @@ def _cause(found: NonFiniteOperation | None, names: Sequence[Columns], results: 
 
 def _instants(rollout: Rollout) -> Iterator[tuple[str, Objective, Formula, int, int]]:
     """Yield (kind, objective, formula, number of the state, number of the inputs) of all evaluations of formulas."""
-    found: list[tuple[Objective, Occasions]] = [(term.table, term.occasions) for term in problem_terms(rollout)]
+    found: list[tuple[Objective, EvaluationPoints]] = [(term.table, term.points) for term in problem_terms(rollout)]
     found += [(output, instant(rollout, output.at)) for output in rollout.problem.outputs]
-    for asked, occasions in found:
+    for asked, points in found:
         kind = type(asked).__name__.lower()
         for part in asked.formula.parts:
-            yield from ((kind, asked, part.formula, k, row) for k, row in part_occasions(rollout, part).pairs)
-        yield from ((kind, asked, asked.formula, k, row) for k, row in occasions.pairs)
+            yield from ((kind, asked, part.formula, k, row) for k, row in part_points(rollout, part).pairs)
+        yield from ((kind, asked, asked.formula, k, row) for k, row in points.pairs)
 
 
 def _formula_arguments(rollout: Rollout, arrays: RolloutArrays, formula: Formula, k: int, row: int) -> list[Array]:

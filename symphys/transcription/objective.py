@@ -19,7 +19,7 @@ from symphys.maths.smoothing import length
 from symphys.problem import Constraint, Problem
 from symphys.records import dataclass
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.terms import Occasions, Term, instant, part_occasions, problem_terms
+from symphys.transcription.terms import EvaluationPoints, Term, instant, part_points, problem_terms
 from symphys.types import Array, Expr
 
 MIN_SEPARATE_SUM = 512
@@ -62,9 +62,9 @@ class FormulaSamples:
         moments = [symbol for pair in self.moments.values() for symbol in pair]
         return [self.z, self.p, *moments, *self.series.values(), *self.totals.values()]
 
-    def at(self, formula: Formula, occasion: Occasions) -> Expr:
+    def at(self, formula: Formula, point: EvaluationPoints) -> Expr:
         """Return the value (m,) of a formula at one instant."""
-        (key,) = occasion.pairs
+        (key,) = point.pairs
         k, _ = key
         if key not in self.moments:
             x0, given = self.rollout.x0, self.rollout.given
@@ -75,10 +75,10 @@ class FormulaSamples:
 
     def _part(self, part: MotionPart) -> Expr:
         """Return the value (m,) of a part over the whole motion; integrals follow the rule of running costs."""
-        occasions = part_occasions(self.rollout, part)
+        points = part_points(self.rollout, part)
         if part.kind in ("start", "end"):
-            return self.at(part.formula, occasions)
-        average = _mean(ca.horzcat(*(self.values((part.formula, side)) for side in occasions.sides)))
+            return self.at(part.formula, points)
+        average = _mean(ca.horzcat(*(self.values((part.formula, side)) for side in points.sides)))
         return average if part.kind == "average" else self.interval * self.steps * average
 
     def values(self, series: Series) -> Expr:
@@ -148,7 +148,7 @@ def terms(samples: FormulaSamples) -> Terms:
     asked = problem_terms(samples.rollout)
     first, last = len(problem.costs), len(problem.costs) + len(problem.targets)
     costs = [_cost(samples, term) for term in asked[:first]]
-    targets = [samples.at(term.formula, term.occasions) for term in asked[first:last]]
+    targets = [samples.at(term.formula, term.points) for term in asked[first:last]]
     limits = [_Limit(samples, term) for term in asked[last:]]
     # Objective = costs + squared residuals of targets; penalties are squared violations.
     residuals = [np.sqrt(term.weight) * value for term, value in zip(asked[first:last], targets, strict=True)]
@@ -220,8 +220,8 @@ def _mean(samples: Expr) -> Expr:
 
 def _over_time(samples: FormulaSamples, term: Term) -> Expr:
     """Return the values (m, evaluations) of a running term."""
-    series = [samples.values((term.formula, side)) for side in term.occasions.sides]
-    steps = term.occasions.steps
+    series = [samples.values((term.formula, side)) for side in term.points.sides]
+    steps = term.points.steps
     return ca.horzcat(*(each if len(steps) == samples.steps else each[:, steps.start : steps.stop] for each in series))
 
 
@@ -235,10 +235,10 @@ class _Cost(NamedTuple):
 
 def _cost(samples: FormulaSamples, term: Term) -> _Cost:
     if not term.running:
-        return _weighed(term, samples.at(term.formula, term.occasions), term.weight)
-    values, steps = _over_time(samples, term), len(term.occasions.steps)
+        return _weighed(term, samples.at(term.formula, term.points), term.weight)
+    values, steps = _over_time(samples, term), len(term.points.steps)
     weight = term.weight * samples.interval * steps / values.shape[1]
-    series = tuple((term.formula, side) for side in term.occasions.sides)
+    series = tuple((term.formula, side) for side in term.points.sides)
     whole = steps == samples.steps and not (term.kind == "squares" and samples.problem.free_duration)
     return _weighed(term, values, weight, (lambda scale: samples.sums(series, scale)) if whole else None)
 
@@ -259,7 +259,7 @@ class _Limit:
     def __init__(self, samples: FormulaSamples, term: Term) -> None:
         table = term.table
         assert isinstance(table, Constraint)
-        values = _over_time(samples, term) if term.running else samples.at(term.formula, term.occasions)
+        values = _over_time(samples, term) if term.running else samples.at(term.formula, term.points)
         self.name = table.name
         self.value, self.mean = ca.vec(values), _mean(values)
         self.lower, self.upper = term.bounds(int(values.shape[0]))

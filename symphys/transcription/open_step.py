@@ -262,7 +262,7 @@ def costs(rollout: Rollout, value: Value) -> tuple[Expr, Expr]:
     for term in problem_terms(rollout):
         if term.kind == "limit":
             continue
-        sides = term.occasions.sides
+        sides = term.points.sides
         weight = term.weight * rollout.dt / len(sides) if term.running else term.weight
         for side in sides:
             found = value(term.formula, side)
@@ -270,7 +270,7 @@ def costs(rollout: Rollout, value: Value) -> tuple[Expr, Expr]:
             if term.running:
                 running = running + cost
             else:
-                single[term.occasions.steps.start + side] += cost
+                single[term.points.steps.start + side] += cost
     return running, ca.vertcat(ca.DM(0, 1), *single.values())
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from symphys.expression import Formula, MotionPart
 from symphys.records import dataclass
 from symphys.transcription.rollout import Rollout
-from symphys.transcription.terms import part_occasions
+from symphys.transcription.terms import part_points
 from symphys.types import Array
 
 
@@ -63,7 +63,7 @@ def _numbers(rollout: Rollout, arrays: RolloutArrays, part: MotionPart) -> Array
     """Evaluate a part (m,)."""
     compiled = rollout.compiled(part.formula)
     found = [
-        np.array(compiled(*formula_arguments(arrays, k, row))).ravel() for k, row in part_occasions(rollout, part).pairs
+        np.array(compiled(*formula_arguments(arrays, k, row))).ravel() for k, row in part_points(rollout, part).pairs
     ]
     total = np.mean(found, axis=0)
     return np.asarray(total * arrays.time[-1] if part.kind == "integral" else total)

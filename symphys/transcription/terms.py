@@ -18,7 +18,7 @@ from symphys.types import Array
 
 
 @dataclass(frozen=True)
-class Occasions:
+class EvaluationPoints:
     """Where along a motion a formula is evaluated: in some steps, each time with the inputs of the step.
 
     Attributes:
@@ -35,20 +35,20 @@ class Occasions:
         return [(k + side, k) for side in self.sides for k in self.steps]
 
 
-def instant(rollout: Rollout, when: str | float) -> Occasions:
+def instant(rollout: Rollout, when: str | float) -> EvaluationPoints:
     """Return the state at the end or nearest to a time [s]; the last state belongs to the last step."""
     tick = rollout.tick(when)
     step = min(tick, rollout.steps - 1)
-    return Occasions(range(step, step + 1), (tick - step,))
+    return EvaluationPoints(range(step, step + 1), (tick - step,))
 
 
-def over_time(rollout: Rollout, formula: Formula, phase: Phase | None = None) -> Occasions:
+def over_time(rollout: Rollout, formula: Formula, phase: Phase | None = None) -> EvaluationPoints:
     """Return where the mean over a motion or a phase is taken: by the trapezoidal rule of what changes in a step."""
     steps = range(*((0, rollout.steps) if phase is None else phase.ticks(rollout.steps)))
-    return Occasions(steps, (0, 1) if rollout.moves(formula) else (0,))
+    return EvaluationPoints(steps, (0, 1) if rollout.moves(formula) else (0,))
 
 
-def part_occasions(rollout: Rollout, part: MotionPart) -> Occasions:
+def part_points(rollout: Rollout, part: MotionPart) -> EvaluationPoints:
     """Return where the formula of a part is evaluated."""
     if part.kind in ("start", "end"):
         return instant(rollout, 0.0 if part.kind == "start" else "end")
@@ -63,14 +63,14 @@ class Term:
         table: that it is from.
         kind: ``cost``: its values are summed; ``squares``: their squares are; ``limit``: they lie within bounds.
         weight: factor of the sum; of a limit, of its squared violations, each value's.
-        occasions: where it is evaluated.
+        points: where it is evaluated.
         running: whether sums are integrals over time: times the time step.
     """
 
     table: Cost | Target | Constraint
     kind: Literal["cost", "squares", "limit"]
     weight: float
-    occasions: Occasions
+    points: EvaluationPoints
     running: bool = False
 
     @property
@@ -81,7 +81,7 @@ class Term:
     def bounds(self, size: int) -> tuple[Array, Array]:
         """Return the lower and upper bounds of a limit of ``size`` components, (steps * size,) step by step."""
         assert isinstance(self.table, Constraint), "nothing else has bounds"
-        count = len(self.occasions.steps)
+        count = len(self.points.steps)
         ends = (np.broadcast_to(end, (size,)) for end in (self.table.lower, self.table.upper))
         lower, upper = (np.tile(end, count) for end in ends)
         return lower, upper
@@ -105,7 +105,7 @@ def limit_term(rollout: Rollout, limit: Constraint) -> Term:
     if limit.at != "always":
         return Term(limit, "limit", limit.penalty, instant(rollout, limit.at))
     steps = over_time(rollout, limit.formula, limit.during).steps
-    return Term(limit, "limit", limit.penalty, Occasions(steps, (1,)), True)
+    return Term(limit, "limit", limit.penalty, EvaluationPoints(steps, (1,)), True)
 
 
 def problem_terms(rollout: Rollout) -> list[Term]:

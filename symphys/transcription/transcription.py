@@ -93,9 +93,9 @@ class Transcription:
         """
         from symphys.transcription.simulation import recorded, simulate
 
-        found = None if self._cache.doubted else recorded(self.rollout, self.arrays(z, smoothing))
+        found = None if self._cache.by_reports else recorded(self.rollout, self.arrays(z, smoothing))
         if found is None:
-            self._cache.doubted, self._cache.last = True, None
+            self._cache.by_reports, self._cache.last = True, None
             found = simulate(self.rollout, self._reported, np.array(z, float), smoothing)
         return found
 
@@ -118,7 +118,7 @@ class Transcription:
         _, given, p = (np.array(part) for part in self._start(z))
         dt = float(np.ravel(rollout.parameters.step_length(self.problem.simulation, p.ravel()))[0])
         time = np.arange(rollout.steps + 1, dtype=np.float64) * dt
-        if self._cache.doubted or (smoothing and steps.step.exact):
+        if self._cache.by_reports or (smoothing and steps.step.exact):
             x, u = (part.T for part in self._reported(z, smoothing)[:2])
         else:
             x = steps.states(z[None], smoothing)[0]
@@ -129,8 +129,8 @@ class Transcription:
         return RolloutArrays(z, smoothing, x, u, given.T, p.ravel(), time)
 
     def simulate_by_reports(self) -> None:
-        """Simulate by the functions that report what happened, on casadi's virtual machine, and build no others."""
-        self._cache.doubted = True
+        """Let casadi's virtual machine give all motions, by functions that report what happened; build no others."""
+        self._cache.by_reports = True
 
     @cached_property
     def _cache(self) -> _Cache:
@@ -269,7 +269,8 @@ class _Cache:
     Attributes:
         last: the last motion, with its z and smoothing.
         reported: likewise the last results of the virtual machine's rollout.
-        doubted: whether the virtual machine has taken a step elsewhere than the kernel: then it takes all of them.
+        by_reports: whether the virtual machine's reports give all motions: it has taken a step elsewhere than the
+            kernel, or no kernel is to be built.
         gives_probes: whether values of the evaluator come with the probe, as those of kernels do.
     """
 
@@ -277,7 +278,7 @@ class _Cache:
         """Begin with nothing."""
         self.last: tuple[Key, RolloutArrays] | None = None
         self.reported: tuple[Key, list[Array]] | None = None
-        self.doubted, self.gives_probes = False, True
+        self.by_reports, self.gives_probes = False, True
 
 
 def gradient_prices(

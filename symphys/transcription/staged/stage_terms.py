@@ -344,14 +344,14 @@ class _Terms:
     def all(self) -> Iterator[StageTerm]:
         for term in problem_terms(self.rollout):
             if term.running:
-                yield from (self._running(term, bool(side)) for side in term.occasions.sides)
+                yield from (self._running(term, bool(side)) for side in term.points.sides)
             else:
                 yield self._instant(term)
 
     def _running(self, term: Term, after: bool) -> StageTerm:
         """Make a term at one side of its steps; a varying time step is part of the value."""
-        name, kind, steps = term.table.name, term.kind, np.array(term.occasions.steps, np.int64)
-        weight, key = term.weight / len(term.occasions.sides), self._key(term.formula, kind, after)
+        name, kind, steps = term.table.name, term.kind, np.array(term.points.steps, np.int64)
+        weight, key = term.weight / len(term.points.sides), self._key(term.formula, kind, after)
         value, dt = self.symbols.value(term.formula, after), self.symbols.interval
         if not self.free or kind == "limit":
             return StageTerm(name, kind, weight * self.rollout.dt, steps, after, value, key)
@@ -359,7 +359,7 @@ class _Terms:
         return StageTerm(name, kind, weight, steps, after, value, (*key, "running"))
 
     def _instant(self, term: Term) -> StageTerm:
-        ((tick, step),) = term.occasions.pairs
+        ((tick, step),) = term.points.pairs
         formula, kind, last = term.formula, term.kind, self.rollout.steps
         if not formula.parts:
             value, key = self.symbols.value(formula, tick == last), self._key(formula, kind, tick == last)
