@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import casadi as ca
@@ -28,7 +29,7 @@ from symphys.transcription.formula_names import input_names
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.sampler import Sampler
 from symphys.transcription.stage import BatchStep, Stage, Value, sense_function
-from symphys.transcription.terms import problem_terms
+from symphys.transcription.terms import Term, problem_terms
 from symphys.types import Array, Expr
 
 
@@ -202,21 +203,6 @@ def refuse_motion_parts(problem: Problem) -> None:
         for each in every
         if each.formula.parts
     ]
-    issues += [
-        Issue(f'cost "{cost.name}".during', f"{quote(cost.during.name)} is a phase of a whole motion; this is one step")
-        for cost in problem.costs
-        if cost.during is not None
-    ]
-    issues += [
-        Issue(f'phase "{phase.name}".sets', "holds in a phase of a whole motion; this is one step")
-        for phase in problem.phases
-        if phase.sets
-    ]
-    issues += [
-        Issue(f'force "{law.name}".during', "is a phase of a whole motion; this is one step")
-        for law in problem.forces
-        if law.during is not None
-    ]
     if issues:
         raise ProblemError(problem.file, issues)
 
@@ -245,40 +231,34 @@ def asked(problem: Problem) -> list[Cost | Target]:
     return [*problem.costs, *problem.targets]
 
 
-def moments(problem: Problem) -> tuple[int, ...]:
-    """Return the numbers of the steps with a cost at one instant: at their start, in the last step at its end."""
-    last = problem.simulation.steps
-    instants = {each.at for each in asked(problem) if each.at != "always"}
-    return tuple(sorted({last if isinstance(at, str) else round(at / problem.simulation.dt) for at in instants}))
-
-
-def costs(rollout: Rollout, value: Value) -> tuple[Expr, Expr]:
-    """Return the running costs of a step, and the costs (moments,) that the step with each of these numbers adds.
-
-    Over all steps of a horizon both add up to the objective.
-    """
-    running: Expr = ca.DM(0)
-    single: dict[int, Expr] = {tick: ca.DM(0) for tick in moments(rollout.problem)}
+def cost_terms(rollout: Rollout) -> dict[range, list[Term]]:
+    """Return the costs and targets by the steps to which they add: all of them, those of a phase, or one."""
+    found = dict[range, list[Term]]()
     for term in problem_terms(rollout):
-        if term.kind == "limit":
-            continue
-        sides = term.points.sides
-        weight = term.weight * rollout.dt / len(sides) if term.running else term.weight
-        for side in sides:
-            found = value(term.formula, side)
-            cost = weight * (ca.sumsqr(found) if term.kind == "squares" else found)
-            if term.running:
-                running = running + cost
-            else:
-                single[term.points.steps.start + side] += cost
-    return running, ca.vertcat(ca.DM(0, 1), *single.values())
+        if term.kind != "limit":
+            found.setdefault(term.points.steps, []).append(term)
+    return found
+
+
+def step_costs(rollout: Rollout, value: Value) -> Expr:
+    """Return (r,) what each entry of ``cost_terms`` adds in a step; over all its steps they add up to the objective."""
+    sums = []
+    for terms in cost_terms(rollout).values():
+        total: Expr = ca.DM(0)
+        for term in terms:
+            weight = term.weight * rollout.dt / len(term.points.sides) if term.running else term.weight
+            for side in term.points.sides:
+                found = value(term.formula, side)
+                total += weight * (ca.sumsqr(found) if term.kind == "squares" else found)
+        sums.append(total)
+    return ca.vertcat(ca.DM(0, 1), *sums)
 
 
 def open_stage(rollout: Rollout, sensors: Sequence[str]) -> Stage:
-    """Return a stage with the costs ``running`` and ``moments``; see ``costs``."""
+    """Return a stage with ``costs``; see ``step_costs``."""
 
     def ask(value: Value) -> dict[str, Expr]:
-        return dict(zip(("running", "moments"), costs(rollout, value), strict=True))
+        return {"costs": step_costs(rollout, value)}
 
     return Stage(rollout, observe_function(rollout, sensors), ask, reads_variables(rollout.problem))
 
@@ -425,9 +405,7 @@ class CompiledStep:
         after = states.copy()
         after[:, : self._sizes[0]] = found["after"]
         after[:, self._clock] += self._rollout.dt
-        cost = np.array(found["running"][:, 0])
-        if "moments" in found:
-            cost += np.sum(np.where(self._now(states), found["moments"], 0.0), axis=1)
+        cost = np.sum(np.where(self._now(states), found["costs"], 0.0), axis=1) if self._spans else np.zeros(len(rows))
         return StepResult(after, np.array(found.get("sensed", np.zeros((len(rows), 0)))), cost)
 
     def pull(
@@ -459,8 +437,7 @@ class CompiledStep:
         seeds = {
             "after": later[:, :nx],
             "sensed": matrix("observation", observation, self.observation_size),
-            "running": costs[:, None],
-            "moments": np.where(self._now(states), costs[:, None], 0.0),
+            "costs": np.where(self._now(states), costs[:, None], 0.0),
         }
         whole = np.concatenate([seeds[name] for name in self._evaluated.sizes], axis=1)
         _, slopes = self._evaluated.gradient(rows, np.ascontiguousarray(whole), (self.smoothing,))
@@ -473,15 +450,11 @@ class CompiledStep:
     def rest(self, state: ArrayLike) -> Array:
         """Return (B,) the cost of all remaining steps of motions that are over."""
         states = np.array(matrix("state", state, self.state_size))
-        still, special = np.zeros((len(states), self.action_size)), self._instants
-        ticks, total = self._ticks(states), np.zeros(len(states))
-        usual = next((k for k in range(self.steps) if k not in special), None)
-        for tick in [*special, *([] if usual is None else [usual])]:
-            states[:, self._clock] = tick * self._rollout.dt
-            ahead = (tick >= ticks).astype(float)
-            if tick == usual:
-                ahead = np.maximum(self.steps - ticks, 0) - sum(((k >= ticks).astype(float) for k in special), 0.0)
-            total += ahead * self(states, still).cost
+        still, ticks, total = np.zeros((len(states), self.action_size)), self._ticks(states), np.zeros(len(states))
+        ends = sorted({0, self.steps, *(end for span in self._spans for end in (span.start, span.stop))})
+        for first, last in pairwise(ends):
+            states[:, self._clock] = first * self._rollout.dt
+            total += np.clip(last - np.maximum(first, ticks), 0, None) * self(states, still).cost
         return total
 
     def alive(self, state: ArrayLike) -> NDArray[np.bool_]:
@@ -500,14 +473,14 @@ class CompiledStep:
         return np.rint(states[:, self._clock] / self._rollout.dt).astype(np.int64)
 
     def _now(self, states: Array) -> NDArray[np.bool_]:
-        """Return (B, moments) which instants fall into the step from here."""
-        wanted = [min(tick, self.steps - 1) for tick in moments(self.problem)]
-        return np.equal(self._ticks(states)[:, None], np.array(wanted, np.int64).reshape(1, -1))
+        """Return (B, r) which costs the step from here adds; after the last step those of all steps go on."""
+        ticks, whole = self._ticks(states), range(self.steps)
+        return np.array([(each == whole) | ((ticks >= each.start) & (ticks < each.stop)) for each in self._spans]).T
 
     @cached_property
-    def _instants(self) -> list[int]:
-        """The numbers of the steps with an instant."""
-        return sorted({min(tick, self.steps - 1) for tick in moments(self.problem)})
+    def _spans(self) -> tuple[range, ...]:
+        """The steps to which costs add."""
+        return tuple(cost_terms(self._rollout))
 
     def _rows(self, states: Array, actions: Array, inputs: ArrayLike | None) -> Array:
         """Return the rows (B, m) of the kernel."""

@@ -87,8 +87,6 @@ def transcribe(
             plain = replace(plain, steps=cache(lambda: _steps(rest, backend, threads, exact)))
         return with_scenarios(plain, problem, exact, backend, threads)
     if has_large_nets(problem):
-        from symphys.transcription.network_rollout import transcribe_large
-
         return transcribe_large(problem, exact, backend, threads)
     return transcribe_whole(problem, exact, backend, threads)
 
@@ -113,18 +111,51 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
     began = perf_counter()
     rollout = symbolic_rollout(problem)
     functions = ExpressionFunctions(rollout)
-    names, lower, upper = bounds(rollout)
     built = perf_counter() - began
     require_backend(backend)
     chosen = cache(lambda: _evaluating(rollout, functions, exact, backend, threads))
     steps = cache(lambda: _steps(problem, backend, threads, exact))
     staged = cache(lambda: _stages(steps(), backend, threads))
-    shooting = ShootingProblem(
-        name=problem.name,
-        blocks=blocks(problem),
-        evaluator=LaterEvaluator(lambda: chosen().evaluator),
+    shooting = replace(
+        _shooting(problem, rollout, LaterEvaluator(lambda: chosen().evaluator), staged),
         nlp=LaterNlp(lambda: chosen().nlp),
         squares=has_squares(problem),
+        by_steps=_by_steps(rollout, staged, backend),
+    )
+    return Transcription(problem, rollout, functions, shooting, lambda: chosen().description, built, steps)
+
+
+def transcribe_large(problem: Problem, exact: bool, backend: str, threads: int | None) -> Transcription:
+    """Transcribe a problem with large nets beside its steps; with fixed weights its steps may have them too."""
+    from symphys.transcription.network_rollout import LargeTranscription, fits_step
+    from symphys.transcription.network_rollout.context import make_context
+    from symphys.transcription.network_rollout.transcription import evaluator_or_plain
+
+    began = perf_counter()
+    context = make_context(problem)
+    built = perf_counter() - began
+    evaluator, description = evaluator_or_plain(context, exact, backend, processors() if threads is None else threads)
+    steps = cache(lambda: _steps(problem, backend, threads, exact))
+    staged = cache(lambda: _stages(steps(), backend, threads)) if fits_step(problem) else None
+    shooting = _shooting(problem, context.rollout, evaluator, staged)
+    functions = ExpressionFunctions(context.rollout, context.objectives.terms)
+    return LargeTranscription(
+        problem, context.rollout, functions, shooting, lambda: description, built, steps, context=context
+    )
+
+
+def _shooting(
+    problem: Problem, rollout: Rollout, evaluator: Evaluator, staged: Callable[[], RolloutStages] | None
+) -> ShootingProblem:
+    """Return what solvers see of a problem, without expressions and residuals."""
+    names, lower, upper = bounds(rollout)
+    missable = problem.targets or problem.constraints
+    return ShootingProblem(
+        name=problem.name,
+        blocks=blocks(problem),
+        evaluator=evaluator,
+        nlp=Nlp(None),
+        squares=False,
         constraint_names=names,
         constraint_lower=lower,
         constraint_upper=upper,
@@ -133,11 +164,9 @@ def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int |
         stop_when_met=problem.stop_when_met,
         output_names=tuple(output.label for output in problem.outputs),
         staged=staged,
-        by_steps=_by_steps(rollout, staged, backend),
-        asking=asking(staged) if problem.targets or problem.constraints else None,
+        asking=asking(staged) if staged is not None and missable else None,
         guessed_states=states_of(staged, problem.guess),
     )
-    return Transcription(problem, rollout, functions, shooting, lambda: chosen().description, built, steps)
 
 
 def _steps(problem: Problem, backend: str, threads: int | None, exact: bool) -> Linearization:

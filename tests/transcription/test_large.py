@@ -14,6 +14,7 @@ from fakes.emulated import Remote, needs_compiler
 from tools.repeats import thorough
 from worlds.monopod import MONOPOD
 
+from symphys import solve
 from symphys.errors import ProblemError
 from symphys.export.writing import export_problem
 from symphys.problem import load_problem
@@ -424,19 +425,44 @@ def test_a_device_that_cannot_multiply(
     assert np.allclose(a.gradient, b.gradient, rtol=0, atol=1e-11 * np.abs(a.gradient).max())
 
 
-def test_what_large_nets_cannot_have(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Formulas that look at their weights, and huge ones in exported code: refused before anything is built."""
+def test_formulas_may_read_the_weights(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The step has such a net, unless it is huge: that is refused, as it is in exported code."""
     path = tmp_path / "hopping.toml"
     path.write_text(
         HOPPING.replace("ACTIVATION", "skip = true").replace('"[leg.torque, start]"', '"[leg.torque, weights]"')
     )
     problem = load_problem(path)
+    monkeypatch.setattr(split, "MAX_STEP_WEIGHTS", 1000)
+    made = transcribe(problem, backend="casadi")
+    z = made.shooting.start(0)[None]
+    within = made.shooting.evaluator.gradient(z, 0.0)
     monkeypatch.setattr(split, "MAX_STEP_WEIGHTS", 10)
-    with pytest.raises(ProblemError, match=r'cost "effort": .*weights'):
+    beside = transcribe(problem, backend="casadi").shooting.evaluator.gradient(z, 0.0)
+    assert within.gradient is not None and beside.gradient is not None
+    assert np.allclose(beside.merit, within.merit, rtol=1e-12)
+    assert np.allclose(beside.gradient, within.gradient, rtol=0, atol=1e-9 * np.abs(within.gradient).max())
+    monkeypatch.setattr(split, "MAX_COMPILED_WEIGHTS", 20)
+    with pytest.raises(ProblemError, match=r'cost "effort": looks at weights, .* up to 20, and there are \d+'):
         transcribe(problem)
-    monkeypatch.setattr(split, "MAX_EXPORTED_WEIGHTS", 20)
     with pytest.raises(ProblemError, match=r'controller "brain"\.net: .*20'):
         require_small_nets(problem, "export")
+
+
+def test_solvers_by_steps_take_nets_whose_weights_are_fixed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They find the same, to rounding, whether the net is large; with weights that vary they say what to take."""
+    path = tmp_path / "fixed.toml"
+    fixed = HOPPING.replace("ACTIVATION", "skip = true").replace('sets = "brain.weights"', 'sets = "other.weights"')
+    path.write_text(fixed)
+    problem = load_problem(path)
+    monkeypatch.setattr(split, "MAX_STEP_WEIGHTS", 1000)
+    within = solve(problem, "ilqr", backend="casadi", iterations=10)
+    monkeypatch.setattr(split, "MAX_STEP_WEIGHTS", 30)
+    beside = solve(problem, "ilqr", backend="casadi", iterations=10)
+    assert isinstance(transcribe(problem, backend="casadi"), LargeTranscription)
+    known, found = ([stage.objective for stage in each.run.stages] for each in (within, beside))
+    assert beside.run.iterations == 10 and found == pytest.approx(known, rel=1e-6)
+    path.write_text(HOPPING.replace("ACTIVATION", "skip = true"))
+    assert transcribe(load_problem(path), backend="casadi").shooting.staged is None
 
 
 def test_quantities_and_exported_functions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ import pytest
 from tools.repeats import thorough
 
 from symphys.codegen import interpret
-from symphys.errors import ProblemError, SymphysError
+from symphys.errors import ProblemError
 from symphys.problem import Problem, problem_of_tables
 from symphys.transcription import Transcription, rollout_program, transcribe
 from symphys.transcription.open_step import compile_open_step
@@ -256,7 +256,14 @@ def test_what_cannot_be_names_table_and_key(tables: dict[str, Any], message: str
         changed(**tables)
 
 
-def test_a_single_step_has_no_phases() -> None:
-    push = {"name": "push", "sets": "sled.force", "knots": 2}
-    with pytest.raises(SymphysError, match=r'phase "ice".sets: .*whole motion'):
-        compile_open_step(changed(variable=[push]), backend="casadi")
+def test_single_steps_slide_over_ice_then_asphalt() -> None:
+    push = {"name": "push", "sets": "sled.force", "knots": 2, "guess": [0.5, 0, 0]}
+    problem = changed(variable=[*SLED["variable"], push])
+    step, made = compile_open_step(problem, backend="casadi"), transcribe(problem, backend="casadi")
+    state, total = step.start().state, 0.0
+    for _ in range(step.steps):
+        state, _, cost = step(state, np.array([[0.5, 0.0, 0.0]]))
+        total += cost[0]
+    z = made.shooting.start(0)
+    assert total == pytest.approx(made.judge(z).objective, rel=1e-12)
+    assert state[0, step.columns["sled.position"]] == pytest.approx(made.simulate(z).position[-1, 0], abs=1e-12)

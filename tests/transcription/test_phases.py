@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from symphys.codegen import interpret
-from symphys.errors import ProblemError, SymphysError
+from symphys.errors import ProblemError
 from symphys.problem import problem_of_tables
 from symphys.transcription import rollout_program, transcribe
 from symphys.transcription.open_step import compile_open_step
@@ -140,9 +140,23 @@ def test_what_cannot_be_names_table_and_key(change: dict[str, Any], message: str
         problem_of_tables({**TABLES, **change})
 
 
-def test_a_single_step_has_no_phases() -> None:
-    with pytest.raises(SymphysError, match="phase of a whole motion"):
-        compile_open_step(problem_of_tables(TABLES), backend="casadi")
-    with pytest.raises(SymphysError, match=r'force "drag".during: .*whole motion'):
-        push = {"name": "push", "sets": "ball.force", "knots": 2}
-        compile_open_step(problem_of_tables({**WADING, "variable": [push]}), backend="casadi")
+@pytest.mark.parametrize(
+    "tables",
+    [
+        TABLES,
+        {**WADING, "variable": [{"name": "push", "sets": "ball.force", "knots": 200, "guess": [0.3, 0, 0.1]}]},
+    ],
+    ids=["costs", "forces"],
+)
+def test_single_steps_know_their_phase(tables: dict[str, Any]) -> None:
+    """Costs of all steps of a horizon add up to the objective of the whole motion, whose last state they reach."""
+    problem = problem_of_tables({**tables, "constraint": []})
+    step, made = compile_open_step(problem, backend="casadi"), transcribe(problem, backend="casadi")
+    state, total = step.start().state, 0.0
+    knots = np.concatenate([v.guess.reshape(step.steps, -1) for v in problem.variables if v.kind == "control"], axis=1)
+    for action in knots:
+        state, _, cost = step(state, action[None])
+        total += cost[0]
+    z = made.shooting.start(0)
+    assert total == pytest.approx(made.judge(z).objective, rel=1e-12)
+    assert state[0, step.columns["ball.position"]] == pytest.approx(made.simulate(z).position[-1, 0], abs=1e-12)

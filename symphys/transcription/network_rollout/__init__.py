@@ -6,23 +6,23 @@ from symphys.later import later
 
 if TYPE_CHECKING:
     from symphys.transcription.network_rollout.evaluator import LargeEvaluator, Shared
-    from symphys.transcription.network_rollout.partition import has_large_nets, require_small_nets
-    from symphys.transcription.network_rollout.transcription import LargeTranscription, transcribe_large
+    from symphys.transcription.network_rollout.partition import fits_step, has_large_nets, require_small_nets
+    from symphys.transcription.network_rollout.transcription import LargeTranscription
 
 __all__ = [
     "LargeEvaluator",
     "LargeTranscription",
     "Shared",
+    "fits_step",
     "has_large_nets",
     "require_small_nets",
-    "transcribe_large",
 ]
 
 __getattr__ = later(
     __name__,
     {
         "evaluator": ("LargeEvaluator", "Shared"),
-        "partition": ("has_large_nets", "require_small_nets"),
-        "transcription": ("LargeTranscription", "transcribe_large"),
+        "partition": ("fits_step", "has_large_nets", "require_small_nets"),
+        "transcription": ("LargeTranscription",),
     },
 )

@@ -21,13 +21,9 @@ from symphys.types import Array
 Indices = NDArray[np.intp]
 MAX_STEP_WEIGHTS = 4096
 """Largest number of weights of a net within the compiled step, where every lane has its own."""
-MAX_EXPORTED_WEIGHTS = 100_000
-"""The same bound for exported code, which has only the step; compiling takes half a minute."""
-
-
-def is_large(controller: FeedbackController) -> bool:
-    """Whether a controller is a net that matrix products should compute."""
-    return isinstance(controller.law, Net) and controller.law.sizes["weights"] > MAX_STEP_WEIGHTS
+MAX_COMPILED_WEIGHTS = 100_000
+"""The same bound where there is nothing but the step: exported code, Jacobians of steps with fixed weights, and
+formulas that read the weights; compiling takes half a minute."""
 
 
 def has_large_nets(problem: Problem) -> bool:
@@ -36,16 +32,34 @@ def has_large_nets(problem: Problem) -> bool:
 
 
 def large_nets(problem: Problem) -> tuple[FeedbackController, ...]:
-    """Return the controllers that are large nets."""
-    return tuple(controller for controller in problem.controllers if is_large(controller))
+    """Return the controllers that matrix products compute: nets of many weights, which no formula reads."""
+    large = [net for net in problem.controllers if _size(net) > MAX_STEP_WEIGHTS]
+    read = {name for _, each in _formulas(problem) for name in each.formula.needed} if large else set()
+    return tuple(net for net in large if _size(net) > MAX_COMPILED_WEIGHTS or read.isdisjoint(_names(problem, net)))
+
+
+def _size(controller: FeedbackController) -> int:
+    return controller.law.sizes["weights"] if isinstance(controller.law, Net) else 0
+
+
+def _names(problem: Problem, controller: FeedbackController) -> set[str]:
+    """Return the names by which formulas read the weights of a controller."""
+    own = set(controller.weights)
+    return own | {v.name for v in problem.variables if any(slot.name in own for slot in v.slots)}
+
+
+def fits_step(problem: Problem) -> bool:
+    """Whether the step can be compiled and differentiated with all nets in it."""
+    varied = {slot.name for variable in problem.variables for slot in variable.slots}
+    return all(_size(net) <= MAX_COMPILED_WEIGHTS and varied.isdisjoint(net.weights) for net in large_nets(problem))
 
 
 def require_small_nets(problem: Problem, what: str) -> None:
     """Raise ProblemError for nets that are too large for a compiled step; ``what`` compiles it."""
     issues = [
-        Issue(f'controller "{net.name}".net', f"has {count} weights; {what} takes up to {MAX_EXPORTED_WEIGHTS}")
+        Issue(f'controller "{net.name}".net', f"has {count} weights; {what} takes up to {MAX_COMPILED_WEIGHTS}")
         for net in large_nets(problem)
-        if (count := net.law.sizes["weights"]) > MAX_EXPORTED_WEIGHTS
+        if (count := net.law.sizes["weights"]) > MAX_COMPILED_WEIGHTS
     ]
     if issues:
         raise ProblemError(problem.file, issues)
@@ -118,7 +132,7 @@ def partition(problem: Problem) -> Partition:
     names = {name for controller in nets for name in controller.weights}
     parts = list(zip(problem.variables, spans(problem.variables), strict=True))
     kept = [(v, span) for v, span in parts if not any(slot.name in names for slot in v.slots)]
-    refuse_formulas(problem, [*names, *(v.name for v, span in parts if (v, span) not in kept)])
+    refuse_formulas(problem, nets)
     others = tuple(controller for controller in problem.controllers if controller not in nets)
     rest = replace(problem, variables=tuple(v for v, _ in kept), controllers=others)
     rollout = symbolic_rollout(rest, input_names(problem))
@@ -144,12 +158,14 @@ def _weights(problem: Problem, controller: FeedbackController) -> Weights:
     return Weights(controller.numbers["weights"], np.concatenate(of_z), np.concatenate(of_net))
 
 
-def refuse_formulas(problem: Problem, names: Sequence[str]) -> None:
-    """Raise ProblemError if a formula reads the weights of large nets, by these names of variables or numbers."""
+def refuse_formulas(problem: Problem, nets: Sequence[FeedbackController]) -> None:
+    """Raise ProblemError if a formula reads the weights of large nets."""
+    most = f"the weights of a net; formulas take up to {MAX_COMPILED_WEIGHTS}"
     issues = [
-        Issue(f'{kind} "{each.name}"', f"looks at {name}, the weights of a net that is too large for formulas")
+        Issue(f'{kind} "{each.name}"', f"looks at {name}, {most}, and there are {_size(net)}")
+        for net in nets
+        for name in sorted(_names(problem, net))
         for kind, each in _formulas(problem)
-        for name in names
         if name in each.formula.needed
     ]
     if issues:

@@ -10,28 +10,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from symphys.codegen import KernelUnavailable, ProgramError, processors
+from symphys.codegen import KernelUnavailable, ProgramError
 from symphys.codegen.backends import BEST, PRECISIONS, Description, described
 from symphys.codegen.cuda import DeviceKernel
-from symphys.errors import SymphysError
-from symphys.problem import Problem
 from symphys.records import dataclass
-from symphys.shooting import Nlp, ShootingProblem
-from symphys.transcription.decision_variables import blocks
-from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.gradient_probe import Probe
 from symphys.transcription.judge import Assessment, assessment
-from symphys.transcription.network_rollout.context import RolloutContext, make_context
+from symphys.transcription.network_rollout.context import RolloutContext
 from symphys.transcription.network_rollout.evaluator import LargeEvaluator, LargeProbe
 from symphys.transcription.network_rollout.forward_backward import ForwardPass, back, objective_arguments
-from symphys.transcription.objective import limits
 from symphys.transcription.recorded_parts import RolloutArrays
 from symphys.transcription.simulation import Record, simulate
 from symphys.transcription.transcription import Transcription, gradient_prices
 from symphys.types import Array
 
 if TYPE_CHECKING:
-    from symphys.transcription.staged.linearization import Linearization
+    pass
 
 INTERPRETED_BACKENDS = ("casadi", "c")
 NET_PRECISIONS = {"double": np.float64, "single": np.float32}
@@ -100,38 +94,6 @@ class LargeTranscription(Transcription):
         x, u, given, p = motion.x[:, 0].T, motion.u[:, 0].T, motion.given[:, 0].T, motion.p[0]
         _, *happened = step.map(steps)(x[:, :-1], u, np.tile(p[:, None], steps), smoothing)
         return [x, u, given, p[:, None], *happened]
-
-
-def transcribe_large(
-    problem: Problem, exact: bool = False, backend: str = BEST, threads: int | None = None
-) -> LargeTranscription:
-    """Transcribe a problem with large nets; "simd32": nets in single precision, steps in double."""
-    began = perf_counter()
-    context = make_context(problem)
-    built = perf_counter() - began
-    evaluator, description = evaluator_or_plain(context, exact, backend, processors() if threads is None else threads)
-    shooting = ShootingProblem(
-        name=problem.name,
-        blocks=blocks(problem),
-        evaluator=evaluator,
-        nlp=Nlp(None),
-        squares=False,
-        constraint_names=context.objectives.terms.names,
-        constraint_lower=context.objectives.terms.lower,
-        constraint_upper=context.objectives.terms.upper,
-        limits=limits(problem),
-        smoothing=problem.simulation.smoothing,
-        stop_when_met=problem.stop_when_met,
-        output_names=tuple(output.label for output in problem.outputs),
-    )
-    functions = ExpressionFunctions(context.rollout, context.objectives.terms)
-    return LargeTranscription(
-        problem, context.rollout, functions, shooting, lambda: description, built, _no_steps, context=context
-    )
-
-
-def _no_steps() -> Linearization:
-    raise SymphysError("the steps of a problem with large nets are not taken one by one")
 
 
 def evaluator_or_plain(
