@@ -40,6 +40,8 @@ STRAIGHT = (
     *("-fno-ipa-icf", "-fno-ipa-sra", "-fno-ipa-cp", "-fno-ipa-ra"),
 )
 """More flags of gcc where functions are straight lines of values, each computed once: a third less to compile."""
+LIGHT = ("-O1",)
+"""More flags where little time is spent: half to compile (graphs.c)."""
 BROADCASTS = ("-O1", "-fdisable-rtl-combine")
 """More flags of gcc where numbers are read into all lanes: its combiner takes seven eighths of its time there, and more
 than -O1 gives slower code (Jacobians of a hopper: 27 s in place of 71, and 0.88 of the time of a call)."""
@@ -127,7 +129,8 @@ class Compiler:
             file = target.with_suffix(".c")
             _write(file, source.text)
             straight, broadcasts = (STRAIGHT if source.straight else ()), (BROADCASTS if source.broadcasts else ())
-            extra = (*(NARROW if source.narrow else ()), *((*straight, *broadcasts) if self.gnu else ()))
+            plain = (*(NARROW if source.narrow else ()), *(LIGHT if source.light else ()))
+            extra = (*plain, *((*straight, *broadcasts) if self.gnu else ()))
             commands.append([*self.command, *flags, *extra, *own_flags(), "-c", str(file), "-o", str(target)])
         run_all(commands, COMPILE_TIMEOUT, processors(), folder)
         library = folder / "kernel.so"

@@ -75,7 +75,9 @@ def compile_for(given: IO[bytes]) -> None:
 def texts_of(parts: Sequence[SourceFile]) -> str:
     """Return a checksum of C files."""
     return hashlib.sha256(
-        "\0".join(f"{part.narrow} {part.straight} {part.broadcasts} {part.text}" for part in parts).encode()
+        "\0".join(
+            f"{part.narrow} {part.straight} {part.broadcasts} {part.light} {part.text}" for part in parts
+        ).encode()
     ).hexdigest()
 
 
@@ -110,11 +112,9 @@ def loaded(path: Path) -> ctypes.CDLL:
         raise KernelUnavailable(f"the compiled kernel cannot be loaded: {error}") from error
 
 
-OWN_FILES = ("graphs.c", "riccati.c")
-
-
 @cached
 def own_library() -> ctypes.CDLL:
     """Return the C files of this package that know no program, built once for a machine; KernelUnavailable if not."""
-    with shared_library([SourceFile(resource(name)) for name in OWN_FILES], default_cache()) as built:
+    parts = [SourceFile(resource("graphs.c"), light=True), SourceFile(resource("riccati.c"))]
+    with shared_library(parts, default_cache()) as built:
         return loaded(built.path)

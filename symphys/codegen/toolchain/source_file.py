@@ -18,12 +18,14 @@ class SourceFile:
         narrow: whether it is for fewer lanes than a vector register has.
         straight: whether functions are straight lines of values, each computed once.
         broadcasts: whether functions read numbers into all lanes of a vector.
+        light: whether little time is spent in it, and compiling should be quick.
     """
 
     text: str
     narrow: bool = False
     straight: bool = False
     broadcasts: bool = False
+    light: bool = False
 
 
 def resource(name: str) -> str:
