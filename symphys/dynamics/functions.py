@@ -17,6 +17,7 @@ from symphys.dynamics.step import take_step
 from symphys.dynamics.substep import Substep
 from symphys.dynamics.tracing.decorator import traced, tracing
 from symphys.dynamics.tracing.guards import with_guards
+from symphys.dynamics.tracing.numbers import with_known_numbers
 from symphys.dynamics.tracing.recording import Recorder, TracedCall, TracedVector, without_dead_code
 from symphys.dynamics.tracing.trace import InlineTracer
 from symphys.dynamics.unknowns import AnyImpulse
@@ -255,7 +256,8 @@ def trace_step(
     for names in _together(world, owners, bool(recorder.guards)):
         slot = recorder.give("next", [after[name] for name in names])
         results[slot] = slice(layout[names[0]].start, layout[names[-1]].stop)
-    return TracedStep(with_guards(without_dead_code(recorder.calls), recorder.guards, recorder.sections), results)
+    calls = without_dead_code(with_known_numbers(recorder.calls))
+    return TracedStep(with_guards(calls, recorder.guards, recorder.sections), results)
 
 
 def _recorder(layout: Layout, arguments: Sequence[Expr]) -> Recorder:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
@@ -294,7 +294,7 @@ def _rollout_program(
     asked = terms(samples)
     formulas = {each: places.recorded(*each) for each in samples.series}
     series = {name: places.recorded(formula, shift) for name, formula in recorded.items()}
-    body = [*_knot_calls(places), *step_calls(places, exact)]
+    step = step_calls(places, exact)
     epilogue, outputs = _epilogue(places, samples, asked, formulas)
     alive = _alive(places)
     if alive is not None:
@@ -308,8 +308,8 @@ def _rollout_program(
         parameters=places.smoothing,
         steps=rollout.steps,
         outputs=outputs,
-        prologue=_prologue(places),
-        body=(*body, *formulas.values(), *series.values()),
+        prologue=(*_prologue(places), *step.numbers),
+        body=(*_knot_calls(places), *step.body, *formulas.values(), *series.values()),
         epilogue=epilogue,
         constants=fixed,
         discounted=AdjointDiscount(places.x, alive),
@@ -344,10 +344,17 @@ def step_identity(rollout: Rollout, exact: bool) -> str | None:
     return identity_of(world, timed, own, columns, rollout.inputs, tuple(rollout.memory.columns), exact)
 
 
-def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
+class StepCalls(NamedTuple):
+    """The calls of a time step: ``numbers``, which hold in all steps and belong into the prologue, and ``body``."""
+
+    numbers: list[FunctionCall]
+    body: list[FunctionCall]
+
+
+def step_calls(samples: Places, exact: bool) -> StepCalls:
     """Return the calls of one time step, from ``x`` and ``given`` to the ``x`` after: controllers, laws, then physics.
 
-    Every program with time steps in it has these calls as its body: rollouts, ``Stage``, slopes, policies.
+    Every program with time steps in it has these calls: rollouts, ``Stage``, slopes, policies.
     """
     from symphys.dynamics.functions import trace_step
 
@@ -357,10 +364,10 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
     arguments = {"u": samples.u, "p": samples.p, "smoothing": samples.smoothing}
     after = samples.x.later() if rollout.termination is None else samples.layout.take(rollout.memory.size - 1)
     places: dict[TracedVector, Place] = {slot: _part(after, part) for slot, part in recording.results.items()}
-    calls, zeros = control_calls(rollout, samples), None
+    calls, numbers, zeros = control_calls(rollout, samples), list[FunctionCall](), None
     if widest := _most_zeros(recording.calls):
         zeros = samples.layout.take(widest)
-        calls.append(FunctionCall(ca.Function("zeros", [], [ca.DM.zeros(widest)]), (), (zeros,)))
+        numbers.append(FunctionCall(ca.Function("zeros", [], [ca.DM.zeros(widest)]), (), (zeros,)))
     for piece in recording.calls:
         for slot in piece.inputs:
             if slot.name in columns:
@@ -370,12 +377,15 @@ def step_calls(samples: Places, exact: bool) -> list[FunctionCall]:
         for slot in piece.outputs:
             own = samples.layout.take(slot.size)  # also of what lies in the next state: sizes of memories are kept
             places.setdefault(slot, own)
-        calls.append(_guarded(piece, places, zeros))
+        if piece.inputs or any(slot.name for slot in piece.outputs):
+            calls.append(_guarded(piece, places, zeros))
+        else:
+            numbers.append(FunctionCall(piece.function, (), tuple([places[slot] for slot in piece.outputs])))
     if after.size > columns.size:
         calls.append(_memory_call(samples, _part(after, slice(columns.size, None))))
     if rollout.termination is not None:
         calls.append(FunctionCall(rollout.termination, (samples.x, after, samples.p), (samples.x.later(),)))
-    return calls
+    return StepCalls(numbers, calls)
 
 
 def _most_zeros(calls: Sequence[TracedCall]) -> int:

@@ -96,7 +96,7 @@ class Stage:
     def program(self, exact: bool) -> Program:
         """Return the program, whose vector is a row and whose parameter is the smoothing."""
         places = StagePlaces(self.rollout, sum(self.sizes))
-        body = step_calls(places, exact)
+        step = step_calls(places, exact)
         after, last, found = places.x.later().still(), list[FunctionCall](), list[Place]()
         outputs = {"after": after, "sensed": places.layout.take(int(self._sense.size1_out(0)))}
         last.append(FunctionCall(self._sense, (after, places.p, places.time.later().still()), (outputs["sensed"],)))
@@ -119,8 +119,8 @@ class Stage:
             parameters=places.smoothing,
             steps=1,
             outputs={name: place for name, place in outputs.items() if place.size},
-            prologue=(FunctionCall(self._parts(), (places.row,), (*written, *[places.z] * reads_z)),),
-            body=tuple(body),
+            prologue=(FunctionCall(self._parts(), (places.row,), (*written, *[places.z] * reads_z)), *step.numbers),
+            body=tuple(step.body),
             epilogue=tuple(call for call in last if any(place.size for place in call.outputs)),
             zeroed=() if reads_z else (places.z,),
         )

@@ -217,6 +217,7 @@ def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts
     places = PolicyPlaces(step, sizes)
     steps, tangent, policy = step.rollout.steps, step.tangent, places.policy
     decided = (places.length, places.share, places.statics, places.off, places.held)
+    physics = step_calls(places, step.exact)
     # Each step: deviation from the plan, decision of the policy, controllers and physics.
     body = [
         FunctionCall(tangent.distance, (policy["x"], places.x, places.nominal), (places.off,)),
@@ -225,7 +226,7 @@ def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts
             (*decided, *(policy[name] for name in POLICY_SERIES[1:])),
             (places.v, places.inputs, places.held.later()),
         ),
-        *step_calls(places, step.exact),
+        *physics.body,
     ]
     epilogue: tuple[FunctionCall, ...] = ()
     # Costs of the states before and after each step, and of the last state.
@@ -249,7 +250,7 @@ def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts
         parameters=places.shared,
         steps=steps,
         outputs=places.outputs(),
-        prologue=_prologue(step, places),
+        prologue=(*_prologue(step, places), *physics.numbers),
         body=tuple(body),
         epilogue=epilogue,
         zeroed=(places.cost,),

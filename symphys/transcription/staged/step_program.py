@@ -102,7 +102,7 @@ def step_program(arguments: StepArguments, exact: bool, tangent: bool) -> Progra
     state after the step is from the one that is given. Without ``tangent`` d and e are left out of the step.
     """
     places = TangentStepPlaces(arguments)
-    body = step_calls(places, exact)
+    step = step_calls(places, exact)
     after, outputs, epilogue = places.x.later().still(), dict[str, Place](), tuple[FunctionCall, ...]()
     if tangent:
         outputs["off"] = places.layout.take(arguments.tangent.size)
@@ -114,8 +114,8 @@ def step_program(arguments: StepArguments, exact: bool, tangent: bool) -> Progra
         parameters=places.given_row,
         steps=1,
         outputs={**outputs, "after": after},
-        prologue=(FunctionCall(_begun(arguments, tangent), (places.varying, places.given_row), written),),
-        body=tuple(body),
+        prologue=(FunctionCall(_begun(arguments, tangent), (places.varying, places.given_row), written), *step.numbers),
+        body=tuple(step.body),
         epilogue=epilogue,
     )
 
