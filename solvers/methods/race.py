@@ -2,10 +2,11 @@
 
 Where hands do not touch the box, or feet leave the ground too late, descent ends in a stationary point far from every
 target. A search among few numbers sees further, and finishes nothing. So CMA-ES searches for a round of generations
-among splines of few knots about the guess, and a finisher goes on from what it found: exactly first, since a search
-leaves little to do, then through all stages of smoothing. Where that misses, a search has a round near the best point,
-or the first one goes on. Whenever one has found something better, the finisher starts again. The race ends with the
-first point that meets everything, from which it goes on to a stationary point where the problem asks for one.
+among splines of few knots about the guess. If it is far then, ilqr has a try from the guess, with the problem's own
+costs. A finisher goes on from what was found: exactly first, since a search leaves little to do, then through all
+stages of smoothing. Where that misses, a search has a round near the best point, or the first one goes on. Whenever one
+has found something better, the finisher starts again. The race ends with the first point that meets everything, from
+which it goes on to a stationary point where the problem asks for one.
 
 Until then costs hold nobody back from what is asked for. The search compares points by ``distance``, and ilqr takes
 targets and constraints in units of their tolerances, beside which costs count little. (A car that should be quick
@@ -72,7 +73,13 @@ LOWEST = "everything is met, and from there no step lowers what it costs: good e
 USED_UP = "the finisher's iterations are used up: raise `finisher_iterations`"
 NEAR_SIGMA = 0.3
 """First standard deviation of a search near what the finisher has found, in units of that of the first search."""
+OWN_ITERATIONS = 100
+"""Iterations of ilqr from the guess with the problem's own costs, in each stage of smoothing."""
+PROMISING = 5.0
+"""[tolerances] What it misses after ``finisher_iterations`` of these at most, else it ends there. A search that is so
+near is finished first."""
 NAME, SEARCH, NEAR, FINISH, RELAX, POLISH = "race", "search", "near", "finish", "relax", "polish"
+OWN = "own"
 SEARCHES = SEARCH, NEAR
 
 
@@ -112,7 +119,8 @@ class RacePart:
 
     Attributes:
         kind: SEARCH; NEAR, a search about what the finisher has found; FINISH, exactly, until everything is met; RELAX
-            likewise through all stages of smoothing; POLISH, exactly, until the objective is stationary.
+            likewise through all stages of smoothing; OWN, likewise with the problem's own costs; POLISH, exactly, until
+            the objective is stationary.
         status, advice: how it ended; INTERRUPTED: a search that goes on.
         z: (n,) its best point.
         objective, max_violation, met: of that point, exactly; see ``Point``.
@@ -178,7 +186,7 @@ def distance(objectives: Array, errors: Array, scale: float) -> Array:
 
 
 class WithFinerSteps:
-    """An evaluator whose points meet everything only if they do with finer time steps too.
+    """An evaluator whose points meet everything only if finer time steps do not refute it.
 
     A box that is struck and comes to rest where it should does so with one time step; one that is carried, with all.
     """
@@ -309,10 +317,13 @@ class Race:
                 return
             if number + 1 < alone or found.distance >= BETTER * tried:
                 continue
-            tried, guessed = found.distance, guessed or np.array_equal(found.z, guess)
+            own, far = self.finisher is ILQR, found.max_violation > PROMISING
+            if own and far and not guessed and (yield from self._finishing(guess, OWN)):
+                return
+            tried, guessed = found.distance, guessed or np.array_equal(found.z, guess) or (own and far)
             if (yield from self._finishing(found.z, FINISH)):
                 return
-            if not guessed and (yield from self._finishing(guess, RELAX)):
+            if not guessed and (yield from self._finishing(guess, OWN if own else RELAX)):
                 return
             guessed = True
         if not guessed and (yield from self._finishing(guess, RELAX)):
@@ -330,6 +341,8 @@ class Race:
             found = yield kind, start
             if self._over(found):
                 return True
+            if kind == OWN and not found.met:
+                return False
             if found.met or not asks:
                 polished = yield POLISH, found.z
                 return found.confirmed or self._over(polished)
@@ -365,7 +378,8 @@ class Race:
         def see(row: TraceRow) -> None:
             moved = shift.moved(row)
             self.spent = self.options.spent(moved)
-            self.pausing = self.spent is not None or (kind in SEARCHES and moved.iteration >= last)
+            poor = kind == OWN and row.iteration == self.options.finisher_iterations and row.max_violation > PROMISING
+            self.pausing = self.spent is not None or poor or (kind in SEARCHES and moved.iteration >= last)
             try:
                 if self.monitor:
                     self.monitor(moved)
@@ -406,10 +420,11 @@ class Race:
         meeting = replace(self.problem, stop_when_met=True)
         if kind == FINISH:
             meeting = replace(meeting, smoothing=last)
-        if self.finisher is ILQR and self.problem.asking is not None:
+        if kind != OWN and self.finisher is ILQR and self.problem.asking is not None:
             staged = self.problem.asking(start)
             meeting = replace(meeting, staged=lambda: staged, measure=self.compared.measure)
-        return self.finisher, meeting, self.finisher.Options(iterations=options.finisher_iterations, **patience)
+        iterations = OWN_ITERATIONS if kind == OWN else options.finisher_iterations
+        return self.finisher, meeting, self.finisher.Options(iterations=iterations, **patience)
 
     def _measure(self, objectives: Array, errors: Array) -> Array:
         """Return ``distance`` in units of the first objective that is evaluated: that of the guess."""

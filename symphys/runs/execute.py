@@ -16,6 +16,7 @@ from symphys import verification as trust
 from symphys.codegen.backends import PRECISIONS, require_kernels
 from symphys.errors import SymphysError, Unavailable
 from symphys.findings.examination import Examination
+from symphys.findings.numerics import WORST_LIMITS
 from symphys.findings.obstacles import obstacles
 from symphys.findings.verdict import holds
 from symphys.findings.writing import capital
@@ -201,7 +202,7 @@ def solve(
     if chosen.by_steps(transcription.shooting):
         transcription = transcription.by_steps
     confirms = partial(confirmed, transcription) if chosen.confirms else None
-    finer = partial(trust.finer_errors, transcription) if chosen.confirms else None
+    finer = partial(finer_shares, transcription) if chosen.confirms else None
     shooting = replace(transcription.shooting, confirms=confirms, finer_errors=finer)
     shooting = replace(shooting, multipliers=job.guess.multipliers)
     log(f"evaluated by {transcription.backend}")
@@ -294,6 +295,11 @@ def confirmed(transcription: Transcription, z: Array) -> bool:
     return verdict.solved and holds(finer, judged(verdict))
 
 
+def finer_shares(transcription: Transcription, z: Array) -> Array:
+    """Return (k,) the errors of ``finer_errors`` as shares of what refutes a result."""
+    return trust.finer_errors(transcription, z) / WORST_LIMITS[1]
+
+
 def judge(
     transcription: Transcription, outcome: Outcome, examine: bool = True, tell: Callable[[str], None] = no_callback
 ) -> Judgement:
@@ -307,7 +313,7 @@ def judge(
         examined: dict[str, Any] | None = None
         if outcome.status is not Status.INTERRUPTED:
             examined = (
-                trust.examine(transcription, taken.z, tell, whole=False, slopes=derived)
+                trust.examine(transcription, taken.z, tell, False, derived, refuted=WORST_LIMITS[1])
                 if examine
                 else trust.survey(transcription, taken)
             )

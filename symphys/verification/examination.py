@@ -135,6 +135,7 @@ def examine(
     tell: Tell = lambda what: None,
     whole: bool = True,
     slopes: bool = True,
+    refuted: float = 1.0,
 ) -> dict[str, Any]:
     """Return the "trust" object of a result, for the exact rollout of ``z`` (n,).
 
@@ -147,8 +148,9 @@ def examine(
         z: (n,).
         tell: called with a few words before each part that takes time.
         whole: whether refinements are simulated that hardly say more; see ``refinement.refine``.
-        slopes: whether derivatives are examined in any case. Else they are where finer simulations do not meet
-            everything that z meets: a search that took none need not wait until they are compiled.
+        slopes: whether derivatives are examined in any case. Else they are where finer simulations refute what z
+            meets: a search that took none need not wait until they are compiled.
+        refuted: error / tolerance of a finer simulation above which it refutes a result.
 
     Raises:
         NotFinite: there is no such motion; says where it ends and why.
@@ -163,7 +165,7 @@ def examine(
     compared, finer = list[dict[str, Any]](), dict[str, Any]()
     if not slopes:
         finer = refinement.refine(transcription, z, tell, whole, settled, slopes=False)
-        slopes = not (transcription.judge(z).solved and all(row["worst"] <= 1 for row in finer["refined"]))
+        slopes = not (transcription.judge(z).solved and all(row["worst"] <= refuted for row in finer["refined"]))
     if slopes:
         tell(COMPARING)
         compared = compare_gradient(transcription, z)

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from worlds import staged_toys
 from worlds.staged_toys import boxed, pendulum
 from worlds.toys import constrained, counted, failing, quadratic, rosenbrock, solve, stop_at, target, through_json, toy
 
@@ -76,6 +77,21 @@ def test_controls_over_time_are_finished_by_ilqr() -> None:
     assert found.status is Status.CONVERGED
     assert found.gains
     assert found.stages[-1].objective <= alone.stages[-1].objective * (1 + 1e-6)
+
+
+def test_a_guess_that_is_good_enough_for_ilqr_is_tried_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a search is far, and only as long as that comes near."""
+    monkeypatch.setattr(staged_toys, "TOLERANCE", 1e-3)
+    tiny = {"generations": 1, "population": 4, "sigma": 0.01, "rounds": 4}
+    problem, words, given_up = replace(boxed(pendulum(), 100.0), stop_when_met=True), list[str](), list[str]()
+    found = solve("race", problem, options=tiny, log=words.append)
+    assert found.status is Status.MET and [word for word in words if ", part" in word] == [
+        "search, part 1 of the race",
+        "own, part 2 of the race",
+    ]
+    solve("race", problem, options={**tiny, "finisher_iterations": 2}, log=given_up.append)
+    kinds = [word.split(",")[0] for word in given_up if ", part" in word]
+    assert kinds[:3] == ["search", "own", "finish"] and kinds.count("own") == 1
 
 
 def test_met_at_the_start() -> None:
