@@ -292,12 +292,17 @@ class Race:
         rows = revived_rows(self.running) if self.running else []
         last = self._shift(kind).moved(rows[-1]) if rows else self.rows[-1] if self.rows else None
         self.spent = self.options.spent(last) if last else None
-        self.pausing = kind in SEARCHES and last is not None and last.iteration >= self._round_ends
+        poor = bool(rows) and self._poor(kind, rows[-1])
+        self.pausing = poor or (kind in SEARCHES and last is not None and last.iteration >= self._round_ends)
         if not rows or not (self.spent or self.pausing):
             return False
         z, counts = np.array(self.running["best"]["z"], float), Counts(*map(int, self.running["counts"]))
         self._take(kind, Outcome(Status.INTERRUPTED, "", z, tuple(rows), counts, self.running))
         return True
+
+    def _poor(self, kind: str, row: TraceRow) -> bool:
+        """Whether a try from the guess ends with this row of its own: it is far after some iterations."""
+        return kind == OWN and row.iteration == self.options.finisher_iterations and row.max_violation > PROMISING
 
     @property
     def _round_ends(self) -> int:
@@ -378,8 +383,8 @@ class Race:
         def see(row: TraceRow) -> None:
             moved = shift.moved(row)
             self.spent = self.options.spent(moved)
-            poor = kind == OWN and row.iteration == self.options.finisher_iterations and row.max_violation > PROMISING
-            self.pausing = self.spent is not None or poor or (kind in SEARCHES and moved.iteration >= last)
+            round_ends = kind in SEARCHES and moved.iteration >= last
+            self.pausing = self.spent is not None or round_ends or self._poor(kind, row)
             try:
                 if self.monitor:
                     self.monitor(moved)

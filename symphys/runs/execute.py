@@ -313,7 +313,7 @@ def judge(
         examined: dict[str, Any] | None = None
         if outcome.status is not Status.INTERRUPTED:
             examined = (
-                trust.examine(transcription, taken.z, tell, False, derived, refuted=WORST_LIMITS[1])
+                trust.examine(transcription, taken.z, tell, whole=False, slopes=derived, refuted=WORST_LIMITS[1])
                 if examine
                 else trust.survey(transcription, taken)
             )

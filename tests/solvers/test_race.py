@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import astuple, replace
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -89,9 +90,17 @@ def test_a_guess_that_is_good_enough_for_ilqr_is_tried_first(monkeypatch: pytest
         "search, part 1 of the race",
         "own, part 2 of the race",
     ]
-    solve("race", problem, options={**tiny, "finisher_iterations": 2}, log=given_up.append)
+    short = {**tiny, "finisher_iterations": 2}
+    whole = solve("race", problem, options=short, log=given_up.append)
     kinds = [word.split(",")[0] for word in given_up if ", part" in word]
     assert kinds[:3] == ["search", "own", "finish"] and kinds.count("own") == 1
+    for stop in range(6):  # also where the try ends; ilqr rolls out once more where it goes on
+        saved = list[dict[str, Any]]()
+        keep = partial(lambda saved, make: saved.append(through_json(make())), saved)
+        part = solve("race", problem, options=short, monitor=stop_at(stop), keep=keep)
+        for checkpoint in (through_json(part.checkpoint), *saved[-1:]):  # interrupted, or killed
+            again = solve("race", problem, options=short, checkpoint=checkpoint)
+            assert np.array_equal(again.z, whole.z) and len(again.trace) == len(whole.trace)
 
 
 def test_met_at_the_start() -> None:
