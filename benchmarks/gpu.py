@@ -16,7 +16,8 @@ from measured_worlds import robots_of, starts, table_problem
 from symphys.codegen import Kernel, KernelUnavailable, compile_program
 from symphys.codegen.cuda import DeviceKernel, compile_on, find_gpu
 from symphys.transcription import rollout_program, symbolic_rollout
-from symphys.transcription.network_rollout import LargeEvaluator, transcribe_large
+from symphys.transcription.network_rollout import LargeEvaluator
+from symphys.transcription.transcribe import transcribe_large
 from symphys.types import Array
 
 STEPS, ROBOTS, LENGTHS = 1000, (1, 128, 1024, 8192), (10, 100, 1000)
@@ -93,7 +94,7 @@ def large(device: str, rounds: int) -> Iterator[Row]:
     problem = table_problem([1024, 1024], STEPS)
     weights = [problem.variables[0].guess]
     for backend, precision in (("cuda", "double"), ("cuda32", "net in single")):
-        evaluator = transcribe_large(problem, exact=True, backend=backend).shooting.evaluator
+        evaluator = transcribe_large(problem, exact=True, backend=backend, threads=None).shooting.evaluator
         assert isinstance(evaluator, LargeEvaluator)
         for robots in ROBOTS[:3]:
             seconds = [

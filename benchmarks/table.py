@@ -19,8 +19,9 @@ from measured_worlds import robots_of, starts, table_problem
 from symphys.codegen import compile_program
 from symphys.problem import Problem
 from symphys.transcription import symbolic_rollout
-from symphys.transcription.network_rollout import LargeEvaluator, has_large_nets, transcribe_large
+from symphys.transcription.network_rollout import LargeEvaluator, has_large_nets
 from symphys.transcription.program import rollout_program
+from symphys.transcription.transcribe import transcribe_large
 from symphys.types import Array
 
 STEPS, FEWER_STEPS = 1000, 200
@@ -97,7 +98,7 @@ def within(problem: Problem) -> Calls:
 
 def beside(problem: Problem, backend: str) -> Calls:
     """Return calls with the net beside the compiled step, its weights shared."""
-    made = transcribe_large(problem, exact=True, backend=backend)
+    made = transcribe_large(problem, exact=True, backend=backend, threads=None)
     weights, evaluator = [problem.variables[0].guess], made.shooting.evaluator
     assert isinstance(evaluator, LargeEvaluator)
 
