@@ -76,8 +76,8 @@ NEAR_SIGMA = 0.3
 OWN_ITERATIONS = 100
 """Iterations of ilqr from the guess with the problem's own costs, in each stage of smoothing."""
 PROMISING = 5.0
-"""[tolerances] What it misses after ``finisher_iterations`` of these at most, else it ends there. A search that is so
-near is finished first."""
+"""[tolerances] The largest miss after ``finisher_iterations`` of these with which it goes on. A search that is so near
+is finished first."""
 NAME, SEARCH, NEAR, FINISH, RELAX, POLISH = "race", "search", "near", "finish", "relax", "polish"
 OWN = "own"
 SEARCHES = SEARCH, NEAR
@@ -322,13 +322,15 @@ class Race:
                 return
             if number + 1 < alone or found.distance >= BETTER * tried:
                 continue
-            own, far = self.finisher is ILQR, found.max_violation > PROMISING
-            if own and far and not guessed and (yield from self._finishing(guess, OWN)):
-                return
-            tried, guessed = found.distance, guessed or np.array_equal(found.z, guess) or (own and far)
+            tried, trial = found.distance, OWN if self.finisher is ILQR else RELAX
+            if trial == OWN and not guessed and found.max_violation > PROMISING:
+                guessed = True
+                if (yield from self._finishing(guess, trial)):
+                    return
+            guessed = guessed or np.array_equal(found.z, guess)
             if (yield from self._finishing(found.z, FINISH)):
                 return
-            if not guessed and (yield from self._finishing(guess, OWN if own else RELAX)):
+            if not guessed and (yield from self._finishing(guess, trial)):
                 return
             guessed = True
         if not guessed and (yield from self._finishing(guess, RELAX)):

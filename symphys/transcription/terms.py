@@ -19,7 +19,7 @@ from symphys.types import Array
 
 @dataclass(frozen=True)
 class EvaluationPoints:
-    """Where along a motion a formula is evaluated: in some steps, each time with the inputs of the step.
+    """The steps of a motion in which a formula is evaluated, with the inputs of each.
 
     Attributes:
         steps: their numbers.

@@ -57,7 +57,7 @@ Mask = tuple[bool, ...]
 @cache
 def library() -> Any:
     """Return the compiled ``graphs.c``; KernelUnavailable without a compiler."""
-    found = own_library()
+    found = own_library("graphs.c", light=True)
     for name, (result, arguments) in SIGNATURES.items():
         function = getattr(found, name)
         function.restype, function.argtypes = result, arguments

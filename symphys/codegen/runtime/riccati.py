@@ -67,6 +67,6 @@ class CompiledRiccati:
 def compiled_riccati() -> CompiledRiccati | None:
     """Return the compiled recursion; None without a compiler. It is built once for a machine."""
     try:
-        return CompiledRiccati(own_library())
+        return CompiledRiccati(own_library("riccati.c"))
     except KernelUnavailable:
         return None

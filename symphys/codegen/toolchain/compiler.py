@@ -41,7 +41,7 @@ STRAIGHT = (
     *("-fno-tree-ccp", "-fno-tree-bit-ccp", "-fno-tree-dominator-opts"),
     *("-fdisable-rtl-cse1", "-fdisable-rtl-postreload"),
 )
-"""More flags of gcc where functions are straight lines of values, each computed once: half less to compile."""
+"""More flags of gcc where functions are straight lines of values, each computed once: nearly half less to compile."""
 LIGHT = ("-O1",)
 """More flags where little time is spent: half to compile (graphs.c)."""
 BROADCASTS = ("-O1", "-fdisable-rtl-combine")

@@ -113,8 +113,10 @@ def loaded(path: Path) -> ctypes.CDLL:
 
 
 @cached
-def own_library() -> ctypes.CDLL:
-    """Return the C files of this package that know no program, built once for a machine; KernelUnavailable if not."""
-    parts = [SourceFile(resource("graphs.c"), light=True), SourceFile(resource("riccati.c"))]
-    with shared_library(parts, default_cache()) as built:
+def own_library(name: str, light: bool = False) -> ctypes.CDLL:
+    """Return a C file of this package that knows no program, built once for a machine; KernelUnavailable if not.
+
+    ``light``: see ``SourceFile``.
+    """
+    with shared_library([SourceFile(resource(name), light=light)], default_cache()) as built:
         return loaded(built.path)

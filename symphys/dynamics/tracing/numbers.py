@@ -1,7 +1,8 @@
-"""What calls compute from numbers alone, such as an effective mass from a radius and a mass, is computed once.
+"""Constant folding across calls: expressions of known numbers are evaluated when a step is traced.
 
-Numbers of bodies and laws are arguments of calls, so that calls which differ in them share a function. A function whose
-arguments are known numbers is split: what depends on these alone is evaluated here, and its values are arguments too.
+Numbers of bodies and laws are arguments of calls, so that calls which differ in them share a function. A function with
+known arguments is split: expressions of these alone, such as an effective mass of a radius and a mass, are evaluated
+here, and the rest takes their values as an argument.
 """
 
 from __future__ import annotations

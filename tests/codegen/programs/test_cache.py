@@ -246,7 +246,7 @@ def test_one_process_builds_a_kernel_while_others_wait_and_one_of_these_where_it
     log, gate = tmp_path / "log", tmp_path / "gate"
     path = logged(tmp_path / "bin", log, gate, find_compiler().command)
     gate.touch()
-    own = "from symphys.codegen.toolchain.libraries import own_library as build; build()"
+    own = "from symphys.codegen.graph.graph import library as build; build()"
     building(tmp_path, "", own, PATH=path).communicate(timeout=FOREVER)
     gate.unlink()
     log.unlink()

@@ -1,4 +1,4 @@
-"""Known numbers of calls: what depends on them alone is computed once; calls that differ in them share a function."""
+"""Constant folding across calls: the same values, and one function for calls that differ in their numbers."""
 
 from __future__ import annotations
 
