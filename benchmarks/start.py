@@ -106,7 +106,7 @@ def start(name: str, solver: str, last: int) -> dict[str, Any]:
         if row.iteration >= last:
             raise Enough
 
-    with suppress(Enough):
+    with suppress(Enough, symphys.SymphysError):  # ipopt ends with an error of its own
         symphys.solve(problem, solver, progress=progress)
     return found
 

@@ -24,7 +24,7 @@ from symphys.model.controllers import Net
 from symphys.model.controllers.net import Activation, Layer, activated
 from symphys.model.state_layout import Layout as Columns
 from symphys.model.state_layout import input_columns
-from symphys.problem import ALIVE, STEP_LENGTH, FeedbackController, Problem
+from symphys.problem import ALIVE, STEP_LENGTH, FeedbackController, Problem, Variable
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.formula_names import spans
 from symphys.transcription.gradient_probe import combined
@@ -320,6 +320,21 @@ def program_identity(problem: Problem, exact: bool) -> str | None:
     """Return a key of a rollout's program; problems that differ only in texts and solver options share it."""
     data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in IGNORED_FIELDS}
     return identity_of(data, exact)
+
+
+def swept_identity(rollout: Rollout, inputs: Sequence[Variable], exact: bool) -> str | None:
+    """Return a key of a rollout's program that does not depend on the numbers of ``inputs``, its last variables."""
+    problem, parameters = rollout.problem, rollout.parameters
+    ignored = IGNORED_FIELDS | {"parametric", "parameters", "variables"}
+    data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in ignored}
+    symbolic, text = {*parameters.names, *parameters.overrides()}, repr(data)
+    constants = {name: value for name, value in problem.parameters.items() if name in text and name not in symbolic}
+    data["parameters"] = constants  # those that formulas may read
+    data["variables"] = problem.variables[: -len(inputs)]
+    # what a program has of ``parametric``
+    world = structure(rollout.world, parameters.symbols, parameters.scheme(problem.simulation))
+    start = ca.Function("start", [rollout.z], [rollout.x0, rollout.given, rollout.p]).serialize()
+    return identity_of(data, world, start, parameters.names, exact)
 
 
 OF_STEP = ("sensors", "controllers", "forces", "references", "phases", "termination")

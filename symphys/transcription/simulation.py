@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.codegen.backends.calls import row_by_row
 from symphys.dynamics.observation import reading_function
 from symphys.model.joints import Joint
 from symphys.model.state_layout import GIVEN, Layout, input_columns
@@ -69,9 +70,7 @@ def recorded(rollout: Rollout, arrays: RolloutArrays) -> Record | None:
 
     None where a step leads elsewhere there, beyond rounding. NotFinite, with place and cause, if it is not finite.
     """
-    p, steps = np.tile(arrays.p[:, None], rollout.steps), rollout.steps
-    found = rollout.report.map(steps)(arrays.x[:-1].T, arrays.u.T, p, np.full((1, steps), arrays.smoothing))
-    after, *happened = (np.array(part).T for part in found)
+    after, *happened = row_by_row(rollout.report, arrays.x[:-1], arrays.u, arrays.p, [arrays.smoothing])
     if not np.allclose(after, arrays.x[1:], AGREEMENT, AGREEMENT, equal_nan=True):
         return None
     return _recorded(rollout, arrays, happened)
@@ -91,8 +90,7 @@ def motion_of(rollout: Rollout, time: Array, x: Array, u: Array, p: Array) -> Tr
     if rollout.feedback is not None:
         pairs = zip(x, u, time, strict=False)
         u = np.array([np.array(rollout.feedback(state, given, p, now)).ravel() for state, given, now in pairs])
-    found = report.map(steps)(x[:-1].T, u.T, np.tile(p[:, None], steps), np.zeros((1, steps)))
-    happened = [np.array(part).T for part in found[1:]]
+    happened = row_by_row(report, x[:-1], u, p, [0.0])[1:]
     simulation = replace(rollout.problem.simulation, duration=steps * rollout.dt)
     whole = replace(rollout, problem=replace(rollout.problem, simulation=simulation))
     return _trajectory(whole, time, x, u, p, *happened).require_finite()
@@ -147,10 +145,8 @@ def _joints(rollout: Rollout, x: Array, u: Array, p: Array) -> dict[str, Any]:
     """Return the fields of joints."""
     joints = rollout.world.joints
     counts = [len(joint.kind.coordinates) for joint in joints]
-    read = reading_function(rollout.world, rollout.parameters.symbols).map(rollout.steps + 1)
-    *parts, separation = (
-        np.array(part).T for part in read(plain(rollout, x).T, np.tile(p[:, None], rollout.steps + 1))
-    )
+    read = reading_function(rollout.world, rollout.parameters.symbols)
+    *parts, separation = row_by_row(read, plain(rollout, x), p)
     value, rate, torque = (_split(part, counts) for part in parts)
     return {
         "joint_names": tuple(joint.name for joint in joints),

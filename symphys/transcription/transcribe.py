@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
@@ -46,8 +45,8 @@ from symphys.transcription.asking import asking
 from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
 from symphys.transcription.network_rollout import has_large_nets
-from symphys.transcription.objective import Terms, bounds, has_squares, limits, rollout_terms
-from symphys.transcription.program import program_identity, rollout_program, step_identity
+from symphys.transcription.objective import bounds, has_squares, limits
+from symphys.transcription.program import program_identity, rollout_program, step_identity, swept_identity
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.sampler import Sampler, swept_inputs
 from symphys.transcription.staged.step_evaluator import StepEvaluator
@@ -196,7 +195,7 @@ def _evaluating(
     problem = rollout.problem
     inputs = () if backend == "casadi" else swept_inputs(problem)
     if inputs:
-        return shared_backend(problem, inputs, functions.nlp, exact, backend, threads)
+        return shared_backend(problem, inputs, lambda: functions.nlp, exact, backend, threads)
     source = BackendSource(functions, lambda: rollout_program(rollout, exact), exact, program_identity(problem, exact))
     return choose(backend, source, threads)
 
@@ -223,7 +222,12 @@ LATEST_BACKEND: dict[tuple[object, ...], Backend] = {}
 
 
 def shared_backend(
-    problem: Problem, inputs: tuple[Variable, ...], nlp: Any, exact: bool, backend: str, threads: int | None
+    problem: Problem,
+    inputs: tuple[Variable, ...],
+    nlp: Callable[[], Any],
+    exact: bool,
+    backend: str,
+    threads: int | None,
 ) -> Backend:
     """Return the backend of a problem by a kernel that takes some of its numbers as inputs.
 
@@ -233,32 +237,25 @@ def shared_backend(
     Args:
         problem: of a sweep.
         inputs: see ``swept_inputs``.
-        nlp: of the problem itself, see ``Nlp.expression``.
+        nlp: makes that of the problem itself, see ``Nlp.expression``.
         exact: as for ``transcribe``.
         backend: likewise.
         threads: likewise.
     """
+    numbers = np.concatenate([variable.guess for variable in inputs])
     rollout = symbolic_rollout(replace(problem, variables=(*problem.variables, *inputs)))
-    asked = rollout_terms(rollout)
-    key = (whole(rollout, asked), exact, backend, threads)
-    if key in LATEST_BACKEND:
+    identity = swept_identity(rollout, inputs, exact)
+    key = (identity, backend, threads)
+    if identity is not None and key in LATEST_BACKEND:
         made = LATEST_BACKEND[key].description
         here = replace(made, seconds=0.0, cached=None if made.cached is None else True)
         chosen = replace(LATEST_BACKEND[key], description=here)
     else:
-        source = BackendSource(ExpressionFunctions(rollout, asked), lambda: rollout_program(rollout, exact), exact)
+        source = BackendSource(ExpressionFunctions(rollout), lambda: rollout_program(rollout, exact), exact, identity)
         LATEST_BACKEND.clear()
         chosen = LATEST_BACKEND[key] = choose(backend, source, threads)
-    numbers = np.concatenate([variable.guess for variable in inputs])
-    return replace(chosen, evaluator=BoundEvaluator(chosen.evaluator, numbers), nlp=bound_nlp(chosen.nlp, nlp, numbers))
-
-
-def whole(rollout: Rollout, asked: Terms) -> str:
-    """Return a text of everything that determines a backend: equal for problems that differ only in inputs."""
-    parts = [getattr(asked, name) for name in ("costs", "objective", "penalties", "errors", "constraints", "outputs")]
-    parts += [asked.means, *([] if asked.residuals is None else [asked.residuals])]
-    text = ca.Function("whole", [rollout.z, rollout.smoothing], parts).serialize()
-    return hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()
+    bound = LaterNlp(lambda: bound_nlp(chosen.nlp, nlp(), numbers))
+    return replace(chosen, evaluator=BoundEvaluator(chosen.evaluator, numbers), nlp=bound)
 
 
 class BoundEvaluator:

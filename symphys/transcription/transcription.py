@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from symphys.transcription.staged.linearization import Linearization, StepPull
 
 PRICING_CALLS = 5
-"""Calls with which a function is timed; the fastest counts."""
+"""Calls with which a function is timed at most; the fastest counts."""
+PRICED = 0.01
+"""[s] after which a function is called no more to be timed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,15 +90,19 @@ class Transcription:
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
         """Simulate z and return motion, states and arguments; NotFinite if a number is not finite.
 
-        Each step is taken by casadi's virtual machine too; where one leads elsewhere, all of the motion is that of the
-        virtual machine.
+        The last record is cached. Each step is taken by casadi's virtual machine too; where one leads elsewhere, all of
+        the motion is that of the virtual machine.
         """
         from symphys.transcription.simulation import recorded, simulate
 
+        key, last = _key(z, smoothing), self._cache.record
+        if last is not None and last[0] == key:
+            return last[1]
         found = None if self._cache.by_reports else recorded(self.rollout, self.arrays(z, smoothing))
         if found is None:
             self._cache.by_reports, self._cache.last = True, None
             found = simulate(self.rollout, self._reported, np.array(z, float), smoothing)
+        self._cache.record = key, found
         return found
 
     def arrays(self, z: Array, smoothing: float = 0.0) -> RolloutArrays:
@@ -124,8 +130,7 @@ class Transcription:
             x = steps.states(z[None], smoothing)[0]
             u = given.T
             if rollout.feedback is not None:
-                found = rollout.feedback.map(rollout.steps)(x[:-1].T, given, np.tile(p, rollout.steps), time[None, :-1])
-                u = np.array(found).T
+                u = row_by_row(rollout.feedback, x[:-1], u, p.ravel(), time[:-1, None])[0]
         return RolloutArrays(z, smoothing, x, u, given.T, p.ravel(), time)
 
     def simulate_by_reports(self) -> None:
@@ -268,6 +273,7 @@ class _Cache:
 
     Attributes:
         last: the last motion, with its z and smoothing.
+        record: likewise the last record.
         reported: likewise the last results of the virtual machine's rollout.
         by_reports: whether the virtual machine's reports give all motions: it has taken a step elsewhere than the
             kernel, or no kernel is to be built.
@@ -277,6 +283,7 @@ class _Cache:
     def __init__(self) -> None:
         """Begin with nothing."""
         self.last: tuple[Key, RolloutArrays] | None = None
+        self.record: tuple[Key, Record] | None = None
         self.reported: tuple[Key, list[Array]] | None = None
         self.by_reports, self.gives_probes = False, True
 
@@ -292,8 +299,8 @@ def gradient_prices(
 
 def fastest(call: Callable[[], object], clock: Callable[[], float] = perf_counter) -> float:
     """Return the seconds of the fastest of a few calls, by a clock."""
-    times = []
-    for _ in range(PRICING_CALLS):
+    times = list[float]()
+    while len(times) < PRICING_CALLS and sum(times) < PRICED:
         began = clock()
         call()
         times.append(clock() - began)

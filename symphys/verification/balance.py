@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.codegen.backends.calls import row_by_row
 from symphys.dynamics.motion import momentum
 from symphys.maths import rotation
 from symphys.model.state_layout import Layout, input_columns, inputs_size
@@ -162,11 +163,10 @@ def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
     kinetic += rotor_energy(world, x)
     states, arrays = ca.Function("energies", [x, p], [kinetic]), record.arrays
     x_k = plain(rollout, arrays.x)
-    moving = states.map(len(x_k))(x_k.T, np.tile(arrays.p[:, None], len(arrays.x)))
-    works = ca.Function("work", [x, after, u], [work]).map(rollout.steps)
-    done = works(x_k[:-1].T, x_k[1:].T, arrays.u.T)
+    moving = row_by_row(states, x_k, arrays.p)[0][:, 0]
+    done = row_by_row(ca.Function("work", [x, after, u], [work]), x_k[:-1], x_k[1:], arrays.u)[0][:, 0]
     potential, lifted = _potential(rollout, record)
-    return np.array(moving).ravel(), potential, np.array(done).ravel() + lifted
+    return moving, potential, done + lifted
 
 
 def _potential(rollout: Rollout, record: Record) -> tuple[Array, Array]:

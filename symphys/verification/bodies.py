@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.codegen.backends.calls import row_by_row
 from symphys.dynamics.joints.warm_start import components
 from symphys.dynamics.motion import inertia_matrix
 from symphys.dynamics.observation import readings
@@ -52,7 +53,7 @@ def gravity(rollout: Rollout, record: Record) -> Array:
     u = input_symbols(rollout.world, rollout.inputs)
     vector = ca.vertcat(*(ca.SX(g) for g in rollout.world.gravity))
     of_step, arrays = ca.Function("gravity", [u, parameters(rollout)], [ca.densify(vector)]), record.arrays
-    return np.array(of_step.map(rollout.steps)(arrays.u.T, np.tile(arrays.p[:, None], rollout.steps))).T
+    return row_by_row(of_step, arrays.u, arrays.p)[0]
 
 
 def parameters(rollout: Rollout) -> Any:

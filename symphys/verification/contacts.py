@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from symphys.codegen.backends.calls import row_by_row
 from symphys.dynamics.observation import slip_function
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout, plain
@@ -86,9 +87,9 @@ def slides(rollout: Rollout, record: Record) -> list[dict[str, Any]]:
 def slip_speeds(rollout: Rollout, record: Record) -> Array:
     """Return the tangential speed at each contact at the start of each step (N, C) [m/s]."""
     scheme = rollout.parameters.scheme(rollout.problem.simulation)
-    slip = slip_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols).map(rollout.steps)
+    slip = slip_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols)
     arrays = record.arrays
-    return np.array(slip(plain(rollout, arrays.x)[:-1].T, arrays.u.T, np.tile(arrays.p[:, None], rollout.steps))).T
+    return row_by_row(slip, plain(rollout, arrays.x)[:-1], arrays.u, arrays.p)[0]
 
 
 def _deepest(rollout: Rollout, motion: Trajectory) -> dict[str, Any]:

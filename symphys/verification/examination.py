@@ -185,7 +185,7 @@ def examine(
     return {
         "gradient": compared,
         **finer,
-        "smoothed": refinement.smoothed(transcription, record),
+        "smoothed": refinement.smoothed(transcription, record, whole),
         **motion,
         **refinement.settling(transcription, z, motion["residual"], motion["impulse"]),
         "misses": near,

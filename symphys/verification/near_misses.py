@@ -22,6 +22,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.codegen.backends.calls import row_by_row
 from symphys.dynamics.collision import collide
 from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
 from symphys.maths import rotation
@@ -97,9 +98,7 @@ class SurfacePair:
 
     def least(self, poses: Array, p: Array) -> Array:
         """Return the smallest gap of all points (m,) [m], for ``poses`` (m, 2, 7)."""
-        count = len(poses)
-        found = self.gaps.map(count)(poses[:, 0].T, poses[:, 1].T, np.tile(p[:, None], count))
-        least: Array = np.array(found).min(axis=0)
+        least: Array = row_by_row(self.gaps, poses[:, 0], poses[:, 1], p)[0].min(axis=1)
         return least
 
 
@@ -242,9 +241,7 @@ def _flown(pair: SurfacePair, record: Record, k: int, after: Array) -> Array:
     poses[:, :, 3] = 1
     for side, body in enumerate(pair.bodies):
         state = np.concatenate([getattr(motion, field)[k, body] for field in GIVEN])
-        many = np.tile(state[:, None], len(after))
-        bend = np.tile(_acceleration(record, pair.rollout.dt, k, body)[:, None], len(after))
-        poses[:, side] = np.array(fly.map(len(after))(many, bend, after[None])).T
+        poses[:, side] = row_by_row(fly, state, _acceleration(record, pair.rollout.dt, k, body), after[:, None])[0]
     return poses
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from symphys.codegen.backends.calls import row_by_row
 from symphys.model.state_layout import Layout
 from symphys.shooting import VariableBlock
 from symphys.trajectory import NotFinite
@@ -165,11 +166,10 @@ def left(transcription: Transcription, record: Record, residual: float, impulse:
     if not (free and residual > LEFT_RESIDUAL * impulse > 0):
         return {}
     finer = finer_problem(transcription, MORE_SWEEPS).timed(record).rollout
-    p = np.tile(arrays.p[:, None], rollout.steps)
-    after, _, _, residuals, *_ = finer.report.map(rollout.steps)(arrays.x[:-1].T, arrays.u.T, p, 0.0)
-    share = np.array(residuals).ravel() / np.maximum(motion.residual, np.finfo(float).tiny)
+    settled, _, _, residuals, *_ = row_by_row(finer.report, arrays.x[:-1], arrays.u, arrays.p, [0.0])
+    share = residuals[:, 0] / np.maximum(motion.residual, np.finfo(float).tiny)
     scale = np.where(share > CYCLING, 0.0, 1 / np.maximum(1 - share, 1 - CYCLING))
-    numbers, settled = bodies(rollout, record), np.array(after).T
+    numbers = bodies(rollout, record)
     off = scale[:, None] * speeds(rollout, numbers, settled - arrays.x[1:])[:, free]
     stays = np.zeros_like(off)
     for k in np.argsort(-off.max(axis=1), kind="stable")[:MAX_STEPS]:
@@ -230,18 +230,23 @@ def finer_problem(transcription: Transcription, what: str) -> Transcription:
     return transcribe_finer(transcription, finer[what])
 
 
-def smoothed(transcription: Transcription, record: Record) -> list[dict[str, Any]]:
+def smoothed(transcription: Transcription, record: Record, whole: bool = True) -> list[dict[str, Any]]:
     """Compare the exact motion of ``record`` with smoothed rollouts.
 
+    Args:
+        transcription: of a problem.
+        record: of it.
+        whole: whether ``TRIED_SMOOTHING`` is tried where the problem has none of its own, which no verdict rests on.
+
     Returns:
-        For each "smoothing" [m/s] of the problem's own stages, or of ``TRIED_SMOOTHING`` where it has none, the
-        "objective", the "worst" error / tolerance and "costs", the sum of what is minimised; "own" says which it is.
-        "moved": how far bodies get from their places in the exact motion, as a share of the longest way of one.
+        For each "smoothing" [m/s] of the problem's own stages, or of ``TRIED_SMOOTHING``, the "objective", the "worst"
+        error / tolerance and "costs", the sum of what is minimised; "own" says which it is. "moved": how far bodies get
+        from their places in the exact motion, as a share of the longest way of one.
     """
     z = record.z
     own = [smoothing for smoothing in transcription.problem.simulation.smoothing if smoothing > 0]
     rows = []
-    for smoothing in own or TRIED_SMOOTHING:
+    for smoothing in own or TRIED_SMOOTHING * whole:
         verdict = transcription.judge(z, smoothing)
         found = {"objective": verdict.objective, "worst": verdict.worst, "costs": sum(verdict.costs.values())}
         moved = _moved(record, transcription, smoothing)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from symphys.codegen.backends.interface import Function
 from symphys.types import Array
@@ -39,26 +39,32 @@ class BufferedFunction:
         return [dense(*each) for each in zip(self.shapes, self.places, self.nonzeros, strict=True)]
 
 
-def row_by_row(function: Function, *arguments: Array) -> list[Array]:
-    """Return a function of dense arguments (B, n) with results (B, size); RuntimeError where casadi fails.
+def row_by_row(function: Function, *arguments: ArrayLike) -> list[Array]:
+    """Return a function of dense arguments (B, n) with dense results (B, size); RuntimeError where casadi fails.
 
-    Numbers go from arrays to arrays: casadi takes half a millisecond to hand over 16,000 of them as a ``DM``.
+    Arguments (n,) are the same in all rows. A matrix is an argument (B, columns, rows) and a result column after
+    column. Numbers go from arrays to arrays: casadi
+    takes half a millisecond to hand over 16,000 of them as a ``DM``.
     """
-    rows = [np.ascontiguousarray(argument, float) for argument in arguments]
+    given = [np.asarray(argument, float) for argument in arguments]
+    count = next((len(argument) for argument in given if argument.ndim > 1), 1)
+    flat = [each.reshape(count, each.size // max(count, 1)) if each.ndim > 1 else each for each in given]
+    rows = [np.ascontiguousarray(np.broadcast_to(each, (count, each.shape[-1]))) for each in flat]
+    found = [np.zeros((count, function.numel_out(i))) for i in range(function.n_out())]
     places = [np.array(function.sparsity_out(i).find(), int) for i in range(function.n_out())]
-    found = [np.zeros((len(rows[0]), function.numel_out(i))) for i in range(function.n_out())]
-    nonzeros = [np.zeros(own.size) for own in places]
-    buffer, evaluate = function.buffer()
+    nonzeros = [np.zeros((count, own.size)) for own in places]
+    if not count:
+        return found
+    buffer, evaluate = mapped(function, count, 1).buffer()
+    for i, argument in enumerate(rows):
+        buffer.set_arg(i, argument.reshape(-1).data)
     for i, values in enumerate(nonzeros):
-        buffer.set_res(i, values.data)
-    for b in range(len(rows[0])):
-        for i, argument in enumerate(rows):
-            buffer.set_arg(i, argument[b].data)
-        evaluate()
-        if buffer.ret():
-            raise RuntimeError(f"the evaluation of {function.name()} failed")
-        for into, own, values in zip(found, places, nonzeros, strict=True):
-            into[b, own] = values
+        buffer.set_res(i, values.reshape(-1).data)
+    evaluate()
+    if buffer.ret():
+        raise RuntimeError(f"the evaluation of {function.name()} failed")
+    for into, own, values in zip(found, places, nonzeros, strict=True):
+        into[:, own] = values
     return found
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symphys.codegen.backends import BEST
+from symphys.codegen.backends.calls import row_by_row
 from symphys.shooting import Linearized, StagedMotion
 from symphys.transcription.formula_names import spans
 from symphys.transcription.rollout import Rollout
@@ -138,12 +139,10 @@ class Linearization:
         """Yield the bases (nx, n) of the tangents at states X (N, nx)."""
         nx, n = self.step.arguments.sizes[:2]
         some = max(1, min(len(X), MAX_LIFTED // max(nx * n, 1)))
-        mapped = self.tangent.basis.map(some)
         for first in range(0, len(X), some):
             part = X[first : first + some]
-            states = np.concatenate([part, np.repeat(part[:1], some - len(part), axis=0)])
-            found = np.array(ca.DM(mapped(states.T, np.tile(p[:, None], some))))
-            yield from np.split(found, some, axis=1)[: len(part)]
+            found = row_by_row(self.tangent.basis, part, p)[0]
+            yield from found.reshape(len(part), n, nx).transpose(0, 2, 1)
 
     def full_parameters(self, p: Array) -> Array:
         """Return p (np,) of the steps from that of a rollout whose time step is no parameter."""
