@@ -49,8 +49,6 @@ def locks(screws: Sequence[Screw], paths: Sequence[Sequence[int]] | None = None)
         screws: all of them, from one body with mass on.
         paths: indices of the screws from that body to each other body with mass; without, one path of all.
     """
-    from scipy.optimize import minimize  # a start without such chains loads no scipy
-
     paths = [list(range(len(screws)))] if paths is None else paths
     if len(screws) > 6 * len(paths) + sum(each.carried for each in screws):
         return True
@@ -69,6 +67,8 @@ def locks(screws: Sequence[Screw], paths: Sequence[Sequence[int]] | None = None)
 
     if not inner:
         return least(np.empty(0)) < SINGULAR
+    from scipy.optimize import minimize  # a start without such chains loads no scipy
+
     starts = np.vstack([low, high, rng.uniform(low, high, (TRIALS, len(inner)))])
     best = sorted(starts, key=least)[:REFINED]
     options = {"xatol": 1e-7, "fatol": 1e-7, "maxfev": 60 * len(inner)}
@@ -87,18 +87,17 @@ def _least(screws: Sequence[Screw], paths: Sequence[Sequence[int]], q: Array) ->
 
 def _velocities(screws: Sequence[Screw], path: Sequence[int], q: Array, centre: Array, size: float) -> Array:
     """(6, screws) Turning, and speed over ``size``, of the body at the end of a path by the rate of each screw."""
-    from scipy.spatial.transform import Rotation
-
-    turned, moved, columns = Rotation.identity(), np.zeros(3), np.zeros((6, len(screws)))
+    turned, moved, columns = np.eye(3), np.zeros(3), np.zeros((6, len(screws)))
     for k in path:
-        axis = turned.apply(screws[k].axis)
+        axis = turned @ screws[k].axis
         if (given := screws[k].point) is None:
             columns[3:, k] = axis
             moved = moved + q[k] * axis
             continue
-        point = turned.apply(given - centre) + moved
+        point = turned @ (given - centre) + moved
         lead = screws[k].lead
         columns[:3, k], columns[3:, k] = axis, (np.cross(point, axis) + lead * axis) / size
-        step = Rotation.from_rotvec(q[k] * axis)
-        turned, moved = step * turned, point + step.apply(moved - point) + q[k] * lead * axis
+        across = np.cross(np.eye(3), axis)  # across @ v is axis x v
+        step = np.eye(3) + np.sin(q[k]) * across + (1 - np.cos(q[k])) * across @ across
+        turned, moved = step @ turned, point + step @ (moved - point) + q[k] * lead * axis
     return columns

@@ -14,8 +14,10 @@ import numpy as np
 
 from symphys.codegen import FunctionCall, Kernel, MemoryLayout, Place, Program
 from symphys.codegen.backends import build_kernel
+from symphys.codegen.toolchain.identity import identity_of
+from symphys.codegen.toolchain.warm_start import ProgramSource
 from symphys.expression import Formula
-from symphys.transcription.program import dense, step_calls
+from symphys.transcription.program import dense, program_identity, step_calls
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array, Expr
 
@@ -89,9 +91,20 @@ class Stage:
         return self._values.setdefault((formula, shift), ca.SX.sym("value", size))
 
     def compiled(self, exact: bool, backend: str, threads: int) -> KernelStep:
-        """Compile a kernel, for smoothing 0 only if ``exact``; KernelUnavailable without a compiler."""
-        program = self.program(exact)
-        return KernelStep(build_kernel(backend, program, list(program.outputs), threads))
+        """Build or find a kernel, for smoothing 0 only if ``exact``; KernelUnavailable without a compiler."""
+        results = ["after", "sensed", *self._names, *["inputs"] * self._with_inputs]
+        source = ProgramSource(lambda: self.program(exact), self._identity(exact))
+        return KernelStep(build_kernel(backend, source, results, threads, wait=True))
+
+    def _identity(self, exact: bool) -> str | None:
+        """Return a key of ``program``; None where it is not known."""
+        problem = program_identity(self.rollout.problem, exact)
+        if problem is None:
+            return None
+        asked = [function.serialize() for function in (self._sense, self._asked)]
+        values = [(formula.text, shift) for formula, shift in self._values]
+        memory = tuple(self.rollout.memory.columns)
+        return identity_of("stage", problem, self.rollout.inputs, memory, self.sizes, *asked, values, self._with_inputs)
 
     def program(self, exact: bool) -> Program:
         """Return the program, whose vector is a row and whose parameter is the smoothing."""

@@ -50,6 +50,13 @@ def test_a_chain_that_cannot_is_not(name: str) -> None:
     assert not locks(FREE[name])
 
 
+@pytest.mark.parametrize(("low", "high", "locking"), [(-1.2, 0.0, True), (0.0, 1.2, False)])
+def test_the_middle_hinge_locks_where_the_outer_axes_meet(low: float, high: float, locking: bool) -> None:
+    """Turned about y by -60 degrees, an axis 30 degrees above x is the first one, z."""
+    outer = hinge([np.sqrt(0.75), 0, 0.5])
+    assert locks([hinge(Z), Screw(Y, HERE, low, high), outer]) == locking
+
+
 @few(("wheel", "locking"), [(X, True), (Z, False), (Y, False), ([0.6, 0.8, 0], False)], 2)
 def test_a_frame_that_holds_three_joints_locks_where_nothing_beyond_it_answers(wheel: object, locking: bool) -> None:
     """A flywheel on the inner ring answers turns of it about all but one axis, which must be the one that locks."""

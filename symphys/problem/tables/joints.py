@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 
+import casadi as ca
 import numpy as np
 
+from symphys.maths import rotation
 from symphys.model.gimbal import Screw, locks
 from symphys.model.joints import (
     JOINTS,
@@ -178,10 +180,8 @@ def _crossed(joint: ParametricJoint, body: str | None, pose: Array, screws: list
 
 
 def _pose(frame: JointFrame) -> Array:
-    from scipy.spatial.transform import Rotation  # a start without such chains loads no scipy
-
-    found = np.eye(4)
-    found[:3, :3] = Rotation.from_quat(np.array(frame.orientation, float), scalar_first=True).as_matrix()
+    found, q = np.eye(4), np.array(frame.orientation, float)
+    found[:3, :3] = rotation.matrix(ca.DM(q / np.linalg.norm(q)))
     found[:3, 3] = np.array(frame.point, float)
     return found
 
