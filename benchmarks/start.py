@@ -10,7 +10,6 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -106,8 +105,13 @@ def start(name: str, solver: str, last: int) -> dict[str, Any]:
         if row.iteration >= last:
             raise Enough
 
-    with suppress(Enough, symphys.SymphysError):  # ipopt ends with an error of its own
+    try:
         symphys.solve(problem, solver, progress=progress)
+    except Enough:
+        pass
+    except symphys.SymphysError:  # ipopt ends with an error of its own
+        if not found:
+            raise
     return found
 
 

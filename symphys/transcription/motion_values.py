@@ -6,11 +6,10 @@ from collections.abc import Callable
 
 import casadi as ca
 
-from symphys.codegen.toolchain.identity import identity_of
-from symphys.codegen.toolchain.warm_start import kept_function
+from symphys.codegen.toolchain.warm_start import kept
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.objective import Terms, rollout_terms
-from symphys.transcription.program import program_identity
+from symphys.transcription.program import motion_identity
 from symphys.transcription.rollout import Rollout
 from symphys.types import Expr
 
@@ -44,6 +43,4 @@ def _of_motion(rollout: Rollout, name: str, parts: Callable[[Terms, Expr], list[
         found = parts(rollout_terms(rollout, (x, rollout.applied(x))), x)
         return ca.Function(name, [rollout.z, x], [ca.densify(part) for part in found])
 
-    problem = program_identity(rollout.problem, True)
-    identity = None if problem is None else identity_of(name, problem, rollout.inputs, tuple(rollout.memory.columns))
-    return kept_function(make, identity, least=0)
+    return kept(make, motion_identity(rollout, name))

@@ -322,6 +322,14 @@ def program_identity(problem: Problem, exact: bool) -> str | None:
     return identity_of(data, exact)
 
 
+def motion_identity(rollout: Rollout, *what: object) -> str | None:
+    """Return a key of what is made of a rollout's formulas in some way; None where it is not known."""
+    problem = program_identity(rollout.problem, True)
+    if problem is None:
+        return None
+    return identity_of(problem, rollout.inputs, tuple(rollout.memory.columns), rollout.parameters.names, *what)
+
+
 def swept_identity(rollout: Rollout, inputs: Sequence[Variable], exact: bool) -> str | None:
     """Return a key of a rollout's program that does not depend on the numbers of ``inputs``, its last variables."""
     problem, parameters = rollout.problem, rollout.parameters

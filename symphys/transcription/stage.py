@@ -14,10 +14,9 @@ import numpy as np
 
 from symphys.codegen import FunctionCall, Kernel, MemoryLayout, Place, Program
 from symphys.codegen.backends import build_kernel
-from symphys.codegen.toolchain.identity import identity_of
 from symphys.codegen.toolchain.warm_start import ProgramSource
 from symphys.expression import Formula
-from symphys.transcription.program import dense, program_identity, step_calls
+from symphys.transcription.program import dense, motion_identity, step_calls
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array, Expr
 
@@ -98,13 +97,9 @@ class Stage:
 
     def _identity(self, exact: bool) -> str | None:
         """Return a key of ``program``; None where it is not known."""
-        problem = program_identity(self.rollout.problem, exact)
-        if problem is None:
-            return None
         asked = [function.serialize() for function in (self._sense, self._asked)]
         values = [(formula.text, shift) for formula, shift in self._values]
-        memory = tuple(self.rollout.memory.columns)
-        return identity_of("stage", problem, self.rollout.inputs, memory, self.sizes, *asked, values, self._with_inputs)
+        return motion_identity(self.rollout, "stage", exact, self.sizes, *asked, values, self._with_inputs)
 
     def program(self, exact: bool) -> Program:
         """Return the program, whose vector is a row and whose parameter is the smoothing."""

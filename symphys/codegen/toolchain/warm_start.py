@@ -8,12 +8,13 @@ program is built.
 from __future__ import annotations
 
 import contextlib
+import pickle
 import time
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import casadi as ca
 
@@ -28,8 +29,8 @@ from symphys.codegen.toolchain.plans import KeptPlan
 from symphys.records import dataclass
 
 Precision = Literal["double", "single"]
-MIN_KEPT_INSTRUCTIONS = 5000
-"""Instructions of a function of casadi from which it is kept: fewer are built in some tenths of a second."""
+MIN_KEPT_INSTRUCTIONS = 50
+"""Instructions of a function of casadi from which it is kept: fewer are built as soon as read."""
 
 
 @dataclass(frozen=True)
@@ -102,29 +103,40 @@ def keep(key: str, write: Callable[[Path], None], cache: Cache) -> None:
 def kept_function(
     make: Callable[[], ca.Function], identity: str | None, least: int = MIN_KEPT_INSTRUCTIONS
 ) -> ca.Function:
-    """Return a function of casadi, from the cache where one of this identity was made before; see ``ProgramSource``.
+    """Return a function of casadi, from the cache where one of this identity was made before; see ``kept``.
 
     It is kept from ``least`` instructions on.
+    """
+    return kept(make, identity, lambda function: function.n_instructions() >= least)
+
+
+def kept(make: Callable[[], Kept], identity: str | None, worth: Callable[[Kept], bool] = lambda _: True) -> Kept:
+    """Return what ``make`` makes, from the cache where something of this identity was made before.
+
+    Args:
+        make: makes data of arrays, functions of casadi, and data classes of this package.
+        identity: as in ``ProgramSource``.
+        worth: whether it is kept.
     """
     key = None if identity is None else identity_of(identity, package_stamp())
     try:
         cache = default_cache()
     except KernelUnavailable:
         return make()
-    if key is not None and (kept := found(key[:32], _read_function, cache)) is not None:
-        return kept
-    function = make()
-    if key is not None and function.n_instructions() >= least:
-        keep(key[:32], lambda path: _write_function(function, path), cache)
-    return function
+    if key is not None and (known := found(key[:32], _read, cache)) is not None:
+        return known[0]  # type: ignore[no-any-return]
+    made = make()
+    if key is not None and worth(made):
+        keep(key[:32], lambda path: _write(made, path), cache)
+    return made
 
 
-def _write_function(function: ca.Function, path: Path) -> None:
-    path.write_bytes(zlib.compress(function.serialize().encode(errors="surrogateescape"), 1))
+def _write(made: object, path: Path) -> None:
+    path.write_bytes(zlib.compress(pickle.dumps((made,)), 1))
 
 
-def _read_function(path: Path) -> ca.Function:
+def _read(path: Path) -> Any:
     try:
-        return ca.Function.deserialize(zlib.decompress(path.read_bytes()).decode(errors="surrogateescape"))
-    except (zlib.error, RuntimeError) as error:
-        raise ValueError(f"{path} holds no function") from error
+        return pickle.loads(zlib.decompress(path.read_bytes()))
+    except (zlib.error, pickle.UnpicklingError, EOFError, RuntimeError, AttributeError, ImportError) as error:
+        raise ValueError(f"{path} holds nothing that can be read") from error

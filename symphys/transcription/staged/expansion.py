@@ -9,15 +9,18 @@ leads there is a row at each of the N steps. With rows r, slopes S and weights w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from symphys.codegen.toolchain.warm_start import kept
 from symphys.shooting import Expansion
-from symphys.transcription.staged.stage_functions import StageFunctions, StepRows, reading
+from symphys.transcription.program import motion_identity
+from symphys.transcription.staged.stage_functions import ReadingFunction, StageFunctions, StepRows, reading
 from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm
 from symphys.transcription.staged.term_slopes import Block, Blocks, nonzeros, tangent_slopes
-from symphys.types import Array, Ints
+from symphys.types import Array, Expr, Ints
 
 
 class ExpansionSums:
@@ -115,6 +118,35 @@ def _add(total: Array, ticks: Ints, rows: Block, columns: Block) -> None:
         total[ticks[:, None, None], rows.columns[:, None], columns.columns] += products
 
 
+class StackSlopes(NamedTuple):
+    """Values and slopes of stacked terms in tangents.
+
+    Attributes:
+        function: -> values (r,), nonzeros of their slopes.
+        sizes: of the slopes by the tangents of ``x`` and ``first`` and by inputs, side by side.
+        shape: of the slopes; more columns are by constants.
+        places: (2, nonzeros) rows and columns of the nonzeros.
+    """
+
+    function: ReadingFunction
+    sizes: tuple[int, int, int]
+    shape: tuple[int, int]
+    places: Ints
+
+
+def stack_slopes(symbols: StageSymbols, values: Sequence[Expr], at_steps: bool, static: bool) -> StackSlopes:
+    """Return values, each (r,), and their slopes; see ``SquareStack``."""
+    stacked = ca.vertcat(ca.SX(0, 1), *values)
+    x, first, u, constants = tangent_slopes(symbols, stacked)
+    n = symbols.tangent.size + len(symbols.sums.sums)
+    wide = (_padded(x, n), _padded(first, symbols.tangent.size if at_steps and first.nnz() else 0), u)
+    slopes = ca.sparsify(ca.horzcat(*wide, constants if static else ca.SX(stacked.shape[0], 0)))
+    function = reading([stacked, nonzeros(slopes)], symbols.arguments, at_steps)
+    of_x, of_first, of_u = (int(each.shape[1]) for each in wide)
+    places = np.array(slopes.sparsity().get_triplet(), np.int64)
+    return StackSlopes(function, (of_x, of_first, of_u), slopes.shape, places)
+
+
 Evaluated = tuple[str, int | None, int | None]
 """Backend, threads, and the operations of a horizon above which functions are compiled."""
 
@@ -145,14 +177,14 @@ class SquareStack:
         """
         steps, self._at_steps = symbols.rollout.steps, at_steps
         rows = steps if at_steps else steps + 1
-        values, weights, limits = list[ca.SX](), list[Array](), list[np.ndarray]()
+        distinct, weights, limits = list[StageTerm](), list[Array](), list[np.ndarray]()
         known: dict[tuple[object, ...], int] = {}
         for term in terms:
             limit = places.get(id(term))
             key = (*term.key, -1 if limit is None else limit.start)
             if key not in known:
-                known[key] = len(values)
-                values.append(term.value)
+                known[key] = len(distinct)
+                distinct.append(term)
                 weights.append(np.zeros((rows, term.size)))
                 limits.append(np.full((rows, term.size), -1))
             ticks = term.steps if at_steps else term.states
@@ -164,17 +196,14 @@ class SquareStack:
         self._limited = np.flatnonzero((whole >= 0).any(axis=0))
         self._limits = whole[:, self._limited]
         self._lower, self._upper = (np.append(each, 0.0)[self._limits] for each in bounds)
-        stacked = ca.vertcat(ca.SX(0, 1), *values)
-        x, first, u, constants = tangent_slopes(symbols, stacked)
-        self._n, self._m = symbols.tangent.size + len(symbols.sums.sums), int(symbols.u.shape[0])
-        wide = (_padded(x, self._n), _padded(first, symbols.tangent.size if at_steps and first.nnz() else 0), u)
-        sizes = [int(each.shape[1]) for each in wide]
-        slopes = ca.sparsify(ca.horzcat(*wide, constants if static else ca.SX(stacked.shape[0], 0)))
+        made = kept(
+            lambda: stack_slopes(symbols, [term.value for term in distinct], at_steps, static),
+            motion_identity(symbols.rollout, "stack", at_steps, static, [term.key for term in distinct]),
+        )
+        sizes, self._m = made.sizes, int(symbols.u.shape[0])
         self._cuts = [slice(end - size, end) for size, end in zip(sizes, np.cumsum(sizes).tolist(), strict=True)]
-        self._wide, self._shape = sum(sizes), (rows, *slopes.shape)
-        self._places = tuple(np.array(each, np.int64) for each in slopes.sparsity().get_triplet())
-        function = reading([stacked, nonzeros(slopes)], symbols.arguments, at_steps)
-        self._functions = StageFunctions([function], rows, *evaluated)
+        self._wide, self._shape, self._places = sum(sizes), (rows, *made.shape), made.places
+        self._functions = StageFunctions([made.function], rows, *evaluated)
         unused = (self._weights == 0) & (whole < 0)
         self._unused = (unused, unused[:, self._places[0]]) if unused.any() else None
 
@@ -267,12 +296,21 @@ def square_stacks(
         if term.kind == "limit":
             places[id(term)] = slice(first, first + len(term.steps) * term.size)
             first = places[id(term)].stop
-        if term.kind in ("squares", "limit"):
-            whole = ca.Function("term", list(symbols.arguments), [ca.densify(term.value)])
-            both = term.after and any(whole.jac_sparsity(0, i).nnz() for i in (1, 2))
-            (at_steps if both else at_states).append(term)
+    stacked = [term for term in terms if term.kind in ("squares", "limit")]
+    identity = motion_identity(symbols.rollout, "sides of terms", [term.key for term in stacked])
+    sides = kept(lambda: [_of_both_sides(symbols, term) for term in stacked], identity)
+    for term, both in zip(stacked, sides, strict=True):
+        (at_steps if both else at_states).append(term)
     chosen = ((each, both) for each, both in ((at_states, False), (at_steps, True)) if each)
     return [SquareStack(symbols, each, places, bounds, both, static, evaluated) for each, both in chosen]
+
+
+def _of_both_sides(symbols: StageSymbols, term: StageTerm) -> bool:
+    """Whether a term of the state after a step depends on what leads there, too."""
+    if not term.after:
+        return False
+    whole = ca.Function("term", list(symbols.arguments), [ca.densify(term.value)])
+    return any(whole.jac_sparsity(0, i).nnz() for i in (1, 2))
 
 
 def _padded(slope: ca.SX, columns: int) -> ca.SX:

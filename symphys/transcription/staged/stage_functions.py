@@ -17,9 +17,10 @@ from symphys.codegen import (
     Place,
     Program,
     ProgramError,
-    compile_program,
 )
 from symphys.codegen.backends import PRECISIONS
+from symphys.codegen.toolchain.identity import identity_of
+from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
 from symphys.records import dataclass
 from symphys.types import Array, Expr, Ints
 
@@ -185,7 +186,9 @@ class StageFunctions:
         if not self._compiles:
             return None
         try:
-            return compile_program(self._program, seeded=(), threads=self.threads, wait=self._waits)
+            own = [(each.function.serialize(), each.segments) for each in self.functions]
+            source = ProgramSource(lambda: self._program, identity_of("stage functions", own))
+            return compile_source(source, (), self.threads, wait=self._waits)
         except (KernelUnavailable, ProgramError):
             return None  # the step's description says why there is no compiler
 

@@ -13,20 +13,22 @@ of the last step.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import field
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import field, replace
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
+from symphys.codegen.toolchain.warm_start import kept
 from symphys.errors import SymphysError
 from symphys.expression import Formula, MotionPart, parse
 from symphys.problem import Constraint, Cost, Problem, Target
 from symphys.records import dataclass
 from symphys.suggest import quote
 from symphys.transcription.formula_names import spans
+from symphys.transcription.program import motion_identity
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.tangent import Tangent
 from symphys.transcription.terms import Term, over_time, problem_terms
@@ -182,9 +184,10 @@ class StageTerm:
         weight: factor of the sum; of a limit, of its squared violations in the merit.
         steps: (T,) at which it is evaluated.
         after: whether it looks at the state after the step; else at that before.
-        value: (r,) an expression of ``StageSymbols``.
+        make: makes its value (r,), an expression of ``StageSymbols``.
         key: terms with equal ones have equal values and slopes, whichever state they look at.
         number: of a sum.
+        size: its number of components ``r``.
     """
 
     name: str
@@ -192,14 +195,15 @@ class StageTerm:
     weight: float
     steps: Ints
     after: bool
-    value: Expr
+    make: Callable[[], Expr]
     key: tuple[object, ...]
     number: int = -1
+    size: int = 1
 
-    @property
-    def size(self) -> int:
-        """Return the number of components ``r``."""
-        return int(self.value.shape[0])
+    @cached_property
+    def value(self) -> Expr:
+        """Return the value (r,)."""
+        return self.make()
 
     @property
     def states(self) -> Ints:
@@ -331,7 +335,10 @@ def stage_terms(symbols: StageSymbols) -> list[StageTerm]:
 
     The weighted sum of costs and squares is the objective. Limits are in the order of the problem's constraints.
     """
-    return [*_Terms(symbols).all(), *_sums(symbols)]
+    found = [*_Terms(symbols).all(), *_sums(symbols)]
+    identity = motion_identity(symbols.rollout, "sizes of terms", [term.key for term in found])
+    sizes = kept(lambda: [int(term.value.shape[0]) for term in found], identity)
+    return [replace(term, size=size) for term, size in zip(found, sizes, strict=True)]
 
 
 class _Terms:
@@ -352,19 +359,20 @@ class _Terms:
         """Make a term at one side of its steps; a varying time step is part of the value."""
         name, kind, steps = term.table.name, term.kind, np.array(term.points.steps, np.int64)
         weight, key = term.weight / len(term.points.sides), self._key(term.formula, kind, after)
-        value, dt = self.symbols.value(term.formula, after), self.symbols.interval
+        value, dt = partial(self.symbols.value, term.formula, after), self.symbols.interval
         if not self.free or kind == "limit":
             return StageTerm(name, kind, weight * self.rollout.dt, steps, after, value, key)
-        value = value * (ca.sqrt(dt) if kind == "squares" else dt)
-        return StageTerm(name, kind, weight, steps, after, value, (*key, "running"))
+        share = ca.sqrt(dt) if kind == "squares" else dt
+        return StageTerm(name, kind, weight, steps, after, lambda: value() * share, (*key, "running"))
 
     def _instant(self, term: Term) -> StageTerm:
         ((tick, step),) = term.points.pairs
         formula, kind, last = term.formula, term.kind, self.rollout.steps
         if not formula.parts:
-            value, key = self.symbols.value(formula, tick == last), self._key(formula, kind, tick == last)
+            value = partial(self.symbols.value, formula, tick == last)
+            key: tuple[object, ...] = self._key(formula, kind, tick == last)
         else:
-            value, key = self.symbols.at_end(formula, tick), (formula.text, kind, tick)
+            value, key = partial(self.symbols.at_end, formula, tick), (formula.text, kind, tick)
             tick, step = (tick, step) if self.symbols.sums.local(formula, tick) else (last, last - 1)
         return StageTerm(term.table.name, kind, term.weight, np.array([step]), tick == last, value, key)
 
@@ -372,11 +380,15 @@ class _Terms:
         return formula.text, kind, after and not self.symbols.of_step.isdisjoint(formula.names)
 
 
+def _component(symbols: StageSymbols, each: MotionSum, after: bool) -> Expr:
+    return symbols.value(each.formula, after)[each.component]
+
+
 def _sums(symbols: StageSymbols) -> Iterator[StageTerm]:
     for number, each in enumerate(symbols.sums.sums):
         for after, weights in ((False, each.before), (True, each.after)):
             if weights.any():
-                value = symbols.value(each.formula, after)[each.component]
+                value = partial(_component, symbols, each, after)
                 steps = np.flatnonzero(weights)
                 key = number, after and not symbols.of_step.isdisjoint(each.formula.names)
                 yield StageTerm("sum", "sum", float(weights[steps[0]]), steps, after, value, key, number)

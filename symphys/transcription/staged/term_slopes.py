@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from symphys.codegen.toolchain.warm_start import kept
 from symphys.records import dataclass
+from symphys.transcription.program import motion_identity
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.stage_functions import ReadingFunction, StageFunctions, StepRows, reading
 from symphys.transcription.staged.stage_terms import Kind, StageSymbols, StageTerm, motion_sums, stage_terms
@@ -110,6 +112,12 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
         shared = known[term.key]
         function = ReadingFunction(shared.function.function, shared.function.reads, term.after)
         return TermSlopes(function, shared.slopes, shared.curved, shared.parts, shared.bases, shared.acting)
+    identity = motion_identity(symbols.rollout, "slopes of a term", term.key, term.after)
+    found = known[term.key] = kept(lambda: _made_slopes(symbols, term), identity)
+    return found
+
+
+def _made_slopes(symbols: StageSymbols, term: StageTerm) -> TermSlopes:
     # First derivatives in tangents; the second one where the term is no square.
     value, arguments = term.value, symbols.arguments[:4]
     slopes = tangent_slopes(symbols, value)
@@ -122,7 +130,7 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
         results += [nonzeros(second), *(nonzeros(each) for each in bases)]
         ends = np.cumsum([0, *(len(each) for each in acting)]).tolist()
         parts = tuple(slice(*pair) for pair in pairwise(ends))
-    found = TermSlopes(
+    return TermSlopes(
         reading(results, symbols.arguments, term.after),
         tuple(Pattern.of(each) for each in slopes),
         None if second is None else Pattern.of(second),
@@ -130,8 +138,6 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
         tuple(Pattern.of(each) for each in bases) if second is not None else (),
         acting,
     )
-    known[term.key] = found
-    return found
 
 
 def tangent_slopes(symbols: StageSymbols, value: Expr) -> list[Expr]:
@@ -292,11 +298,14 @@ class TermGroups:
 
     @cached_property
     def _values(self) -> list[StageFunctions]:
-        known: dict[Any, ReadingFunction] = {}
-        functions = []
-        for term in self.terms:
-            made = known.setdefault(term.key, reading([term.value], self.symbols.arguments, term.after))
-            functions.append(ReadingFunction(made.function, made.reads, term.after))
+        def make() -> list[ReadingFunction]:
+            first = {term.key: term for term in reversed(self.terms)}
+            known = {key: reading([term.value], self.symbols.arguments, term.after) for key, term in first.items()}
+            return [known[term.key] for term in self.terms]
+
+        made = kept(make, motion_identity(self.symbols.rollout, "terms", [term.key for term in self.terms]))
+        pairs = zip(made, self.terms, strict=True)
+        functions = [ReadingFunction(each.function, each.reads, term.after) for each, term in pairs]
         return [
             self._together([functions[i] for i in group.numbers], group.numbers, MOTIONS_PER_CALL)
             for group in self._groups
