@@ -7,6 +7,7 @@ first one writes it. Python's own start (20 ms) is left out.
 
 from __future__ import annotations
 
+import fcntl
 import statistics
 import time
 from collections.abc import Iterator
@@ -77,7 +78,7 @@ def starts(name: str, solver: str, bytecode: str, limit: float) -> Row:
         own |= {"PYTHONPYCACHEPREFIX": bytecode, "PYTHONDONTWRITEBYTECODE": ""}
         try:
             cold = dict(in_process(start, name, solver, MORE, env=own, timeout=limit))
-            while list(Path(folder).glob(".*.lock")):  # compilers that go on
+            while any(map(is_held, Path(folder).glob(".*.lock"))):  # compilers that go on
                 time.sleep(0.2)
             warm = dict(in_process(start, name, solver, 1, env=own, timeout=limit))
         except Exception as error:  # a table of all problems does not end with one
@@ -85,6 +86,18 @@ def starts(name: str, solver: str, bytecode: str, limit: float) -> Row:
         kept = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file()) / 2**20
     row |= {"cold": cold["wall"], "cold_spent": cold["spent"], "warm": warm["wall"], "read": warm["read"]}
     return row | {"warm_spent": warm["spent"], "memory": warm["memory"], "cold_memory": cold["memory"], "cache": kept}
+
+
+def is_held(lock: Path) -> bool:
+    """Whether a process builds what this file locks; one that was killed leaves its file."""
+    try:
+        with lock.open() as handle:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except FileNotFoundError:
+        return False
+    return False
 
 
 class Enough(BaseException):

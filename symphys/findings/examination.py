@@ -129,6 +129,19 @@ class Miss:
 
 
 @dataclass(frozen=True)
+class Untouched:
+    """A ``body`` that what is missed is about and that nothing moves: ``contact`` comes nearest, by ``gap`` [m].
+
+    ``time``: [s] when.
+    """
+
+    body: str
+    contact: str
+    gap: float
+    time: float
+
+
+@dataclass(frozen=True)
 class Slide:
     """The distance [m] that two surfaces slid under load, and their largest speed [m/s] and when [s]."""
 
@@ -191,6 +204,7 @@ class Examination:
             bodies that meet at one instant, with friction that pulls surfaces together, of all.
         slides: the contacts that slid furthest.
         misses: surfaces that hardly miss or hardly touch each other.
+        untouched: bodies that should be moved, and that nothing moves.
         equations, unknowns: components of all targets, and components of variables that may vary; 0 equations where
             everything is met.
         contradicting: names of targets that cannot all be met nearby.
@@ -242,6 +256,7 @@ class Examination:
     steps: float = np.nan
     slides: tuple[Slide, ...] = ()
     misses: tuple[Miss, ...] = ()
+    untouched: tuple[Untouched, ...] = ()
     equations: float = np.nan
     unknowns: float = np.nan
     contradicting: tuple[str, ...] = ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from symphys.findings.examination import Examination, HeldBound
+from symphys.findings.examination import Examination, HeldBound, Untouched
 from symphys.findings.levels import FAIR, UNKNOWN, Finding, Judged
 from symphys.findings.numerics import NO_COSTS
 from symphys.findings.writing import capital, listed, several, show
@@ -24,6 +24,10 @@ OUTWEIGHED = (
     "the costs hold {names} back: a [[target]] is a penalty beside them, so weigh it more (`weight`), or state a "
     "[[constraint]] in its place"
 )
+UNTOUCHED = (
+    "nothing moves {body}: {contact} comes nearest, to {gap} m at t = {time} s, and from there no gradient says where "
+    "to go; begin with a motion that touches it, or let a search find one (`--solver race`)"
+)
 EQUATIONS = "More equations than numbers that may vary: all are met only where some of them depend on each other."
 HELD = "It ends there, and what is minimised falls beyond: the bound holds it back. Widen it, if it may be wider."
 
@@ -41,6 +45,11 @@ def obstacle_findings(trust: Examination, judged: Judged) -> list[Finding]:
             if names:
                 what, number = f"Targets {which}", several(len(names), "target")
                 lines.append(Finding(TARGETS, FAIR, what, number, capital(said_of(names, clause)) + "."))
+        for each in trust.untouched:
+            number = f"{show(each.gap, 2)} m ({each.contact} at t = {show(each.time)} s)"
+            lines.append(
+                Finding(TARGETS, FAIR, f"Nothing moves {each.body}", number, capital(untouched_words(each)) + ".")
+            )
         if trust.equations > trust.unknowns:
             number = f"{show(trust.equations)} for {several(int(trust.unknowns), 'unknown')}"
             lines.append(Finding(TARGETS, UNKNOWN, "Components of targets", number, EQUATIONS))
@@ -59,6 +68,7 @@ def obstacles(trust: Examination, judged: Judged) -> tuple[str, ...]:
             clauses.append(said_of(against(trust), OPPOSED))
         if trust.outweighed:
             clauses.append(said_of(trust.outweighed, OUTWEIGHED))
+        clauses += map(untouched_words, trust.untouched)
     bounds = holding(trust, judged)
     if bounds:
         named = [bound_words(bound) for bound in bounds[:MAX_BOUNDS]]
@@ -66,6 +76,11 @@ def obstacles(trust: Examination, judged: Judged) -> tuple[str, ...]:
         verb = "holds" if len(bounds) == 1 else "hold"
         clauses.append(f"{listed([*named, *more])} {verb} the answer back, which would improve beyond")
     return tuple(clauses)
+
+
+def untouched_words(each: Untouched) -> str:
+    """Write how far from a body what could move it stays."""
+    return UNTOUCHED.format(body=each.body, contact=each.contact, gap=show(each.gap, 2), time=show(each.time))
 
 
 def against(trust: Examination) -> tuple[str, ...]:

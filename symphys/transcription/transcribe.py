@@ -26,6 +26,7 @@ from symphys.codegen.backends import (
 )
 from symphys.codegen.backends.interface import joined
 from symphys.codegen.backends.simd import common, probed
+from symphys.codegen.own_libraries import begin_own_libraries
 from symphys.codegen.runtime.kernel import Outputs
 from symphys.codegen.toolchain.warm_start import ProgramSource
 from symphys.problem import GuessedMotion, Problem, Simulation, Variable
@@ -108,6 +109,8 @@ def transcribe_finer(known: Transcription, simulation: Simulation) -> Transcript
 def transcribe_whole(problem: Problem, exact: bool, backend: str, threads: int | None) -> Transcription:
     """Transcribe a problem without its scenarios as one expression; nets of any size are part of the step."""
     began = perf_counter()
+    if backend in PRECISIONS:
+        begin_own_libraries()
     rollout = symbolic_rollout(problem)
     functions = ExpressionFunctions(rollout)
     built = perf_counter() - began

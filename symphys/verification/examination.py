@@ -13,7 +13,7 @@ from symphys.types import Array
 from symphys.verification import refinement
 from symphys.verification.balance import balance, jumps
 from symphys.verification.contacts import contacts, slides
-from symphys.verification.near_misses import near_misses, tunnelling
+from symphys.verification.near_misses import near_misses, tunnelling, untouched
 from symphys.verification.sensitivity_growth import sensitivity_growth
 from symphys.verification.target_conflicts import held_bounds, target_conflicts
 
@@ -180,6 +180,7 @@ def examine(
         standing |= target_conflicts(transcription, record)
     tell(NEAR)
     near = near_misses(timed, record)
+    missed = [check.name for check in transcription.judge(z).checks if not check.met]
     tell(SMOOTHING)
     motion = survey(transcription, record)
     return {
@@ -189,6 +190,7 @@ def examine(
         **motion,
         **refinement.settling(transcription, z, motion["residual"], motion["impulse"]),
         "misses": near,
+        "untouched": untouched(timed.rollout, record, missed),
         **standing,
         "bounds": held_bounds(transcription, z),
         "slides": slides(timed.rollout, record),

@@ -14,7 +14,7 @@ did.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cached_property
 from itertools import groupby
 from typing import Any
@@ -29,6 +29,7 @@ from symphys.maths import rotation
 from symphys.model.shapes import SolidShape
 from symphys.model.state_layout import GIVEN, Layout
 from symphys.model.world import Pair
+from symphys.problem import Constraint, Target
 from symphys.records import dataclass
 from symphys.shooting import VariableBlock
 from symphys.transcription import Record, Rollout, Transcription
@@ -147,6 +148,40 @@ def near_misses(transcription: Transcription, record: Record) -> list[dict[str, 
         if slopes is None:
             return []
         rows += [_row(approach, blocks, slope, rollout.dt) for approach, slope in zip(some, slopes.T, strict=False)]
+    return rows
+
+
+def untouched(rollout: Rollout, record: Record, missed: Collection[str]) -> list[dict[str, Any]]:
+    """Return the bodies that what is missed is about, and that nothing moves: whatever could push them stays away.
+
+    They have no joint, and nothing that varies is their own.
+
+    Args:
+        rollout: of a problem.
+        record: of its motion.
+        missed: names of targets and constraints.
+
+    Returns:
+        For each its "body", the "contact" that comes nearest, its "gap" [m] and "time" [s].
+    """
+    problem, world, loaded = rollout.problem, rollout.world, acting(record.motion)
+    tables: list[Target | Constraint] = [*problem.targets, *problem.constraints]
+    asked = [name for each in tables if each.name in missed for name in each.formula.names]
+    own = [*rollout.inputs, *(slot.name for variable in problem.variables for slot in variable.slots)]
+    held = {body for joint in world.joints for body in (joint.first, joint.second)}
+    rows = []
+    for number, body in enumerate(world.bodies):
+        named, driven = (any(name.startswith(f"{body.name}.") for name in names) for names in (asked, own))
+        if number in held or driven or not named:
+            continue
+        pairs = [pair for pair in surface_pairs(rollout) if pair.second is not None and number in pair.bodies]
+        if not pairs or any(loaded[:, list(pair.columns)].any() for pair in pairs):
+            continue
+        gaps = [record.motion.contact_gap[:-1, list(pair.columns)].min(axis=1) for pair in pairs]
+        nearest = int(np.argmin([each.min() for each in gaps]))
+        found = _around(pairs[nearest], record, int(gaps[nearest].argmin()))
+        time = found.k * rollout.dt + found.after
+        rows.append({"body": body.name, "contact": found.pair.name, "gap": found.gap, "time": time})
     return rows
 
 
