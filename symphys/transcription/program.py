@@ -8,7 +8,6 @@ order of the sums is that of casadi's, so that no bit differs.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -17,14 +16,12 @@ import numpy as np
 
 from symphys.codegen import AdjointDiscount, FunctionCall, MemoryLayout, Place, Program
 from symphys.codegen.program.collection import uncollected
-from symphys.codegen.toolchain.identity import identity_of
-from symphys.dynamics.kept import structure
 from symphys.expression import Formula
 from symphys.model.controllers import Net
 from symphys.model.controllers.net import Activation, Layer, activated
 from symphys.model.state_layout import Layout as Columns
 from symphys.model.state_layout import input_columns
-from symphys.problem import ALIVE, STEP_LENGTH, FeedbackController, Problem, Variable
+from symphys.problem import ALIVE, FeedbackController
 from symphys.transcription.decision_variables import start_of
 from symphys.transcription.formula_names import spans
 from symphys.transcription.gradient_probe import combined
@@ -223,8 +220,6 @@ def _chunk(rows: int, columns: int, scale: float | None) -> ca.Function:
 
 
 NO_FORMULAS: Mapping[str, Formula] = MappingProxyType({})
-IGNORED_FIELDS = frozenset({"name", "title", "description", "file", "text", "settings", "solvers", "solver_tables"})
-"""Fields of a problem on which no program depends."""
 
 
 class RolloutPlaces:
@@ -314,57 +309,6 @@ def _rollout_program(
         constants=fixed,
         discounted=AdjointDiscount(places.x, alive),
     )
-
-
-def program_identity(problem: Problem, exact: bool) -> str | None:
-    """Return a key of a rollout's program; problems that differ only in texts and solver options share it."""
-    data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in IGNORED_FIELDS}
-    return identity_of(data, exact)
-
-
-def motion_identity(rollout: Rollout, *what: object) -> str | None:
-    """Return a key of what is made of a rollout's formulas in some way; None where it is not known."""
-    problem = program_identity(rollout.problem, True)
-    if problem is None:
-        return None
-    return identity_of(problem, rollout.inputs, tuple(rollout.memory.columns), rollout.parameters.names, *what)
-
-
-def swept_identity(rollout: Rollout, inputs: Sequence[Variable], exact: bool) -> str | None:
-    """Return a key of a rollout's program that does not depend on the numbers of ``inputs``, its last variables."""
-    problem, parameters = rollout.problem, rollout.parameters
-    ignored = IGNORED_FIELDS | {"parametric", "parameters", "variables"}
-    data = {field.name: getattr(problem, field.name) for field in fields(problem) if field.name not in ignored}
-    symbolic, text = {*parameters.names, *parameters.overrides()}, repr(data)
-    constants = {name: value for name, value in problem.parameters.items() if name in text and name not in symbolic}
-    data["parameters"] = constants  # those that formulas may read
-    data["variables"] = problem.variables[: -len(inputs)]
-    # what a program has of ``parametric``
-    world = structure(rollout.world, parameters.symbols, parameters.scheme(problem.simulation))
-    start = ca.Function("start", [rollout.z], [rollout.x0, rollout.given, rollout.p]).serialize()
-    return identity_of(data, world, start, parameters.names, exact)
-
-
-OF_STEP = ("sensors", "controllers", "forces", "references", "phases", "termination")
-"""Fields of a problem on which its step depends, besides its world and its parameters."""
-
-
-def step_identity(rollout: Rollout, exact: bool) -> str | None:
-    """Return a key of one step: other costs, targets, limits, guesses and durations have the same.
-
-    The duration is part of it where it is free, formulas may name it, or phases act; the time step where it is no
-    parameter.
-    """
-    problem, parameters, simulation = rollout.problem, rollout.parameters, rollout.problem.simulation
-    world = structure(rollout.world, parameters.symbols, parameters.scheme(simulation))
-    columns = [(name, each.start, each.stop) for name, each in parameters.columns.items()]
-    own = [getattr(problem, name) for name in OF_STEP]
-    phased = any(phase.sets for phase in problem.phases) or any(law.during for law in problem.forces)
-    if problem.free_duration or phased or "duration" in repr(own):
-        timed: object = simulation
-    else:
-        timed = None if STEP_LENGTH in parameters.columns else simulation.dt
-    return identity_of(world, timed, own, columns, rollout.inputs, tuple(rollout.memory.columns), exact)
 
 
 class StepCalls(NamedTuple):

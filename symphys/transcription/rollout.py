@@ -272,11 +272,18 @@ class Rollout:
 
     def built(self, make: Callable[..., T], *more: Hashable) -> T:
         """Build a function of the world, once for all programs of this rollout and of sweeps with equal worlds."""
-        key = (make, more)
-        if key not in self._built:
+
+        def new() -> T:
             scheme = self.parameters.scheme(self.problem.simulation)
             arguments = (self.world, scheme, self.inputs, self.parameters.symbols)
-            self._built[key] = kept(make, *arguments, *more) if self._shares else make(*arguments, *more)
+            return kept(make, *arguments, *more) if self._shares else make(*arguments, *more)
+
+        return self.once((make, more), new)
+
+    def once(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return what ``make`` makes for this rollout, the first time; later the same."""
+        if key not in self._built:
+            self._built[key] = make()
         found: T = self._built[key]
         return found
 

@@ -16,7 +16,8 @@ from symphys.codegen import FunctionCall, Kernel, MemoryLayout, Place, Program
 from symphys.codegen.backends import build_kernel
 from symphys.codegen.toolchain.warm_start import ProgramSource
 from symphys.expression import Formula
-from symphys.transcription.program import dense, motion_identity, step_calls
+from symphys.transcription.identities import motion_identity
+from symphys.transcription.program import dense, step_calls
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array, Expr
 

@@ -45,9 +45,10 @@ from symphys.shooting import (
 from symphys.transcription.asking import asking
 from symphys.transcription.decision_variables import blocks
 from symphys.transcription.functions import ExpressionFunctions
+from symphys.transcription.identities import program_identity, step_identity, swept_identity
 from symphys.transcription.network_rollout import has_large_nets
 from symphys.transcription.objective import bounds, has_squares, limits
-from symphys.transcription.program import program_identity, rollout_program, step_identity, swept_identity
+from symphys.transcription.program import rollout_program
 from symphys.transcription.rollout import Rollout, symbolic_rollout
 from symphys.transcription.sampler import Sampler, swept_inputs
 from symphys.transcription.staged.step_evaluator import StepEvaluator
@@ -56,6 +57,7 @@ from symphys.types import Array
 
 if TYPE_CHECKING:
     from symphys.transcription.staged.linearization import Linearization
+    from symphys.transcription.staged.linearized_step import LinearizedStep
     from symphys.transcription.staged.staged_problem import RolloutStages
 
 
@@ -175,8 +177,17 @@ def _steps(problem: Problem, backend: str, threads: int | None, exact: bool) -> 
     """Return motions and their derivatives step by step; compiled on demand, for any time step."""
     from symphys.transcription.staged.linearization import Linearization
 
-    exact = exact or not any(problem.simulation.smoothing)
-    return Linearization(symbolic_rollout(problem, timed=True), backend, threads, exact)
+    exact, rollout = exact or not any(problem.simulation.smoothing), symbolic_rollout(problem, timed=True)
+    if not problem.varied or (identity := step_identity(rollout, exact)) is None:
+        return Linearization(rollout, backend, threads, exact)
+    key = (identity, backend, threads)
+    if key in LATEST_STEPS:
+        return Linearization(rollout, step=LATEST_STEPS[key])
+    made = Linearization(rollout, backend, threads, exact)
+    while len(LATEST_STEPS) >= MAX_LATEST_STEPS:
+        del LATEST_STEPS[next(iter(LATEST_STEPS))]
+    LATEST_STEPS[key] = made.step
+    return made
 
 
 def _stages(steps: Linearization, backend: str, threads: int | None) -> RolloutStages:
@@ -220,6 +231,9 @@ def guessed(made: Transcription, problem: Problem) -> Transcription:
     )
 
 
+MAX_LATEST_STEPS = 3
+LATEST_STEPS: dict[tuple[object, ...], LinearizedStep] = {}
+"""Steps of the last problems of a sweep, by everything that determines them: as they are, and as they are judged."""
 LATEST_BACKEND: dict[tuple[object, ...], Backend] = {}
 """The backend of the last problem of a sweep, by everything that determines it."""
 

@@ -79,7 +79,8 @@ class Transcription:
 
     def judge(self, z: Array, smoothing: float = 0.0) -> Assessment:
         """Assess ``z`` by the exact rollout, or by a smoothed one."""
-        found = self._motion_values.call([z, self.arrays(z, smoothing).x.T])
+        arrays = self.arrays(z, smoothing)
+        found = self._motion_values.call([z, arrays.x.T, arrays.p])
         _, objective, *parts, _ = (np.array(part).ravel() for part in found)
         return assessment(self.rollout.problem, float(objective[0]), *parts)
 
@@ -187,14 +188,14 @@ class Transcription:
         if known is not None:
             return known
         self._cache.gives_probes = False
-        X = self.steps().states(np.asarray(Z, float), 0.0)
-        return np.array(row_by_row(self._motion_values, Z, X)[-1][:, 0])
+        X, P = self.steps().states(np.asarray(Z, float), 0.0), row_by_row(self._start, Z)[2]
+        return np.array(row_by_row(self._motion_values, Z, X, P)[-1][:, 0])
 
     def _probe_gradient(self, z: Array) -> Array:
         arrays = self.arrays(z)
-        direct, by_states = (np.array(part) for part in self._probe_slopes(z, arrays.x.T))
+        direct, by_states, by_p = (np.array(part) for part in self._probe_slopes(z, arrays.x.T, arrays.p))
         states = {k: by_states[:, k, None] for k in range(len(arrays.x))}
-        pulled = self._pull(arrays, states, np.zeros((len(arrays.p), 1)))
+        pulled = self._pull(arrays, states, by_p.reshape(-1, 1))
         return np.asarray(direct.ravel() + pulled[:, 0])
 
     def back(self, record: Record, ends: Array) -> Iterator[Array]:

@@ -86,10 +86,8 @@ def slides(rollout: Rollout, record: Record) -> list[dict[str, Any]]:
 
 def slip_speeds(rollout: Rollout, record: Record) -> Array:
     """Return the tangential speed at each contact at the start of each step (N, C) [m/s]."""
-    scheme = rollout.parameters.scheme(rollout.problem.simulation)
-    slip = slip_function(rollout.world, scheme, rollout.inputs, rollout.parameters.symbols)
     arrays = record.arrays
-    return row_by_row(slip, plain(rollout, arrays.x)[:-1], arrays.u, arrays.p)[0]
+    return row_by_row(rollout.built(slip_function), plain(rollout, arrays.x)[:-1], arrays.u, arrays.p)[0]
 
 
 def _deepest(rollout: Rollout, motion: Trajectory) -> dict[str, Any]:

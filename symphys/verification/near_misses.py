@@ -15,7 +15,7 @@ did.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import groupby
 from typing import Any
 
@@ -286,6 +286,7 @@ def _acceleration(record: Record, dt: float, k: int, body: int) -> Array:
     return np.asarray((velocity[step + 1] - velocity[step]) / dt)
 
 
+@cache
 def _flight() -> ca.Function:
     """Return the function (position, orientation, velocities (13,), acceleration (3,), time) -> pose (7,)."""
     state, bend, time = ca.SX.sym("state", 13), ca.SX.sym("acceleration", 3), ca.SX.sym("time")

@@ -50,7 +50,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "problem to shooting problem",
     ),
     "verification": (
-        "dynamics maths model problem shooting trajectory transcription",
+        "codegen dynamics maths model problem shooting trajectory transcription",
         "casadi numpy",
         "how far a solution can be trusted, as numbers",
     ),

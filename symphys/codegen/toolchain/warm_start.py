@@ -8,7 +8,6 @@ program is built.
 from __future__ import annotations
 
 import contextlib
-import pickle
 import time
 import zlib
 from collections.abc import Callable, Sequence
@@ -24,6 +23,7 @@ from symphys.codegen.runtime.kernel import ProcessorKernel
 from symphys.codegen.toolchain.build import BlockWidth, KeptLibraries, compiled, kernel_of, width_of
 from symphys.codegen.toolchain.cache import PLAN_SUFFIX, Cache, default_cache
 from symphys.codegen.toolchain.identity import identity_of, package_stamp
+from symphys.codegen.toolchain.kept_data import data_of, text_of
 from symphys.codegen.toolchain.libraries import temporary_folder
 from symphys.codegen.toolchain.plans import KeptPlan
 from symphys.records import dataclass
@@ -31,6 +31,11 @@ from symphys.records import dataclass
 Precision = Literal["double", "single"]
 MIN_KEPT_INSTRUCTIONS = 50
 """Instructions of a function of casadi from which it is kept: fewer are built as soon as read."""
+
+
+MAX_LATEST = 16
+LATEST: dict[str, Any] = {}
+"""What ``kept`` has returned last in this process, by its key: problems of a sweep ask for the same."""
 
 
 @dataclass(frozen=True)
@@ -107,36 +112,50 @@ def kept_function(
 
     It is kept from ``least`` instructions on.
     """
-    return kept(make, identity, lambda function: function.n_instructions() >= least)
+    return kept(make, identity, worth=lambda function: function.n_instructions() >= least)
 
 
-def kept(make: Callable[[], Kept], identity: str | None, worth: Callable[[Kept], bool] = lambda _: True) -> Kept:
+def kept(
+    make: Callable[[], Kept],
+    identity: str | None,
+    kinds: Sequence[type] = (),
+    worth: Callable[[Kept], bool] = lambda _: True,
+) -> Kept:
     """Return what ``make`` makes, from the cache where something of this identity was made before.
 
     Args:
-        make: makes data of arrays, functions of casadi, and data classes of this package.
+        make: makes data, see ``text_of``.
         identity: as in ``ProgramSource``.
+        kinds: the named tuples and data classes in it.
         worth: whether it is kept.
     """
-    key = None if identity is None else identity_of(identity, package_stamp())
+    key = None if identity is None else identity_of(identity, package_stamp())[:32]  # type: ignore[index]
+    if key is None:
+        return make()
+    if key in LATEST:
+        return LATEST[key]  # type: ignore[no-any-return]
     try:
         cache = default_cache()
     except KernelUnavailable:
         return make()
-    if key is not None and (known := found(key[:32], _read, cache)) is not None:
-        return known[0]  # type: ignore[no-any-return]
-    made = make()
-    if key is not None and worth(made):
-        keep(key[:32], lambda path: _write(made, path), cache)
+    if (known := found(key, lambda path: _read(path, kinds), cache)) is not None:
+        made: Kept = known[0]
+    else:
+        made = make()
+        if worth(made):
+            keep(key, lambda path: _write(made, path), cache)
+    while len(LATEST) >= MAX_LATEST:
+        del LATEST[next(iter(LATEST))]
+    LATEST[key] = made
     return made
 
 
 def _write(made: object, path: Path) -> None:
-    path.write_bytes(zlib.compress(pickle.dumps((made,)), 1))
+    path.write_bytes(zlib.compress(text_of([made]).encode(), 1))
 
 
-def _read(path: Path) -> Any:
+def _read(path: Path, kinds: Sequence[type]) -> Any:
     try:
-        return pickle.loads(zlib.decompress(path.read_bytes()))
-    except (zlib.error, pickle.UnpicklingError, EOFError, RuntimeError, AttributeError, ImportError) as error:
+        return data_of(zlib.decompress(path.read_bytes()).decode(), kinds)
+    except zlib.error as error:
         raise ValueError(f"{path} holds nothing that can be read") from error

@@ -16,7 +16,7 @@ import numpy as np
 
 from symphys.codegen.toolchain.warm_start import kept
 from symphys.shooting import Expansion
-from symphys.transcription.program import motion_identity
+from symphys.transcription.identities import motion_identity
 from symphys.transcription.staged.stage_functions import ReadingFunction, StageFunctions, StepRows, reading
 from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm
 from symphys.transcription.staged.term_slopes import Block, Blocks, nonzeros, tangent_slopes
@@ -199,6 +199,7 @@ class SquareStack:
         made = kept(
             lambda: stack_slopes(symbols, [term.value for term in distinct], at_steps, static),
             motion_identity(symbols.rollout, "stack", at_steps, static, [term.key for term in distinct]),
+            (StackSlopes, ReadingFunction),
         )
         sizes, self._m = made.sizes, int(symbols.u.shape[0])
         self._cuts = [slice(end - size, end) for size, end in zip(sizes, np.cumsum(sizes).tolist(), strict=True)]

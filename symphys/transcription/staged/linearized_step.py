@@ -20,7 +20,7 @@ from symphys.codegen.slopes import SlopeKernel, compile_slopes
 from symphys.codegen.toolchain.identity import identity_of
 from symphys.codegen.toolchain.warm_start import ProgramSource
 from symphys.records import dataclass
-from symphys.transcription.program import step_identity
+from symphys.transcription.identities import step_identity
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.step_program import (
     StepArguments,

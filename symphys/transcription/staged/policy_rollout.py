@@ -30,7 +30,8 @@ from symphys.codegen.backends import PRECISIONS
 from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
 from symphys.records import dataclass
 from symphys.shooting import AffinePolicy
-from symphys.transcription.program import program_identity, step_calls
+from symphys.transcription.identities import program_identity
+from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.linearized_step import LinearizedStep
 from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm

@@ -28,7 +28,7 @@ from symphys.problem import Constraint, Cost, Problem, Target
 from symphys.records import dataclass
 from symphys.suggest import quote
 from symphys.transcription.formula_names import spans
-from symphys.transcription.program import motion_identity
+from symphys.transcription.identities import motion_identity
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.tangent import Tangent
 from symphys.transcription.terms import Term, over_time, problem_terms

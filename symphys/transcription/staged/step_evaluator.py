@@ -50,8 +50,8 @@ class StepEvaluator(WithoutResiduals):
 
     def along(self, Z: Array, X: Array) -> Values:
         """Implement ``StepwiseEvaluator.along``."""
-        states = X[:, :, : self._formulas.size1_in(1)]
-        merit, objective, _, errors, outputs, probe = row_by_row(self._formulas, Z, states)
+        states, p = X[:, :, : self._formulas.size1_in(1)], self.staged().parameters(Z)[:, : self._formulas.size1_in(2)]
+        merit, objective, _, errors, outputs, probe = row_by_row(self._formulas, Z, states, p)
         return Values(merit[:, 0], objective[:, 0], errors, outputs, probe=probe[:, 0])
 
     def _slope(self, motion: StagedMotion) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 
 from symphys.codegen.toolchain.warm_start import kept
 from symphys.records import dataclass
-from symphys.transcription.program import motion_identity
+from symphys.transcription.identities import motion_identity
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.stage_functions import ReadingFunction, StageFunctions, StepRows, reading
 from symphys.transcription.staged.stage_terms import Kind, StageSymbols, StageTerm, motion_sums, stage_terms
@@ -113,7 +113,8 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
         function = ReadingFunction(shared.function.function, shared.function.reads, term.after)
         return TermSlopes(function, shared.slopes, shared.curved, shared.parts, shared.bases, shared.acting)
     identity = motion_identity(symbols.rollout, "slopes of a term", term.key, term.after)
-    found = known[term.key] = kept(lambda: _made_slopes(symbols, term), identity)
+    kinds = TermSlopes, ReadingFunction, Pattern
+    found = known[term.key] = kept(lambda: _made_slopes(symbols, term), identity, kinds)
     return found
 
 
@@ -303,7 +304,9 @@ class TermGroups:
             known = {key: reading([term.value], self.symbols.arguments, term.after) for key, term in first.items()}
             return [known[term.key] for term in self.terms]
 
-        made = kept(make, motion_identity(self.symbols.rollout, "terms", [term.key for term in self.terms]))
+        made = kept(
+            make, motion_identity(self.symbols.rollout, "terms", [term.key for term in self.terms]), (ReadingFunction,)
+        )
         pairs = zip(made, self.terms, strict=True)
         functions = [ReadingFunction(each.function, each.reads, term.after) for each, term in pairs]
         return [

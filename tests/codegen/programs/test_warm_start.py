@@ -27,7 +27,7 @@ from symphys.expression import parse
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.transcription import transcribe
-from symphys.transcription.program import program_identity
+from symphys.transcription.identities import program_identity
 from symphys.transcription.rollout import symbolic_rollout
 
 Z = np.array([[1.0, 2.0], [0.3, -1.0]])
@@ -156,7 +156,7 @@ def test_a_function_of_somebody_has_no_identity() -> None:
 def test_another_process_has_the_same_identity() -> None:
     code = (
         "from symphys.problem import load_problem; from symphys.problems import find;"
-        "from symphys.transcription.program import program_identity;"
+        "from symphys.transcription.identities import program_identity;"
         "print(program_identity(load_problem(find('cart_pole')), True))"
     )
     told = [
@@ -231,6 +231,11 @@ def test_a_function_of_casadi_is_kept_as_it_was(tmp_path: Path, monkeypatch: pyt
         made.append(factor)
         return many_terms(factor)
 
+    class Nothing(dict[str, object]):
+        def __setitem__(self, key: str, value: object) -> None:
+            """Keep nothing, so that files are read."""
+
+    monkeypatch.setattr(warm_start, "LATEST", Nothing())
     first = warm_start.kept_function(partial(make, 1 / 3), "a")
     again = warm_start.kept_function(partial(make, 1 / 3), "a")
     other = warm_start.kept_function(partial(make, 1 / 7), "b")
