@@ -2,7 +2,7 @@
 
 Same masses, nodes, time steps and costs of the kind; one thread each; processes of their own, in turns. Crocoddyl has
 derivatives of articulated bodies by recursion, and an Euler step; ours are those of the whole step, with joint limits.
-It is no dependency: ``pip install crocoddyl`` brings it, its robots and pinocchio.
+It is no dependency: ``pip install crocoddyl==3.2.1 pin==4.0.0 libpinocchio==4.0.0`` brings it and its robots.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def rows(quick: bool = False, turns: int = 5, iterations: int = 30) -> Iterator[
         iterations: of a solve at most.
     """
     if find_spec("crocoddyl") is None:
-        yield {"robot": "all", "fault": "crocoddyl is not installed: pip install crocoddyl"}
+        yield {"robot": "all", "fault": "crocoddyl is not installed, see the head of the benchmark"}
         return
     for name in ["acrobot"] if quick else ["acrobot", *ARMS]:
         times: dict[str, list[float]] = {"ours": [], "theirs": []}
