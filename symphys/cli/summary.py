@@ -14,9 +14,12 @@ from rich.table import Table
 from rich.text import Text
 
 from symphys.cli.wording import duration, first_line, measured, number, verdict, whole
+from symphys.files import FileError
 from symphys.findings.examination import Examination, HeldBound
 from symphys.findings.obstacles import MAX_BOUNDS, bound_words, holding
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, NOT_SOLVED
+from symphys.results.file_names import RESULT
+from symphys.results.result import VariableRecord, read_result
 
 if TYPE_CHECKING:
     from symphys.batches import BatchResult
@@ -33,6 +36,8 @@ MAX_ROWS = 30
 """Rows of the table; if there are more, the best and the worst are shown."""
 MAX_ADVICE = 10
 """Lines of advice below a table of the best and the worst."""
+MAX_ANSWERS, MAX_VARIABLES, MAX_COMPONENTS = 4, 6, 8
+"""Runs whose answers are printed, variables of each, and components of a variable; of more the range is."""
 MAX_MISSED = 3
 """Missed checks of a run that are named."""
 
@@ -49,10 +54,45 @@ def print_summary(jobs: list[Job], batch: BatchResult) -> None:
         console = Console(width=max(console.width, MIN_WIDTH))
     shown = best_and_worst(groups)
     console.print(fitting_table(shown, console.width, len(groups) - len(shown)))
+    for line in answers(jobs, batch.results):
+        console.print(Text(line), soft_wrap=True)
     if len(shown) < len(groups):
         console.print(Text(counts(batch, len(groups))), soft_wrap=True)
     for line in advice(shown) if len(shown) == len(groups) else advice_together(shown):
         console.print(Text(line), soft_wrap=True)
+
+
+def answers(jobs: Sequence[Job], results: Sequence[Result | None]) -> list[str]:
+    """Return what was found, a line for each variable, from the run folders; nothing of many runs."""
+    if len(jobs) > MAX_ANSWERS:
+        return []
+    lines = []
+    for job, result in zip(jobs, results, strict=True):
+        if result is None or not result.accepted:
+            continue
+        try:
+            variables = list(read_result(job.folder.path / RESULT).z.values())
+        except FileError:  # a page says what is wrong with the folder
+            continue
+        whose = f"{job.name.removesuffix(' seed 0')}: " if len(jobs) > 1 else ""
+        lines += [whose + answer(variable) for variable in variables[:MAX_VARIABLES]]
+        if len(variables) > MAX_VARIABLES:
+            lines.append(f"{whose}and {len(variables) - MAX_VARIABLES} more, in result.json")
+    return lines
+
+
+def answer(variable: VariableRecord) -> str:
+    """Write ``found throw = 12.1 0 1.21 m/s, guess 10 0 4 (ball.velocity)``; of many numbers the range."""
+    unit = f" {variable.unit}" * bool(variable.unit)
+    sets = " and ".join(variable.sets)
+    if variable.value.size > MAX_COMPONENTS:
+        low, high = (number(float(end)) for end in (variable.value.min(), variable.value.max()))
+        knots = variable.value.shape[1]
+        many = f"{knots} knots" if knots > 1 else f"{variable.value.size:,} numbers"
+        return f"found {variable.name}: {many} from {low} to {high}{unit} ({sets})"
+    parts = (part.T.ravel().tolist() for part in (variable.value, variable.guess))
+    value, guess = (" ".join(number(each, 4) for each in part) for part in parts)
+    return f"found {variable.name} = {value}{unit}, guess {guess} ({sets})"
 
 
 def best_and_worst(groups: Groups) -> Groups:

@@ -72,6 +72,7 @@ class VariableRecord:
         sets: the quantities that it sets, as the problem file writes them where that can be read.
         value, guess: (components, knots); flat in the file, knot after knot, beside their ``shape``.
         lower, upper: (components, knots) bounds, infinite where there is none, which is null in the file.
+        unit: of all these; empty for pure numbers, and where it is not known.
     """
 
     name: str
@@ -80,6 +81,7 @@ class VariableRecord:
     guess: Array
     lower: Array
     upper: Array
+    unit: str = ""
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> VariableRecord:
@@ -108,7 +110,7 @@ class VariableRecord:
         flat = {key: getattr(self, key).T.ravel().tolist() for key in ("value", "guess", "lower", "upper")}
         for key in ("lower", "upper"):
             flat[key] = [number if math.isfinite(number) else None for number in flat[key]]
-        return {"sets": list(self.sets), "shape": list(self.value.shape), **flat}
+        return {"sets": list(self.sets), "unit": self.unit, "shape": list(self.value.shape), **flat}
 
 
 @dataclass(frozen=True)

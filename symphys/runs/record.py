@@ -15,6 +15,7 @@ from symphys.codegen.backends import Description
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import judge_run
 from symphys.problem import Problem
+from symphys.problem.quantities import formula_units
 from symphys.records import dataclass
 from symphys.results.result import (
     REACHED,
@@ -146,6 +147,7 @@ def judged(verdict: Assessment | None) -> Judged:
 def variables(problem: Problem, blocks: Iterable[VariableBlock], z: Array) -> dict[str, VariableRecord]:
     """Return the variables by name."""
     sets = {v.name: tuple(slot.name for slot in v.slots) for v in problem.variables}
+    units = formula_units(problem.world(), (), problem.variables)
 
     def block(flat: Array, shape: tuple[int, int]) -> Array:
         return flat.reshape(shape[::-1]).T
@@ -154,7 +156,11 @@ def variables(problem: Problem, blocks: Iterable[VariableBlock], z: Array) -> di
         each.name: VariableRecord(
             each.name,
             sets[each.name],
-            *(block(flat, each.shape) for flat in (z[each.start : each.stop], each.guess, each.lower, each.upper)),
+            value=block(z[each.start : each.stop], each.shape),
+            guess=block(each.guess, each.shape),
+            lower=block(each.lower, each.shape),
+            upper=block(each.upper, each.shape),
+            unit=units.get(each.name, ""),
         )
         for each in blocks
     }

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from symphys.cli.summary import advice, fitting_table, missed, table
+from symphys import files
+from symphys.cli.summary import MAX_ANSWERS, advice, answer, answers, fitting_table, missed, table
 from symphys.cli.watching.observers import Live, Notes, Plain
-from symphys.results.result import CheckRecord
+from symphys.results.result import CheckRecord, VariableRecord
 from symphys.runs import Result
 from symphys.solvers import CmaOptions, TraceRow
 
@@ -115,3 +119,37 @@ def test_without_a_terminal_lines_keep_their_distance(
     for _ in range(3):
         plain.advanced(job, ROW)  # type: ignore[arg-type]
     assert capsys.readouterr().err.count(job.name) == lines
+
+
+def found(name: str, value: Any, unit: str = "", sets: str = "ball.velocity") -> VariableRecord:
+    numbers = np.atleast_2d(np.array(value, float)).T
+    return VariableRecord(name, (sets,), numbers, 0 * numbers, numbers, numbers, unit)
+
+
+def test_an_answer_has_its_numbers_unit_and_guess() -> None:
+    assert (
+        answer(found("throw", [12.0943, 0, 1.2], "m/s")) == "found throw = 12.09 0 1.2 m/s, guess 0 0 0 (ball.velocity)"
+    )
+    assert answer(found("grip", 0.4, sets="ground.friction")) == "found grip = 0.4, guess 0 (ground.friction)"
+
+
+def test_of_many_numbers_the_range_is_said() -> None:
+    knots = np.linspace(-1, 2, 41)[None]
+    twist = VariableRecord("twist", ("elbow.command",), knots, 0 * knots, knots, knots, "N m")
+    assert answer(twist) == "found twist: 41 knots from -1 to 2 N m (elbow.command)"
+    assert (
+        answer(found("brain", np.arange(1000), sets="brain.weights"))
+        == "found brain: 1,000 numbers from 0 to 999 (brain.weights)"
+    )
+
+
+def test_answers_are_of_accepted_runs_and_of_few(tmp_path: Path) -> None:
+    """What a batch keeps of a result has no variables, so they are read; a folder that is gone is passed over."""
+    whole = result(z={"throw": found("throw", [1, 2, 3], "m/s")})
+    files.write_json(tmp_path / "result.json", files.strict(whole.to_json()))
+    job: Any = SimpleNamespace(name="throw cma seed 0", folder=SimpleNamespace(path=tmp_path))
+    gone: Any = SimpleNamespace(name="throw cma seed 1", folder=SimpleNamespace(path=tmp_path / "gone"))
+    assert answers([job], [result()]) == [answer(whole.z["throw"])]
+    assert answers([job, gone], [result(), result()]) == [f"throw cma: {answer(whole.z['throw'])}"]
+    assert answers([job], [None]) == answers([job], [result(solved=False)]) == []
+    assert answers([job] * (MAX_ANSWERS + 1), [result()] * (MAX_ANSWERS + 1)) == []

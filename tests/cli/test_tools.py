@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import casadi as ca
@@ -14,6 +15,7 @@ from tools.repeats import few
 
 from symphys import machine
 from symphys.codegen import KernelUnavailable
+from symphys.codegen.graph.graph import library
 from symphys.codegen.toolchain.compiler import find_compiler
 
 Run = Callable[..., tuple[int, str, str]]
@@ -62,6 +64,14 @@ def test_a_kernel_that_cannot_be_removed(run: Run, cache: Path) -> None:
     assert "1 cannot be removed" in err
 
 
+@pytest.fixture(scope="module")
+def own_library() -> None:
+    """The library that makes graphs, in the user's cache, before a test has another."""
+    with suppress(KernelUnavailable):
+        library()
+
+
+@pytest.mark.usefixtures("own_library")
 def test_doctor_tries_everything(run: Run, cache: Path) -> None:
     try:
         find_compiler()

@@ -212,7 +212,8 @@ def variable_rows(variable: VariableRecord) -> list[list[str]]:
     for index, name in enumerate(component_names(variable)):
         value, guess = variable.value[index, 0], variable.guess[index, 0]
         low, high = variable.lower[index, 0], variable.upper[index, 0]
-        sets = tag("small", sets_of(variable)) if index == 0 else Html("")
+        what = ", ".join(filter(None, (sets_of(variable), variable.unit)))
+        sets = tag("small", what) if index == 0 else Html("")
         label = join([tag("b", variable.name) if index == 0 else "", f" {name} " if name else " ", sets])
         numbers = [show(guess), tag("b", show(value, 4)), show(low), show(high)]
         rows.append([label, *numbers, between(value, guess, low, high)])
