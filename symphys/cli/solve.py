@@ -309,14 +309,25 @@ def last_words(batch: BatchResult, out: Path) -> str:
     )
 
 
+LONG = 10.0
+"""[s] Time from which it is said how to shorten it."""
+SHORTER = {
+    "compiling": "what was compiled is kept, so that the next command takes less",
+    "judging and reports": "--unexamined and --no-report leave out most of the last",
+}
+
+
 def time_line(total: float, parts: Mapping[str, float]) -> str:
-    """Return the total time of the command and its known parts, as a line."""
+    """Return the total time of the command and its known parts, as a line; of most of a long time how to shorten it."""
     named = {"building": "build", "compiling": "compile", "solving": "solve"}
     shares = {word: parts[key] for word, key in named.items() if parts.get(key)}
     if not shares:
         return f"time: {duration(total)} s in all"
     shares["judging and reports"] = max(total - sum(shares.values()), 0.0)
-    return f"time: {duration(total)} s in all; {', '.join(f'{word} {duration(part)}' for word, part in shares.items())}"
+    most = max(shares, key=lambda word: shares[word])
+    hint = f"; {SHORTER[most]}" if most in SHORTER and shares[most] > max(total / 2, LONG) else ""
+    listed = ", ".join(f"{word} {duration(part)}" for word, part in shares.items())
+    return f"time: {duration(total)} s in all; {listed}{hint}"
 
 
 def write_reports(jobs: list[Job], out: Path, figures: bool, processes: int, silent: bool, limit: float) -> MadePages:

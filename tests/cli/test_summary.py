@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from symphys import files
+from symphys.cli.solve import time_line
 from symphys.cli.summary import MAX_ANSWERS, advice, answer, answers, fitting_table, missed, table
 from symphys.cli.watching.observers import Live, Notes, Plain
 from symphys.results.result import CheckRecord, VariableRecord
@@ -153,3 +154,19 @@ def test_answers_are_of_accepted_runs_and_of_few(tmp_path: Path) -> None:
     assert answers([job, gone], [result(), result()]) == [f"throw cma: {answer(whole.z['throw'])}"]
     assert answers([job], [None]) == answers([job], [result(solved=False)]) == []
     assert answers([job] * (MAX_ANSWERS + 1), [result()] * (MAX_ANSWERS + 1)) == []
+
+
+@pytest.mark.parametrize(
+    ("total", "parts", "said"),
+    [
+        (40.0, {"build": 0.1, "compile": 30.0, "solve": 1.0}, "the next command takes less"),
+        (40.0, {"build": 0.1, "compile": 1.0, "solve": 1.0}, "--unexamined"),
+        (40.0, {"build": 0.1, "compile": 1.0, "solve": 30.0}, ""),
+        (8.0, {"build": 0.1, "compile": 7.0, "solve": 0.1}, ""),
+        (40.0, {}, ""),
+    ],
+)
+def test_how_to_shorten_most_of_a_long_time_is_said(total: float, parts: dict[str, float], said: str) -> None:
+    line = time_line(total, parts)
+    assert line.startswith(f"time: {total:g} s in all") and said in line
+    assert bool(said) == (line.count(";") > 1)
