@@ -32,6 +32,8 @@ MIN_WIDTH = 120
 NUMBERS = ("solved", "objective", "worst", "iterations", "work", "seconds", "ended")
 OPTIONAL = ("work", "iterations", "seconds", "objective", "ended")
 """Columns that are left out on narrow terminals, in this order; no number is cut."""
+NOTES = {"worst": "worst: largest error / tolerance, met at 1", "work": "work in rollouts"}
+"""What is said below the table of columns that are there."""
 MAX_ROWS = 30
 """Rows of the table; if there are more, the best and the worst are shown."""
 MAX_ADVICE = 10
@@ -133,7 +135,8 @@ def fitting_table(groups: Groups, width: int, left_out: int = 0) -> Table:
 def table(groups: Groups, columns: Sequence[str] = NUMBERS, left_out: int = 0) -> Table:
     """Return the table of groups with these columns; a row in its middle says how many are left out."""
     several = any(len(group) > 1 for group in groups.values())
-    caption = "worst: largest error / tolerance, met at 1; work in rollouts" + ("; medians over the seeds" * several)
+    notes = [note for column, note in NOTES.items() if column in columns] + ["medians over the seeds"] * several
+    caption = "; ".join(notes)
     shown = Table(box=SIMPLE_HEAD, caption=caption, caption_justify="left")
     for name in ("problem", "solver"):
         shown.add_column(name, overflow="fold")

@@ -55,6 +55,13 @@ def test_seeds_share_a_row_of_medians() -> None:
     assert rows[1] == ["throw", "ipopt", "0/0", "-", "-", "-", "-", "-"]
 
 
+def test_below_the_table_only_columns_that_are_there_are_explained() -> None:
+    group = {("throw", "cma"): [result(), result(seed=1)]}
+    whole, narrow = table(group), table(group, ["solved", "worst"])
+    assert str(whole.caption).split("; ")[1:] == ["work in rollouts", "medians over the seeds"]
+    assert "worst" in str(narrow.caption) and "work" not in str(narrow.caption)
+
+
 def test_a_doubted_run_does_not_count_as_solved() -> None:
     doubted = result(solved=False, verdict="doubted", doubts=("a goes through b", "5 J too many"))
     shown = io.StringIO()
