@@ -19,6 +19,8 @@ from typing import Any
 from bench import Row, all_turns, in_process, peak, spent
 
 STEPS, ROBOTS = 100, 128
+BEGINNING = 2.0
+"""[s] until a compiler that goes on has locked what it builds."""
 MORE = 3
 """Iterations of the cold start: kernels that are called twice are compiled."""
 COLUMNS = {
@@ -78,6 +80,7 @@ def starts(name: str, solver: str, bytecode: str, limit: float) -> Row:
         own |= {"PYTHONPYCACHEPREFIX": bytecode, "PYTHONDONTWRITEBYTECODE": ""}
         try:
             cold = dict(in_process(start, name, solver, MORE, env=own, timeout=limit))
+            time.sleep(BEGINNING)
             while any(map(is_held, Path(folder).glob(".*.lock"))):  # compilers that go on
                 time.sleep(0.2)
             warm = dict(in_process(start, name, solver, 1, env=own, timeout=limit))
