@@ -8,6 +8,7 @@ program is built.
 from __future__ import annotations
 
 import contextlib
+import threading
 import time
 import zlib
 from collections.abc import Callable, Sequence
@@ -36,6 +37,7 @@ MIN_KEPT_INSTRUCTIONS = 50
 MAX_LATEST = 16
 LATEST: dict[str, Any] = {}
 """What ``kept`` has returned last in this process, by its key: problems of a sweep ask for the same."""
+_LOCK = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -132,8 +134,9 @@ def kept(
     key = None if identity is None else identity_of(identity, package_stamp())[:32]  # type: ignore[index]
     if key is None:
         return make()
-    if key in LATEST:
-        return LATEST[key]  # type: ignore[no-any-return]
+    with _LOCK:
+        if key in LATEST:
+            return LATEST[key]  # type: ignore[no-any-return]
     try:
         cache = default_cache()
     except KernelUnavailable:
@@ -144,9 +147,10 @@ def kept(
         made = make()
         if worth(made):
             keep(key, lambda path: _write(made, path), cache)
-    while len(LATEST) >= MAX_LATEST:
-        del LATEST[next(iter(LATEST))]
-    LATEST[key] = made
+    with _LOCK:
+        while len(LATEST) >= MAX_LATEST:
+            del LATEST[next(iter(LATEST))]
+        LATEST[key] = made
     return made
 
 

@@ -338,7 +338,12 @@ def stage_terms(symbols: StageSymbols) -> list[StageTerm]:
     found = [*_Terms(symbols).all(), *_sums(symbols)]
     identity = motion_identity(symbols.rollout, "sizes of terms", [term.key for term in found])
     sizes = kept(lambda: [int(term.value.shape[0]) for term in found], identity)
-    return [replace(term, size=size) for term, size in zip(found, sizes, strict=True)]
+    return [_sized(term, size) for term, size in zip(found, sizes, strict=True)]
+
+
+def _sized(term: StageTerm, size: int) -> StageTerm:
+    """Return a term with its size; its value is made once."""
+    return replace(term, size=size, make=lambda: term.value)
 
 
 class _Terms:
