@@ -455,12 +455,12 @@ def test_solvers_by_steps_take_nets_whose_weights_are_fixed(tmp_path: Path, monk
     path.write_text(fixed)
     problem = load_problem(path)
     monkeypatch.setattr(split, "MAX_STEP_WEIGHTS", 1000)
-    within = solve(problem, "ilqr", backend="casadi", iterations=10)
+    within = solve(problem, "ilqr", backend="casadi", iterations=4)
     monkeypatch.setattr(split, "MAX_STEP_WEIGHTS", 30)
-    beside = solve(problem, "ilqr", backend="casadi", iterations=10)
+    beside = solve(problem, "ilqr", backend="casadi", iterations=4)
     assert isinstance(transcribe(problem, backend="casadi"), LargeTranscription)
     known, found = ([stage.objective for stage in each.run.stages] for each in (within, beside))
-    assert beside.run.iterations == 10 and found == pytest.approx(known, rel=1e-6)
+    assert beside.run.iterations == 4 and found == pytest.approx(known, rel=1e-6)
     path.write_text(HOPPING.replace("ACTIVATION", "skip = true"))
     assert transcribe(load_problem(path), backend="casadi").shooting.staged is None
 
