@@ -11,11 +11,11 @@ from typing import Any, TypeVar
 import casadi as ca
 
 from symphys.dynamics.tracing.pytree import flatten
+from symphys.latest import Latest
 from symphys.model.world import Scheme, World
 
 T = TypeVar("T")
-MAX_KEPT = 6
-KEPT: dict[Hashable, Any] = {}
+KEPT = Latest[Any](6)
 
 
 def structure(world: World, parameters: Sequence[Any], *more: Any) -> Hashable:
@@ -40,9 +40,5 @@ def kept(
 ) -> T:
     """Return ``make(world, scheme, inputs, parameters, *more)``, or its result for an equal world."""
     key = (make, structure(world, parameters, scheme), tuple(inputs), more)
-    if key not in KEPT:
-        while len(KEPT) >= MAX_KEPT:
-            del KEPT[next(iter(KEPT))]
-        KEPT[key] = make(world, scheme, inputs, parameters, *more)
-    found: T = KEPT[key]
-    return found
+    found: T | None = KEPT.get(key)
+    return KEPT.put(key, make(world, scheme, inputs, parameters, *more)) if found is None else found

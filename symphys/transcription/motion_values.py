@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import casadi as ca
 
-from symphys.codegen.toolchain.warm_start import kept
+from symphys.codegen.toolchain.warm_start import from_cache
 from symphys.transcription.gradient_probe import combined
 from symphys.transcription.identities import motion_identity
 from symphys.transcription.objective import Terms, rollout_terms
@@ -48,4 +48,4 @@ def _of_motion(rollout: Rollout, name: str, parts: Parts) -> ca.Function:
         found = parts(rollout_terms(given, (x, given.applied(x))), x, p)
         return ca.Function(name, [rollout.z, x, p], [ca.densify(part) for part in found])
 
-    return kept(make, motion_identity(rollout, name))
+    return from_cache(make, motion_identity(rollout, name))

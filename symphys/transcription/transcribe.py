@@ -29,6 +29,7 @@ from symphys.codegen.backends.simd import common, probed
 from symphys.codegen.own_libraries import begin_own_libraries
 from symphys.codegen.runtime.kernel import Outputs
 from symphys.codegen.toolchain.warm_start import ProgramSource
+from symphys.latest import Latest
 from symphys.problem import GuessedMotion, Problem, Simulation, Variable
 from symphys.shooting import (
     Evaluator,
@@ -181,12 +182,10 @@ def _steps(problem: Problem, backend: str, threads: int | None, exact: bool) -> 
     if not problem.varied or (identity := step_identity(rollout, exact)) is None:
         return Linearization(rollout, backend, threads, exact)
     key = (identity, backend, threads)
-    if key in LATEST_STEPS:
-        return Linearization(rollout, step=LATEST_STEPS[key])
+    if (step := LATEST_STEPS.get(key)) is not None:
+        return Linearization(rollout, step=step)
     made = Linearization(rollout, backend, threads, exact)
-    while len(LATEST_STEPS) >= MAX_LATEST_STEPS:
-        del LATEST_STEPS[next(iter(LATEST_STEPS))]
-    LATEST_STEPS[key] = made.step
+    LATEST_STEPS.put(key, made.step)
     return made
 
 
@@ -231,10 +230,9 @@ def guessed(made: Transcription, problem: Problem) -> Transcription:
     )
 
 
-MAX_LATEST_STEPS = 3
-LATEST_STEPS: dict[tuple[object, ...], LinearizedStep] = {}
+LATEST_STEPS: Latest[LinearizedStep] = Latest(3)
 """Steps of the last problems of a sweep, by everything that determines them: as they are, and as they are judged."""
-LATEST_BACKEND: dict[tuple[object, ...], Backend] = {}
+LATEST_BACKEND: Latest[Backend] = Latest(1)
 """The backend of the last problem of a sweep, by everything that determines it."""
 
 
@@ -263,14 +261,12 @@ def shared_backend(
     rollout = symbolic_rollout(replace(problem, variables=(*problem.variables, *inputs)))
     identity = swept_identity(rollout, inputs, exact)
     key = (identity, backend, threads)
-    if identity is not None and key in LATEST_BACKEND:
-        made = LATEST_BACKEND[key].description
-        here = replace(made, seconds=0.0, cached=None if made.cached is None else True)
-        chosen = replace(LATEST_BACKEND[key], description=here)
+    if identity is not None and (known := LATEST_BACKEND.get(key)) is not None:
+        made = known.description
+        chosen = replace(known, description=replace(made, seconds=0.0, cached=None if made.cached is None else True))
     else:
         source = BackendSource(ExpressionFunctions(rollout), lambda: rollout_program(rollout, exact), exact, identity)
-        LATEST_BACKEND.clear()
-        chosen = LATEST_BACKEND[key] = choose(backend, source, threads)
+        chosen = LATEST_BACKEND.put(key, choose(backend, source, threads))
     bound = LaterNlp(lambda: bound_nlp(chosen.nlp, nlp(), numbers))
     return replace(chosen, evaluator=BoundEvaluator(chosen.evaluator, numbers), nlp=bound)
 

@@ -21,6 +21,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "records": ("", "", "data classes that are quick to define"),
     "deprecated": ("", "", "public names of older versions"),
     "later": ("", "", "names imported when first used"),
+    "latest": ("", "", "what was made last, by its key"),
     "interrupts": ("", "", "Ctrl-C"),
     "threads": ("", "", "one thread for linear algebra"),
     "files": ("errors", "numpy", "files appear at once and whole, or not at all"),
@@ -30,7 +31,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     "shooting": ("", "numpy", "what solvers see: the shooting problem, whole or step by step"),
     "maths": ("", "casadi", "rotations and smoothed primitives"),
     "model": ("errors later maths suggest", "casadi numpy scipy", "what a world is, as data"),
-    "dynamics": ("maths model", "casadi numpy", "one time step"),
+    "dynamics": ("latest maths model", "casadi numpy", "one time step"),
     "expression": ("errors maths suggest", "casadi", "the formula language"),
     "problems": ("errors suggest", "", "shipped problem files"),
     "importing": (
@@ -43,9 +44,9 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "casadi numpy pydantic pydantic_core scipy tomli_w",
         "problem file to problem; of the dynamics only what is observed",
     ),
-    "codegen": ("errors later shooting", "casadi cuda cupy numpy", "programs compiled to SIMD C and CUDA"),
+    "codegen": ("errors later latest shooting", "casadi cuda cupy numpy", "programs compiled to SIMD C and CUDA"),
     "transcription": (
-        "codegen dynamics errors expression later maths model problem shooting suggest trajectory",
+        "codegen dynamics errors expression later latest maths model problem shooting suggest trajectory",
         "casadi numpy scipy",
         "problem to shooting problem",
     ),

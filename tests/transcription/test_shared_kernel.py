@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -56,6 +57,20 @@ def test_each_point_is_evaluated_with_its_own_numbers(what: str, smoothing: floa
             assert (one is None) == (other is None)
             if one is not None:
                 np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+def test_each_point_is_judged_with_its_own_numbers(Z: np.ndarray) -> None:
+    """Points share steps and formulas, whose numbers are arguments; the same problem by itself shares nothing."""
+    verdicts = []
+    for shared in made("simd"):
+        alone = transcribe(replace(shared.problem, varied=frozenset()), backend="casadi", threads=1)
+        for z in Z[:2]:
+            one, other = shared.judge(z), alone.judge(z)
+            assert one.objective == pytest.approx(other.objective, rel=1e-9)
+            assert [each.error for each in one.checks] == pytest.approx([each.error for each in other.checks], rel=1e-8)
+            np.testing.assert_allclose(shared.probe.gradient(z), alone.probe.gradient(z), rtol=1e-7, atol=1e-9)
+        verdicts.append(round(one.objective, 6))
+    assert len(set(verdicts)) == 3, "otherwise any sharing would pass"
 
 
 @pytest.mark.slow

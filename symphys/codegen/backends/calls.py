@@ -43,8 +43,7 @@ def row_by_row(function: Function, *arguments: ArrayLike) -> list[Array]:
     """Return a function of dense arguments (B, n) with dense results (B, size); RuntimeError where casadi fails.
 
     Arguments (n,) are the same in all rows. A matrix is an argument (B, columns, rows) and a result column after
-    column. Numbers go from arrays to arrays: casadi
-    takes half a millisecond to hand over 16,000 of them as a ``DM``.
+    column. Numbers go from arrays to arrays: casadi takes half a millisecond to hand over 16,000 of them as a ``DM``.
     """
     given = [np.asarray(argument, float) for argument in arguments]
     count = next((len(argument) for argument in given if argument.ndim > 1), 1)

@@ -66,6 +66,10 @@ def codes_of(functions: Sequence[tuple[Graph, Form]]) -> Codes:
     return Codes(words, starts, constants)
 
 
+SLOPES_DRIVER = ("slopes.c",)
+"""Files of what calls the functions of slopes."""
+
+
 def interpreter(lanes: int, single: bool, driver: Sequence[str] = (*DRIVER, "phases.c")) -> SourceFile:
     """Return the C file: it depends on nothing of a program. ``driver``: files of what calls the functions."""
     names = operations()[2:]

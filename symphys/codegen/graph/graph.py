@@ -51,13 +51,15 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "codes_read": (None, (POINTER, POINTER, POINTER)),
 }
 """Result and arguments of the functions of ``graphs.c``."""
+OWN = "graphs.c", True
+"""The library, which is compiled quickly."""
 Mask = tuple[bool, ...]
 
 
 @cache
 def library() -> Any:
     """Return the compiled ``graphs.c``; KernelUnavailable without a compiler."""
-    found = own_library("graphs.c", light=True)
+    found = own_library(*OWN)
     for name, (result, arguments) in SIGNATURES.items():
         function = getattr(found, name)
         function.restype, function.argtypes = result, arguments

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symphys.codegen.emit.codes import codes_of, interpreter
+from symphys.codegen.emit.codes import SLOPES_DRIVER, codes_of, interpreter
 from symphys.codegen.emit.source import MAX_FILES, listed, spread
 from symphys.codegen.emit.writer import write
 from symphys.codegen.errors import KernelUnavailable, ProgramError
@@ -260,7 +260,7 @@ def compile_slopes(
     if not waits(operations, wait) and kept_library(kept.texts, cache) is None:
         with suppress(KernelUnavailable):
             codes = LinkedCodes(codes_of(planned.functions), lanes, np.float64)
-            with shared_library([interpreter(lanes, False, ("slopes.c",))], cache) as built:
+            with shared_library([interpreter(lanes, False, SLOPES_DRIVER)], cache) as built:
                 if built.note:
                     raise KernelUnavailable(built.note)
                 library = LoadedSlopes(built.path, kept, output, lanes, codes)

@@ -118,5 +118,14 @@ def own_library(name: str, light: bool = False) -> ctypes.CDLL:
 
     ``light``: see ``SourceFile``.
     """
-    with shared_library([SourceFile(resource(name), light=light)], default_cache()) as built:
+    with shared_library([_own(name, light)], default_cache()) as built:
         return loaded(built.path)
+
+
+def has_own_library(name: str, light: bool = False) -> bool:
+    """Whether ``own_library`` was built before; KernelUnavailable if it cannot be."""
+    return kept_library(texts_of([_own(name, light)]), default_cache()) is not None
+
+
+def _own(name: str, light: bool) -> SourceFile:
+    return SourceFile(resource(name), light=light)

@@ -8,7 +8,6 @@ program is built.
 from __future__ import annotations
 
 import contextlib
-import threading
 import time
 import zlib
 from collections.abc import Callable, Sequence
@@ -27,17 +26,14 @@ from symphys.codegen.toolchain.identity import identity_of, package_stamp
 from symphys.codegen.toolchain.kept_data import data_of, text_of
 from symphys.codegen.toolchain.libraries import temporary_folder
 from symphys.codegen.toolchain.plans import KeptPlan
+from symphys.latest import Latest
 from symphys.records import dataclass
 
 Precision = Literal["double", "single"]
 MIN_KEPT_INSTRUCTIONS = 50
 """Instructions of a function of casadi from which it is kept: fewer are built as soon as read."""
-
-
-MAX_LATEST = 16
-LATEST: dict[str, Any] = {}
-"""What ``kept`` has returned last in this process, by its key: problems of a sweep ask for the same."""
-_LOCK = threading.Lock()
+LATEST = Latest[Any](16)
+"""What ``from_cache`` has returned last: problems of a sweep ask for the same."""
 
 
 @dataclass(frozen=True)
@@ -110,14 +106,14 @@ def keep(key: str, write: Callable[[Path], None], cache: Cache) -> None:
 def kept_function(
     make: Callable[[], ca.Function], identity: str | None, least: int = MIN_KEPT_INSTRUCTIONS
 ) -> ca.Function:
-    """Return a function of casadi, from the cache where one of this identity was made before; see ``kept``.
+    """Return a function of casadi, from the cache where one of this identity was made before; see ``from_cache``.
 
     It is kept from ``least`` instructions on.
     """
-    return kept(make, identity, worth=lambda function: function.n_instructions() >= least)
+    return from_cache(make, identity, worth=lambda function: function.n_instructions() >= least)
 
 
-def kept(
+def from_cache(
     make: Callable[[], Kept],
     identity: str | None,
     kinds: Sequence[type] = (),
@@ -134,28 +130,21 @@ def kept(
     key = None if identity is None else identity_of(identity, package_stamp())[:32]  # type: ignore[index]
     if key is None:
         return make()
-    with _LOCK:
-        if key in LATEST:
-            return LATEST[key]  # type: ignore[no-any-return]
+    if (known := LATEST.get(key)) is not None:
+        return known[0]  # type: ignore[no-any-return]
     try:
         cache = default_cache()
     except KernelUnavailable:
         return make()
-    if (known := found(key, lambda path: _read(path, kinds), cache)) is not None:
-        made: Kept = known[0]
-    else:
-        made = make()
-        if worth(made):
-            keep(key, lambda path: _write(made, path), cache)
-    with _LOCK:
-        while len(LATEST) >= MAX_LATEST:
-            del LATEST[next(iter(LATEST))]
-        LATEST[key] = made
-    return made
+    if (known := found(key, lambda path: _read(path, kinds), cache)) is None:
+        known = [make()]
+        if worth(known[0]):
+            keep(key, lambda path: _write(known, path), cache)
+    return LATEST.put(key, known)[0]  # type: ignore[no-any-return]
 
 
 def _write(made: object, path: Path) -> None:
-    path.write_bytes(zlib.compress(text_of([made]).encode(), 1))
+    path.write_bytes(zlib.compress(text_of(made).encode(), 1))
 
 
 def _read(path: Path, kinds: Sequence[type]) -> Any:

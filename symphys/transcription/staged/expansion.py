@@ -14,7 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from symphys.codegen.toolchain.warm_start import kept
+from symphys.codegen.toolchain.warm_start import from_cache
 from symphys.shooting import Expansion
 from symphys.transcription.identities import motion_identity
 from symphys.transcription.staged.stage_functions import ReadingFunction, StageFunctions, StepRows, reading
@@ -196,7 +196,7 @@ class SquareStack:
         self._limited = np.flatnonzero((whole >= 0).any(axis=0))
         self._limits = whole[:, self._limited]
         self._lower, self._upper = (np.append(each, 0.0)[self._limits] for each in bounds)
-        made = kept(
+        made = from_cache(
             lambda: stack_slopes(symbols, [term.value for term in distinct], at_steps, static),
             motion_identity(symbols.rollout, "stack", at_steps, static, [term.key for term in distinct]),
             (StackSlopes, ReadingFunction),
@@ -299,7 +299,7 @@ def square_stacks(
             first = places[id(term)].stop
     stacked = [term for term in terms if term.kind in ("squares", "limit")]
     identity = motion_identity(symbols.rollout, "sides of terms", [term.key for term in stacked])
-    sides = kept(lambda: [_of_both_sides(symbols, term) for term in stacked], identity)
+    sides = from_cache(lambda: [_of_both_sides(symbols, term) for term in stacked], identity)
     for term, both in zip(stacked, sides, strict=True):
         (at_steps if both else at_states).append(term)
     chosen = ((each, both) for each, both in ((at_states, False), (at_steps, True)) if each)

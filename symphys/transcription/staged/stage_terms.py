@@ -21,7 +21,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from symphys.codegen.toolchain.warm_start import kept
+from symphys.codegen.toolchain.warm_start import from_cache
 from symphys.errors import SymphysError
 from symphys.expression import Formula, MotionPart, parse
 from symphys.problem import Constraint, Cost, Problem, Target
@@ -337,7 +337,7 @@ def stage_terms(symbols: StageSymbols) -> list[StageTerm]:
     """
     found = [*_Terms(symbols).all(), *_sums(symbols)]
     identity = motion_identity(symbols.rollout, "sizes of terms", [term.key for term in found])
-    sizes = kept(lambda: [int(term.value.shape[0]) for term in found], identity)
+    sizes = from_cache(lambda: [int(term.value.shape[0]) for term in found], identity)
     return [_sized(term, size) for term, size in zip(found, sizes, strict=True)]
 
 

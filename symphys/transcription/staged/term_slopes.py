@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from symphys.codegen.toolchain.warm_start import kept
+from symphys.codegen.toolchain.warm_start import from_cache
 from symphys.records import dataclass
 from symphys.transcription.identities import motion_identity
 from symphys.transcription.rollout import Rollout
@@ -114,7 +114,7 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
         return TermSlopes(function, shared.slopes, shared.curved, shared.parts, shared.bases, shared.acting)
     identity = motion_identity(symbols.rollout, "slopes of a term", term.key, term.after)
     kinds = TermSlopes, ReadingFunction, Pattern
-    found = known[term.key] = kept(lambda: _made_slopes(symbols, term), identity, kinds)
+    found = known[term.key] = from_cache(lambda: _made_slopes(symbols, term), identity, kinds)
     return found
 
 
@@ -304,7 +304,7 @@ class TermGroups:
             known = {key: reading([term.value], self.symbols.arguments, term.after) for key, term in first.items()}
             return [known[term.key] for term in self.terms]
 
-        made = kept(
+        made = from_cache(
             make, motion_identity(self.symbols.rollout, "terms", [term.key for term in self.terms]), (ReadingFunction,)
         )
         pairs = zip(made, self.terms, strict=True)

@@ -24,6 +24,7 @@ from symphys.codegen.toolchain.identity import identity_of
 from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
 from symphys.dynamics.kept import structure
 from symphys.expression import parse
+from symphys.latest import Latest
 from symphys.problem import Problem, load_problem
 from symphys.problems import find
 from symphys.transcription import transcribe
@@ -231,11 +232,7 @@ def test_a_function_of_casadi_is_kept_as_it_was(tmp_path: Path, monkeypatch: pyt
         made.append(factor)
         return many_terms(factor)
 
-    class Nothing(dict[str, object]):
-        def __setitem__(self, key: str, value: object) -> None:
-            """Keep nothing, so that files are read."""
-
-    monkeypatch.setattr(warm_start, "LATEST", Nothing())
+    monkeypatch.setattr(warm_start, "LATEST", Latest(0))  # so that files are read
     first = warm_start.kept_function(partial(make, 1 / 3), "a")
     again = warm_start.kept_function(partial(make, 1 / 3), "a")
     other = warm_start.kept_function(partial(make, 1 / 7), "b")
