@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from tools.repeats import few
 from worlds.thrown import TABLES
 
+from symphys.codegen.toolchain import warm_start
 from symphys.dynamics.functions import report_function
+from symphys.latest import Latest
 from symphys.problem import Problem, problem_of_tables
 from symphys.problem.sweeps.points import combined, swept
 from symphys.problem.sweeps.reading import read_axes
@@ -112,7 +115,9 @@ def test_points_that_differ_in_more_have_kernels_of_their_own() -> None:
     np.testing.assert_allclose(ratio, 2, rtol=1e-9)
 
 
-def test_steps_are_built_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_are_built_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("SYMPHYS_CACHE", str(tmp_path))  # where no earlier test has left them
+    monkeypatch.setattr(warm_start, "LATEST", Latest(16))
     built: list[object] = []
 
     def counted(world: object, *more: object) -> object:
