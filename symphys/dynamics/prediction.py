@@ -9,6 +9,7 @@ from typing import TypeVar
 
 import casadi as ca
 
+from symphys.dynamics.applied import applied_wrench
 from symphys.dynamics.arguments import surface_as_arguments
 from symphys.dynamics.collision import Contact, collide
 from symphys.dynamics.collision.predicted_path import PredictedPath, at_rest
@@ -98,8 +99,7 @@ def _motions(context: StepContext, x: State, duration: Expr, freed: int, share: 
     motions, jointed = [], jointed_bodies(context.world)
     for index, body in enumerate(context.world.bodies):
         part = {name: x[f"{body.name}.{name}"] for name, _ in BODY_FIELDS}
-        given = (context.input(f"{body.name}.{name}") for name in ("force", "torque"))
-        push = tuple(zero if each is None else each for each in given)
+        push = applied_wrench(context, x, index, duration)
         massless, times = body.massless, (freed, lag, share, duration)
         inertial = (ca.SX(1), ca.SX(1)) if massless else (body.mass, body.inertia)
         gravity = zero if massless else context.settings.gravity

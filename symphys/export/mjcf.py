@@ -48,7 +48,7 @@ from symphys.export.mjcf_bodies import NestedBody, StartState, links_of, nested_
 from symphys.export.mjcf_departures import Departure, departures, require_expressible, shorter_step
 from symphys.export.mjcf_joints import equalities, freedoms, names
 from symphys.export.mjcf_surfaces import FRICTION_RATIO, PAIRS_ONLY, geoms, height_field, meshes, middle, pairs, text
-from symphys.model.body import Body, Site
+from symphys.model.body import Body, Site, SiteMotor
 from symphys.model.joints import AffineMotor, Joint, Motor, Servo, TorqueMotor, VelocityMotor, kinematic_trees
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Terrain
@@ -324,6 +324,12 @@ def affine(motor: AffineMotor) -> tuple[str, dict[str, str]]:
     return "general", {**found, "gainprm": text([motor.gain]), "biastype": "affine", "biasprm": bias}
 
 
+def site_actuator(name: str, motor: SiteMotor) -> Element:
+    """Write the actuator of a site; in MuJoCo it is called as the site is."""
+    ends = {} if motor.command_range is None else {"ctrlrange": text(bounded(motor.command_range))}
+    return Element("motor", {"name": name, "site": name, "gear": text((*motor.force, *motor.torque)), **ends})
+
+
 def bounded(ends: tuple[float, float]) -> tuple[float, float]:
     """Replace infinite bounds by numbers that MuJoCo takes."""
     return max(ends[0], -UNBOUNDED), min(ends[1], UNBOUNDED)
@@ -417,7 +423,9 @@ def mjcf_model(
     worldbody.extend(numbers.parts(None))
     model.append(pairs(world, step, stiffer))
     SubElement(model, "equality").extend(equalities(start.reference))
-    SubElement(model, "actuator").extend(motor for joint in world.joints for motor in actuators(joint, acted_on, step))
+    motors = SubElement(model, "actuator")
+    motors.extend(motor for joint in world.joints for motor in actuators(joint, acted_on, step))
+    motors.extend(site_actuator(site.name, site.motor) for site in world.sites if site.motor is not None)
     SubElement(model, "sensor").extend(felt.elements)
     SubElement(SubElement(model, "keyframe"), "key", name="start", qpos=text(numbers.qpos), qvel=text(numbers.qvel))
     for empty in [each for each in model if each.tag in ("equality", "sensor") and not len(each)]:

@@ -38,8 +38,9 @@ from symphys.importing.tables.joints import read_couplings, read_joints, read_lo
 from symphys.importing.tables.links import body_table, read_links
 from symphys.importing.tables.pose import begin, keyframe, lift, reference_pose
 from symphys.importing.tables.reading import ModelReading, numbers
-from symphys.importing.tables.sensors import read_sensors, read_sites
+from symphys.importing.tables.sensors import read_sensors
 from symphys.importing.tables.shapes import read_shapes, read_statics
+from symphys.importing.tables.site_motors import read_sites_and_motors
 from symphys.records import dataclass
 
 DEFAULT_OPTIONS = ImportOptions()
@@ -232,7 +233,7 @@ def tables_of(source: CompiledModel, options: ImportOptions) -> tuple[dict[str, 
         if tuple(sorted(table["between"])) in touching:
             table["collide"] = True
     begin(reading, joints)
-    sites = read_sites(reading)
+    sites = read_sites_and_motors(reading)
     couplings = read_couplings(reading)
     loops = read_loops(reading, touching)
     sensors = read_sensors(reading)
@@ -295,7 +296,7 @@ def nothing_of(reading: ModelReading) -> None:
 def taken(reading: ModelReading, tables: dict[str, Any]) -> None:
     """Note what was taken over, in one line; names that had to change; the time step of the model."""
     counted = {key: len(tables.get(key) or ()) for key in ("body", "joint", "coupling", "site", "sensor")}
-    motors = sum("motor" in table for table in tables["joint"])
+    motors = sum("motor" in table for table in (*tables["joint"], *tables["site"]))
     frames = sum(table["mass"] == 0 for table in tables["body"])
     parts = [f"{counted['body'] - frames} bodies", f"{counted['joint']} joints", f"{motors} motors"]
     parts += [f"{frames} frames between joints of one body"] if frames else []

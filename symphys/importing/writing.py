@@ -52,8 +52,8 @@ def robot_text(robot: Imported) -> str:
 def described(robot: Imported) -> str:
     """Return the contents of a robot in a sentence."""
     bodies = [table for table in robot.tables.get("body", ()) if table.get("mass") != 0]
-    joints = robot.tables.get("joint", ())
-    motors = sum("motor" in joint for joint in joints)
+    joints, sites = (robot.tables.get(key, ()) for key in ("joint", "site"))
+    motors = sum("motor" in each for each in (*joints, *sites))
     parts = [counted(len(bodies), "body", "bodies"), counted(len(joints), "joint"), counted(motors, "motor")]
     mass = sum(float(table["mass"]) for table in bodies if isinstance(table.get("mass"), int | float))
     return f"{', '.join(parts)}; {mass:.4g} kg."

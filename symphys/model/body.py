@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from math import inf
-from typing import Any, TypedDict, Unpack
+from typing import Any, ClassVar, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symphys.errors import SymphysError
+from symphys.model.numbers import table_key
 from symphys.model.orientation import unit_quaternion
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import SOLID_SPHERE, UPRIGHT, Box, Capsule, Cylinder, Ellipsoid, Shape, Sphere
@@ -261,6 +262,29 @@ def _refused(name: str, text: str) -> SymphysError:
 
 
 @dataclass(frozen=True)
+class SiteMotor:
+    """A force and a torque on a body in proportion to a command, as of a rotor or a thruster.
+
+    Attributes:
+        force: (3,) [N] at the site for a command of 1, along the site's axes.
+        torque: (3,) [N m] likewise; a rotor's drag is some centimetres times its thrust.
+        command_range: least and largest command; None: any.
+    """
+
+    example: ClassVar[str] = "{ force = [0, 0, 1], torque = [0, 0, 0.02], command_range = [0, 5] }"
+
+    force: tuple[float, ...] = field(
+        default=(0.0, 0.0, 0.0), metadata=table_key("direction", "at command 1, along the site's axes [N]")
+    )
+    torque: tuple[float, ...] = field(
+        default=(0.0, 0.0, 0.0), metadata=table_key("direction", "at command 1, along the site's axes [N m]")
+    )
+    command_range: tuple[float, float] | None = field(
+        default=None, metadata=table_key("ends", "least and largest command; default: any")
+    )
+
+
+@dataclass(frozen=True)
 class Site:
     """A point with axes that is fixed in a body, or in the world.
 
@@ -269,9 +293,11 @@ class Site:
         body: its index; None: the world.
         position: (3,) from the centre of mass, body frame [m]; of the world: world frame.
         orientation: (4,) unit quaternion w x y z from the site's axes to the body's, or the world's.
+        motor: what acts on the body there; its command is the input ``<site>.command``.
     """
 
     name: str
     body: int | None
     position: Sequence[Any] = (0.0, 0.0, 0.0)
     orientation: Sequence[Any] = (1.0, 0.0, 0.0, 0.0)
+    motor: SiteMotor | None = None

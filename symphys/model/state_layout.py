@@ -130,9 +130,10 @@ def initial_state(world: World, values: Mapping[str, Any] = NOTHING) -> Any:
 
 
 def input_sizes(world: World) -> dict[str, int]:
-    """Map the inputs of a world to their sizes: forces and torques on bodies, commands of motors."""
+    """Map the inputs of a world to their sizes: forces and torques on bodies, commands of joints and of sites."""
     forces = {f"{body.name}.{field}": 3 for body in world.bodies for field in INPUT_FIELDS}
     commands = {f"{joint.name}.command": len(joint.kind.coordinates) for joint in world.joints if joint.driven}
+    commands |= {f"{site.name}.command": 1 for site in world.sites if site.motor is not None}
     return forces | commands | {name: 1 for name, _ in world.scheduled}
 
 

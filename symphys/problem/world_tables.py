@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.errors import SymphysError
-from symphys.model.body import HOLLOW_SPHERE, Body
+from symphys.model.body import HOLLOW_SPHERE, Body, SiteMotor
 from symphys.model.heightfield import Heightfield
 from symphys.model.joints import JOINTS, Joint
 from symphys.model.joints.frames import MEETING_TOLERANCE
@@ -141,10 +141,17 @@ def attached_tables(world: World) -> dict[str, Any]:
             "body": "world" if site.body is None else world.bodies[site.body].name,
             "position": floats(site.position),
             "orientation": floats(site.orientation),
+            **({} if site.motor is None else {"motor": site_motor_table(site.motor)}),
         }
         for site in world.sites
     ]
     return {"coupling": couplings, "site": sites}
+
+
+def site_motor_table(motor: SiteMotor) -> dict[str, Any]:
+    """The keys of the motor of a site."""
+    ends = {} if motor.command_range is None else {"command_range": floats(motor.command_range)}
+    return {"force": floats(motor.force), "torque": floats(motor.torque), **ends}
 
 
 def body_table(body: Body, start: Start) -> dict[str, Any]:

@@ -14,7 +14,10 @@ from symphys.problem import Problem, Variable, begin, carried, placing, repositi
 from symphys.records import dataclass
 from symphys.shooting import VariableBlock
 from symphys.transcription.formula_names import Parameters, spans
-from symphys.types import Expr
+from symphys.types import Array, Expr, Ints
+
+MIN_KNOT_SHARE = 1e-9
+"""Share of a step below which a knot has no part in it: its end lies on the step's, but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -110,19 +113,36 @@ def _spread_inputs(problem: Problem, variable: Variable, columns: Mapping[str, s
 
 
 def knot_weights(knots: int, steps: int, interpolation: str) -> Expr:
-    """Return (knots, steps) sparse: the weight of each knot in each step, at the middle of the step.
+    """Return (knots, steps) sparse: the weight of each knot in each step: its mean over the step.
 
     "constant": the horizon is cut into equal parts, one a knot. "linear": knots lie at equal distances from the
-    start to the end of the horizon, values between them are interpolated.
+    start to the end of the horizon, values between them are interpolated. So an input gives the impulse that its
+    knots say, wherever these lie within steps.
     """
-    middle = (np.arange(steps) + 0.5) / steps
-    columns = np.arange(steps)
     if interpolation == "constant" or knots == 1:
-        rows = np.minimum((middle * knots).astype(int), knots - 1)
-        return ca.DM.triplet(rows.tolist(), columns.tolist(), ca.DM.ones(steps), knots, steps)
-    place = middle * (knots - 1)
-    left = np.minimum(place.astype(int), knots - 2)
-    share = place - left
-    rows = np.concatenate([left, left + 1])
-    values = ca.DM(np.concatenate([1 - share, share]))
-    return ca.DM.triplet(rows.tolist(), np.tile(columns, 2).tolist(), values, knots, steps)
+        width, integral = knots, _of_step
+    else:
+        width, integral = knots - 1, _of_hat
+    edges = np.arange(steps + 1) * width / steps
+    start, end = edges[:-1], edges[1:]
+    first, rows, columns, values = np.floor(start).astype(int), list[Ints](), list[Ints](), list[Array]()
+    for k in range(int(np.ceil(width / steps)) + 2):
+        row = first + k
+        share = (integral(end - row) - integral(start - row)) / (end - start)
+        some = np.flatnonzero((row < knots) & (share > MIN_KNOT_SHARE))
+        rows.append(row[some])
+        columns.append(some)
+        values.append(share[some])
+    acting, at = (np.concatenate(each).tolist() for each in (rows, columns))
+    return ca.DM.triplet(acting, at, ca.DM(np.concatenate(values)), knots, steps)
+
+
+def _of_step(place: Array) -> Array:
+    """Return the integral up to a place of what is 1 from 0 to 1."""
+    return np.clip(place, 0.0, 1.0)
+
+
+def _of_hat(place: Array) -> Array:
+    """Return the integral up to a place of what rises from -1 to 0 and falls from 0 to 1."""
+    left, right = np.clip(place, -1.0, 0.0) + 1, np.clip(place, 0.0, 1.0)
+    return left * left / 2 + right - right * right / 2

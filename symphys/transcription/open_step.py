@@ -172,6 +172,8 @@ def commands(problem: Problem) -> list[Action]:
         if joint.motor is not None:
             for k in range(len(joint.kind.coordinates)):
                 found.append(Action(f"{joint.name}.command", k, 1.0, *reach(joint, k)))
+    motors = ((site.name, site.motor) for site in problem.world().sites if site.motor is not None)
+    found += [Action(f"{name}.command", 0, 1.0, *(motor.command_range or (-np.inf, np.inf))) for name, motor in motors]
     return found
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from symphys.codegen.toolchain.identity import identity_of
 from symphys.codegen.toolchain.warm_start import kept_function
+from symphys.dynamics.applied import applied_function
 from symphys.dynamics.kept import kept, structure
 from symphys.dynamics.observation import half_step_function
 from symphys.expression import Formula
@@ -264,6 +265,11 @@ class Rollout:
             return self.built(report_function)
 
         return self.remembering(self._kept("report", make))
+
+    @cached_property
+    def applied_wrenches(self) -> ca.Function:
+        """What inputs exert on bodies in a step; see ``applied_function``."""
+        return self.built(applied_function)
 
     @property
     def _shares(self) -> bool:

@@ -108,7 +108,7 @@ def _trajectory(
     *counted: Array,
 ) -> Trajectory:
     world, steps = rollout.world, rollout.steps
-    layout = Layout(world)
+    layout, (force, torque) = Layout(world), _applied(rollout, x, u, p)
     bodies: dict[str, Any] = {
         field: _stack([x[:, layout[f"{body.name}.{field}"]] for body in world.bodies]) for field in GIVEN
     }
@@ -116,8 +116,8 @@ def _trajectory(
         time=time,
         body_names=tuple(body.name for body in world.bodies),
         **bodies,
-        force=_applied(rollout, u, "force"),
-        torque=_applied(rollout, u, "torque"),
+        force=force,
+        torque=torque,
         contact_names=tuple(pair.name for pair in world.pairs),
         contact_force=forces.reshape(steps, len(world.pairs), 3),
         contact_gap=np.concatenate([gaps, gaps[-1:]]),
@@ -184,8 +184,8 @@ def _split(columns: Array, counts: list[int]) -> Array:
     return apart
 
 
-def _applied(rollout: Rollout, u: Array, field: str) -> Array:
-    """Return (N, B, 3) the inputs of this kind, zero for bodies without any."""
-    zero = np.zeros((rollout.steps, 3))
-    columns = {name: u[:, part] for name, part in input_columns(rollout.world, rollout.inputs).items()}
-    return _stack([columns.get(f"{body.name}.{field}", zero) for body in rollout.world.bodies])
+def _applied(rollout: Rollout, x: Array, u: Array, p: Array) -> tuple[Array, Array]:
+    """Return forces and torques (N, B, 3) that inputs exert on bodies, zero for bodies without any."""
+    found = row_by_row(rollout.applied_wrenches, plain(rollout, x)[:-1], u, p)
+    force, torque = (each.reshape(rollout.steps, len(rollout.world.bodies), 3) for each in found)
+    return force, torque

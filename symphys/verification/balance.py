@@ -15,7 +15,7 @@ import numpy as np
 from symphys.codegen.backends.calls import row_by_row
 from symphys.dynamics.motion import momentum
 from symphys.maths import rotation
-from symphys.model.state_layout import Layout, input_columns, inputs_size
+from symphys.model.state_layout import Layout
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout, plain
 from symphys.types import Array
@@ -148,23 +148,23 @@ def _energies(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
     """Return kinetic and potential energy (N + 1,), and the work of applied forces in each step (N,) [J]."""
     world, layout, p = rollout.world, Layout(rollout.world), parameters(rollout)
     x, after = ca.SX.sym("x", layout.size), ca.SX.sym("after", layout.size)
-    u = ca.SX.sym("u", inputs_size(world, rollout.inputs))
+    count, motion = len(world.bodies), record.motion
+    force, torque = ca.SX.sym("force", 3, count), ca.SX.sym("torque", 3, count)
     kinetic, work = ca.SX(0), ca.SX(0)
-    given = {name: u[part] for name, part in input_columns(world, rollout.inputs).items()}
-    for body in world.bodies:
+    for k, body in enumerate(world.bodies):
         at = {field: x[layout[f"{body.name}.{field}"]] for field in ("position", "orientation", "velocity")}
         spin = x[layout[f"{body.name}.angular_velocity"]]
         turning = momentum(body.inertia, at["orientation"], spin)
         kinetic += (body.mass * ca.sumsqr(at["velocity"]) + ca.dot(spin, turning)) / 2
         moved = after[layout[f"{body.name}.position"]] - at["position"]
         turned = rotation.between(at["orientation"], after[layout[f"{body.name}.orientation"]])
-        for field, way in (("force", moved), ("torque", turned)):
-            work += ca.dot(given.get(f"{body.name}.{field}", ca.SX.zeros(3)), way)
+        work += ca.dot(force[:, k], moved) + ca.dot(torque[:, k], turned)
     kinetic += rotor_energy(world, x)
     states, arrays = ca.Function("energies", [x, p], [kinetic]), record.arrays
     x_k = plain(rollout, arrays.x)
     moving = row_by_row(states, x_k, arrays.p)[0][:, 0]
-    done = row_by_row(ca.Function("work", [x, after, u], [work]), x_k[:-1], x_k[1:], arrays.u)[0][:, 0]
+    works = ca.Function("work", [x, after, force, torque], [work])
+    done = row_by_row(works, x_k[:-1], x_k[1:], motion.force, motion.torque)[0][:, 0]
     potential, lifted = _potential(rollout, record)
     return moving, potential, done + lifted
 

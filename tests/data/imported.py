@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 import symphys
 from symphys.importing.records import CompiledModel, Finding, ImportOptions
@@ -41,8 +42,8 @@ def by_name(tables: Tables, kind: str) -> dict[str, Tables]:
     return {table["name"]: table for table in tables.get(kind, [])}
 
 
-def mujoco_motion(model: Any, duration: float, ctrl: float = 0.0, qpos: Array | None = None) -> Any:
-    """MjData after so long, by Runge-Kutta steps of ``FINE``; every command is ``ctrl``."""
+def mujoco_motion(model: Any, duration: float, ctrl: ArrayLike = 0.0, qpos: Array | None = None) -> Any:
+    """MjData after so long, by Runge-Kutta steps of ``FINE``; commands are ``ctrl``."""
     import mujoco
 
     model.opt.timestep, model.opt.integrator = FINE, mujoco.mjtIntegrator.mjINT_RK4

@@ -72,6 +72,7 @@ WALKER = """
     <motor name="hip" joint="hip_x" gear="40" ctrlrange="-1 1"/>
     <position joint="knee" kp="30" kv="2" ctrlrange="-1.5 0" forcerange="-20 25"/>
     <general joint="hip_z" gainprm="5" biastype="affine" biasprm="0.5 -3 -1"/>
+    <motor name="jet" site="imu" gear="0 1 2 0.1 0 0.3" ctrlrange="-1 4"/>
   </actuator>
   <sensor>
     <jointpos joint="knee"/><jointvel joint="hip_x"/><framepos objtype="site" objname="toe"/>

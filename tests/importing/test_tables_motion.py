@@ -9,6 +9,7 @@ from data.imported import Tables, apart, by_name, model_of, mujoco_motion, probl
 import symphys
 
 pytest.importorskip("mujoco")
+COST = [{"name": "height", "value": "hull.position[2]"}]
 
 CHAIN = """<option gravity="1 2 -9.81"/><worldbody><body name="base" pos="0.1 0.2 1" euler="0.3 0.2 -0.4">
 <inertial pos="0.02 -0.01 0.03" mass="3" diaginertia="0.05 0.06 0.03" euler="0.5 0.1 0.2"/>
@@ -164,3 +165,32 @@ def test_joints_of_one_body_that_can_lock_get_an_armature() -> None:
     problem_of(tables, 0.1, 0.01)
     held, _ = read(GIMBAL.replace('"0 1 0"', '"0 1 0" limited="true" range="-1.2 1.2"'))
     assert not any("armature" in joint for joint in held["joint"])
+
+
+def test_actuators_at_sites_act_as_mujoco_has_them() -> None:
+    """Two at one site, one called as its site is, with gains and bounds of forces; others are named."""
+    xml = """<worldbody><body name="hull" pos="0 0 2"><freejoint/>
+    <inertial pos="0.01 0 0.02" mass="1.3" diaginertia="0.03 0.04 0.06"/>
+    <site name="left" pos="0 0.2 0.05" euler="0.2 0.1 0"/><site name="mount" pos="0 -0.2 0.05"/></body>
+    <site name="pole" pos="1 0 0"/></worldbody><actuator><motor name="left" site="left" gear="0 0 2 0 0 -0.04"/>
+    <motor name="thrust" site="mount" gear="0 0 1 0 0 0.02" ctrlrange="0 2"/>
+    <general name="turn" site="mount" gear="0 0 0 0 0.1 0" gainprm="2" forcerange="-5 3"/>
+    <motor name="away" site="mount" refsite="pole" gear="1 0 0 0 0 0"/>
+    <general name="damped" site="mount" gear="1 0 0 0 0 0" biastype="affine" biasprm="0 0 -1"/></actuator>"""
+    tables, findings = read(xml)
+    sites = by_name(tables, "site")
+    assert [name for name, table in sites.items() if "motor" in table] == ["left", "thrust", "turn"]
+    assert sites["turn"]["motor"] == {"torque": [0, 0.2, 0], "command_range": [-2.5, 1.5]}
+    left = texts(findings, "left out")
+    assert "away: it acts along the axes of another site" in left
+    assert "damped: what it gives is not in proportion to its command" in left
+    model = model_of(xml)
+    model.actuator_biasprm[:] = 0  # what is left out
+    data, commands = mujoco_motion(model, 0.3, [3.0, 3.0, 3.0, 0.0, 0.0]), ("left", "thrust", "turn")
+    drive = [{"name": f"u_{name}", "sets": f"{name}.command", "guess": 3.0} for name in commands]
+    off = [
+        apart(model, data, symphys.simulate(problem_of(tables, 0.3, dt, variable=drive, cost=COST)))
+        for dt in (0.01, 0.005)
+    ]
+    assert off[1] < 3e-5
+    assert off[0] == pytest.approx(4 * off[1], rel=0.1)

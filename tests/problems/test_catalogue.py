@@ -59,6 +59,7 @@ SHIPPED = [
     "push_and_fly",
     "push_box",
     "putt",
+    "quadrotor_slalom",
     "quadruped_shift",
     "quadruped_walk",
     "quadruped_walk_net",

@@ -418,6 +418,16 @@ def flies_from_the_bar(found: Found) -> None:
     assert motion["torso.position"][-1, 2] > motion["legs.position"][-1, 2] + 0.5
 
 
+def flies_by_newton_and_euler(found: Found) -> None:
+    """To second order in the step; the poles are passed half a metre to their sides."""
+    wanted = flights.quadrotor(found.z.reshape(4, -1), 4.5)
+    ends = [motion.position[-1, 0] for motion in (found.motion, found.halved.simulate(found.z))]
+    assert np.abs(ends[1] - wanted[:3]).max() < 0.02
+    np.testing.assert_allclose((4 * ends[1] - ends[0]) / 3, wanted[:3], atol=2e-3)
+    sides = [np.interp(x, found.motion.position[:, 0, 0], found.motion.position[:, 0, 1]) for x in (1.5, 3, 4.5)]
+    assert np.abs(sides - np.array([0.5, -0.5, 0.5])).max() < 0.1
+
+
 def closes_the_gait(found: Found) -> None:
     """By the exact rollout, at 1 m/s; its cost of transport is that of the motion's own columns.
 
@@ -597,6 +607,7 @@ TABLE = [
     *rows("push_box", "ilqr", "ilqr", finer=1),
     *rows("putt", {"least_squares": 9}, answer=PUTT, within=4e-3, polish=True),
     *rows("putt", {"gradient": 16, "ipopt": 16, "cma": 250}, answer=PUTT, within=[0.012, 0.04], seeds=2),
+    *rows("quadrotor_slalom", "ilqr multiple_shooting", "multiple_shooting", law=flies_by_newton_and_euler, finer=1),
     *rows("quadruped_shift", "gradient", "gradient", of=3, law=shifts_its_torso),
     *rows("quadruped_shift", "gradient", "gradient", of=3, wanted=2, law=shifts_its_torso),
     *rows("row_of_balls", {"gradient": 45, "least_squares": 25, "ipopt": 35, "cma": 1000}, solved=None,

@@ -140,4 +140,22 @@ def test_knots_are_shared_out_over_the_steps(knots, steps):
     linear = line @ np.array(knot_weights(knots, steps, "linear").full())
     assert linear == pytest.approx(2 + 3 * middle if knots > 1 else np.full(steps, 2.0))
     constant = np.array(knot_weights(knots, steps, "constant").full())
-    assert (np.argmax(constant, axis=0) == np.floor(middle * knots)).all()
+    assert constant.sum(axis=1) == pytest.approx(np.full(knots, steps / knots))
+    acting = np.minimum(np.floor(middle * knots).astype(int), knots - 1)
+    assert (constant[acting, np.arange(steps)] >= 0.5 - 1e-12).all()
+
+
+@pytest.mark.parametrize("kind", ["constant", "linear"])
+@pytest.mark.parametrize(("knots", "steps"), [(5, 7), (3, 40), (11, 6), (91, 450), (81, 450)])
+def test_a_step_has_the_mean_of_its_knots(kind, knots, steps):
+    """The impulse of an input is that of its knots, wherever they lie within steps; by samples of the interpolation."""
+    values = np.random.default_rng(0).normal(size=knots)
+    fine = (np.arange(steps * 2000) + 0.5) / (steps * 2000)
+    if kind == "linear":
+        sampled = np.interp(fine, np.linspace(0, 1, knots), values)
+    else:
+        sampled = values[np.floor(fine * knots).astype(int)]
+    weights = np.array(knot_weights(knots, steps, kind).full())
+    assert values @ weights == pytest.approx(sampled.reshape(steps, -1).mean(axis=1), abs=3e-3)
+    coarse = np.array(knot_weights(knots, 2 * steps, kind).full())
+    assert weights == pytest.approx(coarse.reshape(knots, steps, 2).mean(axis=2), abs=1e-12)

@@ -209,6 +209,20 @@ FEATURES: dict[str, Tables] = {
     ),
     "velocity motor": swung(hinge={"motor": {"velocity": {"torque": 300, "velocity": 8}}}),
     "affine motor": swung(hinge={"motor": {"affine": {"gain": 2, "kp": -3, "kv": -0.1, "gear": 4}}}),
+    "motor of a site": thrown(
+        {"name": "jet", "sets": "nozzle.command", "knots": 3, "guess": [2, -1, 3]},
+        varied("ball.mass"),
+        site=[
+            {
+                "name": "nozzle",
+                "body": "ball",
+                "position": [0.05, 0.02, -0.03],
+                "orientation": {"pitch_deg": 30},
+                "motor": {"force": [1, 0.5, 2], "torque": [0.01, 0, 0.03], "command_range": [-2, 5]},
+            }
+        ],
+        more=[{"name": "effort", "at": "always", "squares": "0.1 * nozzle.command"}],
+    ),
     "universal joint": {
         "simulation": {"duration": 0.12, "dt": 0.01},
         "body": [{**ARM, "name": "base", "position": [0, 2, 1.6], "angular_velocity": [0.3, -0.2, 0.5]}, ARM],

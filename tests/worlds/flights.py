@@ -84,3 +84,30 @@ def juggled(lift: Array) -> tuple[Array, list[float]]:
             impulse = (1 + 0.8) * (state[2] - state[3]) / (1 / BAT + 1 / BALL)
             state[2:] += [-impulse / BAT, impulse / BALL]
     return state, speeds
+
+
+ROTORS = np.array([[0.1, 0.1, 1], [-0.1, 0.1, -1], [-0.1, -0.1, 1], [0.1, -0.1, -1]])
+"""Of the quadrotor's rotors: place [m] and sign of the drag."""
+
+
+def quadrotor(thrusts: Array, duration: float) -> Array:
+    """(13,) Position, orientation, velocity and spin in its frame at the end, of thrusts (4, knots) [N].
+
+    They are linear between the knots. By Newton's and Euler's equations.
+    """
+    mass, inertia, knots = 0.5, np.array([0.0025, 0.0025, 0.0045]), np.linspace(0, duration, thrusts.shape[1])
+
+    def slope(time: float, y: Array) -> Array:
+        given = np.array([np.interp(time, knots, each) for each in thrusts])
+        q, spin, (w, x, y_, z) = y[3:7], y[10:13], y[3:7]
+        up = np.array([2 * (x * z + w * y_), 2 * (y_ * z - w * x), 1 - 2 * (x * x + y_ * y_)]) / (q @ q)
+        torque = np.array([ROTORS[:, 1] @ given, -ROTORS[:, 0] @ given, 0.016 * ROTORS[:, 2] @ given])
+        vector = np.cross(q[1:], spin) + w * spin
+        turning = 0.5 * np.concatenate([[-q[1:] @ spin], vector])
+        return np.concatenate(
+            [y[7:10], turning, GRAVITY + up * given.sum() / mass, (torque - np.cross(spin, inertia * spin)) / inertia]
+        )
+
+    start = np.array([0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0], float)
+    found = solve_ivp(slope, (0, duration), start, rtol=1e-10, atol=1e-10, max_step=duration / thrusts.shape[1])
+    return np.asarray(found.y[:, -1])

@@ -16,6 +16,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.dynamics.applied import applied_wrench
 from symphys.dynamics.collision.body_points import corners, ends, turned_by
 from symphys.dynamics.collision.pairs.capsule_capsule import PARALLEL, nearest
 from symphys.dynamics.collision.pairs.sphere_box import BoxField
@@ -281,21 +282,20 @@ def near_pairs(context: StepContext, x: State) -> tuple[Expr, ...]:
 def _motion_bounds(context: StepContext, x: State) -> tuple[list[MotionBound], Expr]:
     """Return the bounds of all bodies, and the greatest speed of a point of any [m/s]."""
     world = context.world
-    bodies = [_motion_bound(x, body, context, can_measure(body)) for body in world.bodies]
+    bodies = [_motion_bound(x, index, context, can_measure(body)) for index, body in enumerate(world.bodies)]
     fastest: Expr = ca.SX(0)
     for bound, body in zip(bodies, world.bodies, strict=True):
         fastest = _max_speed(fastest, bound, _body_arm(body))
     return bodies, fastest
 
 
-def _motion_bound(x: State, body: Body, context: StepContext, turned: bool) -> MotionBound:
+def _motion_bound(x: State, index: int, context: StepContext, turned: bool) -> MotionBound:
     """Bound the motion of a body; a frame without mass counts as 1 kg, as in ``PredictedMotion``."""
+    body = context.world.bodies[index]
     position, velocity = x[f"{body.name}.position"], x[f"{body.name}.velocity"]
-    forces, torques = (
-        (x[f"{body.name}.reaction_{kind}"], ca.SX.zeros(3) if push is None else push)
-        for kind in ("force", "torque")
-        for push in [context.input(f"{body.name}.{kind}")]
-    )
+    reaction = (x[f"{body.name}.reaction_{kind}"] for kind in ("force", "torque"))
+    given = applied_wrench(context, x, index, context.settings.scheme.dt)
+    forces, torques = zip(reaction, given, strict=True)
     mass = 1.0 if body.massless else body.mass
     settings = context.settings
     seen = _linear_bound(position, velocity, forces, mass, settings.gravity, settings.scheme.dt)

@@ -7,6 +7,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.dynamics.applied import applied_wrench
 from symphys.dynamics.arguments import parts_of
 from symphys.dynamics.articulated.forward_dynamics import Wrench
 from symphys.dynamics.context import State, StepContext, make_context
@@ -138,7 +139,8 @@ def _reactions(at: SensedState) -> dict[str, Wrench]:
         motions = predicted_motions(context, x, ca.SX(at.dt))
         for tree in kinematic_trees(world.joints):
             lacking = {
-                i: _missing_wrench(motions[i], context.settings.gravity, *_known(context, x, i)) for i in tree.bodies
+                i: _missing_wrench(motions[i], context.settings.gravity, *_known(context, x, i, ca.SX(at.dt)))
+                for i in tree.bodies
             }
             for link in reversed(tree.links):
                 place = poses[link.body][0]
@@ -157,11 +159,10 @@ def _reactions(at: SensedState) -> dict[str, Wrench]:
     return {name: (tracer.value(force), tracer.value(torque)) for name, (force, torque) in found.items()}
 
 
-def _known(context: StepContext, x: State, index: int) -> tuple[Wrench, Wrench]:
+def _known(context: StepContext, x: State, index: int, duration: Expr) -> tuple[Wrench, Wrench]:
     """Return the external and the persistent forces on a body in the step before."""
-    name, zero = context.world.bodies[index].name, ca.SX.zeros(3)
-    force, torque = (context.input(f"{name}.{field}") for field in INPUT_FIELDS)
-    given = zero if force is None else force, zero if torque is None else torque
+    name = context.world.bodies[index].name
+    given = applied_wrench(context, x, index, duration)
     return given, (x[f"{name}.reaction_force"], x[f"{name}.reaction_torque"])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Sequence
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -288,8 +288,10 @@ def target(reading: ModelReading, actuator: int) -> tuple[int, float] | None:
         text = f"its tendon runs over {reading.called('joint', index)} alone, which it drives with a gear"
         reading.note("taken", what, text)
         kind = int(types.mjTRN_JOINT)
+    if kind == int(types.mjTRN_SITE):
+        return None  # see ``site_motors``
     if kind not in (int(types.mjTRN_JOINT), int(types.mjTRN_JOINTINPARENT)):
-        reading.note("left out", what, "actuators at sites, bodies and slider-cranks have no counterpart")
+        reading.note("left out", what, "adhesion of bodies and slider-cranks have no counterpart")
         return None
     if reading.off("ACTUATION"):
         reading.note("left out", what, "the model's options switch actuators off")
@@ -311,7 +313,15 @@ def through_tendon(reading: ModelReading, tendon: int) -> tuple[int, float] | No
     return (int(model.wrap_objid[moving[0]]), float(model.wrap_prm[moving[0]])) if len(moving) == 1 else None
 
 
-def affine(reading: ModelReading, actuator: int, joint: int, gear: float) -> Motor | None:
+class ActuatorLaw(NamedTuple):
+    """The force of an actuator before its gear: gain times the command, and a bias by 1, position and velocity."""
+
+    gain: float
+    bias: Array
+    command_range: list[float]
+
+
+def actuator_law(reading: ModelReading, actuator: int) -> ActuatorLaw | None:
     """Return the law of an actuator; None if it is not affine."""
     model, what = reading.model, reading.called("actuator", actuator)
     gain, bias = model.actuator_gainprm[actuator], np.array(model.actuator_biasprm[actuator][:3], float)
@@ -337,11 +347,19 @@ def affine(reading: ModelReading, actuator: int, joint: int, gear: float) -> Mot
         value = getattr(model, f"actuator_{key}", None)
         if value is not None and np.any(value[actuator]):
             reading.note("left out", f"{key} of {what}", "motors have none", f"{float(np.max(value[actuator])):g}")
-    bias = bias if model.actuator_biastype[actuator] else np.zeros(3)
+    return ActuatorLaw(float(gain[0]), bias if model.actuator_biastype[actuator] else np.zeros(3), command)
+
+
+def affine(reading: ModelReading, actuator: int, joint: int, gear: float) -> Motor | None:
+    """Return the motor of a joint that an actuator is; None if it is not affine."""
+    law = actuator_law(reading, actuator)
+    if law is None:
+        return None
     # MuJoCo's length is gear times its coordinate, which is not 0 at the reference pose
-    offset = float(bias[0] + bias[1] * gear * reading.reference(joint))
-    law: Motor = {"gain": float(gain[0]), "offset": offset, "kp": -float(bias[1]), "kv": -float(bias[2]), "gear": gear}
-    return {**law, "command_range": command, "force_range": force_range(reading, actuator, joint, gear)}
+    offset = float(law.bias[0] + law.bias[1] * gear * reading.reference(joint))
+    found: Motor = {"gain": law.gain, "offset": offset, "kp": -float(law.bias[1]), "kv": -float(law.bias[2])}
+    ends = force_range(reading, actuator, joint, gear)
+    return {**found, "gear": gear, "command_range": law.command_range, "force_range": ends}
 
 
 def force_range(reading: ModelReading, actuator: int, joint: int, gear: float) -> list[float]:

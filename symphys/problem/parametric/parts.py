@@ -19,7 +19,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from symphys.model.body import Body
+from symphys.model.body import Body, SiteMotor
 from symphys.model.numbers import Number, numbers_of
 from symphys.model.scalar import Scalar, is_zero
 from symphys.model.shapes import Shape, Sphere, Static, Surface
@@ -206,6 +206,7 @@ class ParametricSite:
     body: str | None
     position: tuple[float, float, float]
     orientation: tuple[float, ...]
+    motor: SiteMotor | None = None
 
 
 @dataclass(frozen=True)

@@ -142,7 +142,7 @@ class ParametricWorld:
     def _site(self, site: ParametricSite, places: Mapping[str, int], value: Value) -> Site:
         """A site on its body, from the centre of mass."""
         place = None if site.body is None else places[site.body]
-        return Site(site.name, place, self._shifted(site.position, site.body, value), site.orientation)
+        return Site(site.name, place, self._shifted(site.position, site.body, value), site.orientation, site.motor)
 
     def _shifted(self, point: Sequence[Scalar], body: str | None, value: Value) -> tuple[Scalar, ...]:
         """(3,) from a body's centre of mass, where the file has it from the origin of the body's frame."""

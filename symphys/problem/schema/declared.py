@@ -66,7 +66,8 @@ def keys_of(described: Iterable[Field[Any]], optional: bool = False) -> dict[str
         elif each.default is MISSING:
             found[each.name] = (value, pydantic.Field(description=about))
         else:
-            found[each.name] = (value, pydantic.Field(default=each.default, description=about))
+            default = list(each.default) if isinstance(each.default, tuple) else each.default
+            found[each.name] = (value, pydantic.Field(default=default, description=about))
     return found
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, create_model
 
+from symphys.model.body import SiteMotor
 from symphys.model.joints import JOINTS, Joint, Spring
 from symphys.model.joints.motor import MOTORS
 from symphys.problem.schema.declared import keys_of, table_of
@@ -78,6 +79,10 @@ class CouplingTable(SchemaTable):
     )
 
 
+class SiteMotorTable(table_of("SiteMotorNumbersTable", fields(SiteMotor))):  # type: ignore[misc]
+    """A force at the site and a torque, along the site's axes, in proportion to a command: a rotor, a thruster."""
+
+
 class SiteTable(SchemaTable):
     """A named point with axes on a body: formulas name its position, orientation and velocity."""
 
@@ -87,6 +92,9 @@ class SiteTable(SchemaTable):
         default=[0.0, 0.0, 0.0], description="from the centre of mass, in the body's frame [m]; world coordinates there"
     )
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
+    motor: SiteMotorTable | None = Field(
+        default=None, description=f"acts on the body by the command name.command: {SiteMotor.example}"
+    )
 
 
 class JointTable(kinds_of_joints()):  # type: ignore[misc]

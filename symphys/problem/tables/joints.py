@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from symphys.maths import rotation
+from symphys.model.body import SiteMotor
 from symphys.model.gimbal import Screw, locks
 from symphys.model.joints import (
     JOINTS,
@@ -353,8 +354,22 @@ def read_sites(tables: Sequence[SiteTable], bodies: Sequence[str], faults: Fault
         x, y, z = table.position
         orientation = read_orientation(("site", index, "orientation"), table.orientation, faults)
         body = None if table.body == WORLD else table.body
-        found.append(ParametricSite(table.name, body, (x, y, z), tuple(orientation.tolist())))
+        motor = None if table.motor is None else read_site_motor(table, index, faults)
+        found.append(ParametricSite(table.name, body, (x, y, z), tuple(orientation.tolist()), motor))
     return tuple(found)
+
+
+def read_site_motor(table: SiteTable, index: int, faults: Faults) -> SiteMotor:
+    """The motor of a site; notes one that does nothing, or acts on the world."""
+    assert table.motor is not None
+    given, place = table.motor, ("site", index, "motor")
+    ends = None if given.command_range is None else tuple(given.command_range)
+    motor = SiteMotor(tuple(given.force), tuple(given.torque), ends)
+    if table.body == WORLD:
+        faults.add(place, "a motor acts on a body, and this site belongs to the world")
+    if not any((*motor.force, *motor.torque)):
+        faults.add(place, f"does nothing: give it a force [N] or a torque [N m], as in {SiteMotor.example}")
+    return motor
 
 
 def check_couplings(world: World, faults: Faults) -> None:
