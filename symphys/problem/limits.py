@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from symphys.model.shapes import SHAPES, SURFACES, SolidShape, Surface, points_of_kinds
+from symphys.model.shapes import SHAPES, SURFACES, Convex, Plane, SolidShape, Sphere, Surface, Terrain, points_of_kinds
 from symphys.model.shapes.inertia import specific
 from symphys.model.state_layout import Layout
 from symphys.model.world import World
@@ -142,6 +142,10 @@ def shown(size: float) -> str:
     return f"{size / GIB:.3g} GiB"
 
 
+MAX_CORNERS = 64
+"""Corners of a hull that touches solids."""
+
+
 def check_pair_limit(world: ParametricWorld, faults: Faults) -> None:
     """Check that a time step can compute all contact points, and that each has a rule."""
     candidates = CollisionFilter(world.parts, (*world.pairs, *world.jointed))
@@ -156,6 +160,26 @@ def check_pair_limit(world: ParametricWorld, faults: Faults) -> None:
             f"contact of such shapes is not known: {listed}{more}; let them pass through each other, by collides_with "
             "or by a [[pair]] with collide = false",
         )
+
+
+def check_hulls(world: ParametricWorld, faults: Faults) -> None:
+    """Check that hulls which touch solids have few corners: a step looks at all of them, a hundred times."""
+    sizes = {
+        part.name: max(
+            (len(s.hull.corners) for s in part.surfaces if isinstance(s, Convex) and not s.flatness), default=0
+        )
+        for part in world.parts
+    }
+    if max(sizes.values(), default=0) <= MAX_CORNERS:
+        return
+    for pair in world.collision_pairs:
+        for one, other in (pair, pair[::-1]):
+            name, solid = world.parts[one].name, world.parts[other]
+            met = [each.kind for each in solid.surfaces if not isinstance(each, Plane | Terrain | Sphere)]
+            if sizes[name] > MAX_CORNERS and met:
+                text = f"{name} has a hull of {sizes[name]} corners, and touches {solid.name}, a {met[0]}: hulls that "
+                remedy = f"touch more than ground and spheres have at most {MAX_CORNERS}; give fewer points, or let "
+                faults.stop(("body",), f"{text}{remedy}the two pass through each other, by collides_with or a [[pair]]")
 
 
 def too_many(candidates: CollisionFilter, counted: PairCount) -> str:

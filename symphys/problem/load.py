@@ -15,7 +15,7 @@ from symphys.files import printable
 from symphys.model.state_layout import input_sizes
 from symphys.model.world import World
 from symphys.problem.include import appendix
-from symphys.problem.limits import check_pair_limit, check_rollout
+from symphys.problem.limits import check_hulls, check_pair_limit, check_rollout
 from symphys.problem.model import (
     ALIVE,
     FeedbackController,
@@ -318,6 +318,7 @@ def read_world(document: Document, faults: Faults) -> tuple[ParametricWorld, dic
     law = read_contact(document.contact)
     parametric = ParametricWorld(bodies, statics, pairs, law, (x, y, z), joints, couplings, sites)
     check_pair_limit(parametric, faults)
+    check_hulls(parametric, faults)
     return parametric, initial
 
 

@@ -106,7 +106,7 @@ def test_a_line_that_is_not_whole_is_dropped_and_the_rest_stays(tmp_path: Path) 
     assert file.read_bytes() == whole
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_small_table_is_whole_goes_on_where_it_was_and_has_the_judges_numbers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -148,12 +148,12 @@ def test_two_coefficients_whose_tangents_turn_with_a_body_become_the_larger() ->
 
 def test_shapes_without_a_rule_and_what_overlaps() -> None:
     xml = """<worldbody><geom type="plane" size="1 1 1"/>
-    <body name="can" pos="0 0 2"><freejoint/><geom type="cylinder" size="0.1 0.2"/></body>
-    <body name="tin" pos="2 0 2"><freejoint/><geom type="cylinder" size="0.1 0.2"/></body>
+    <body name="can" pos="0 0 2"><freejoint/><geom type="ellipsoid" size="0.1 0.1 0.2"/></body>
+    <body name="tin" pos="2 0 2"><freejoint/><geom type="ellipsoid" size="0.1 0.1 0.2"/></body>
     <body name="ball" pos="2 0.15 2"><freejoint/><geom size="0.1"/></body></worldbody>"""
     tables, findings = read(xml)
     lost = texts(findings, "left out")
-    assert "there is no rule for contact between such shapes: cylinder and cylinder (1)" in lost
+    assert "there is no rule for contact between such shapes: ellipsoid and ellipsoid (1)" in lost
     assert "ball and tin (50 mm)" in lost
     touching = laws_here(problem_of(tables)).keys()
     assert touching == {frozenset((name, "ground")) for name in ("can", "tin", "ball")} | {frozenset(("ball", "can"))}

@@ -139,7 +139,7 @@ def test_a_mesh_is_its_hull() -> None:
     near = texts(findings, "approximated")
     off = float(near.partition("up to ")[2].split(" mm")[0])
     assert 5 < off < 40
-    assert len(problem_of(tables).world().pairs) == 16
+    assert len(problem_of(tables).world().pairs) == 8 + 8 + 4
 
 
 def test_a_mesh_may_be_fitted_by_shapes_that_touch_each_other(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -45,7 +45,7 @@ def test_without_a_hand_the_dribbled_ball_comes_less_high() -> None:
     assert height[first:100].max() == pytest.approx(0.8**2 * (0.9 - 0.12), abs=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_guess_catches_the_ball_and_puts_it_elsewhere() -> None:
     """A parabola until the catch; then the ball touches both plates, r / cos(20 degrees) above their seam."""
     made = shipped("catch", "casadi")

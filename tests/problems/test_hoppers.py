@@ -64,7 +64,7 @@ def test_a_short_descent_takes_the_jump_nearer() -> None:
     assert after < 0.65 * before
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_springs_hold_up_the_planar_hopper_in_the_guess() -> None:
     """It stays within 3 cm of its pose, on its foot, and the ground carries its weight."""
     made = shipped("planar_hopper", "casadi")

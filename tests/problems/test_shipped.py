@@ -572,7 +572,7 @@ TABLE = [
     *rows("catch", "ilqr", "ilqr", below=0.07, of=5, wanted=5, finer=3),
     *rows("cost_of_transport", "ilqr multiple_shooting ipopt", "multiple_shooting ipopt",
           law=costs_least_transport),
-    *rows("crane", "race", law=passes_the_wall),
+    *rows("crane", "race", "race", law=passes_the_wall),
     *rows("dismount", "race", "race", law=flies_from_the_bar),
     *rows("door", "race ilqr", "race ilqr", law=turns_the_door, finer=1),
     *rows("dribble", "cma", "cma", of=2, law=pushes_give_what_bounces_take),

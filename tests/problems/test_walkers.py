@@ -141,7 +141,7 @@ def ahead_and_up(made: Transcription, z: Array) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("seconds", "evaluations", "share", "searches"), [(1.0, 120, 0.9, 1), thorough(1.5, 240, 0.8, 3)]
+    ("seconds", "evaluations", "share", "searches"), [thorough(1.0, 120, 0.9, 1), thorough(1.5, 240, 0.8, 3)]
 )
 def test_the_first_steps_of_the_quadruped_help(seconds: float, evaluations: int, share: float, searches: int) -> None:
     """Over a second and more, from values alone: what stood steps ahead, by the middle one of some searches."""

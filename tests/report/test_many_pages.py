@@ -242,7 +242,7 @@ def test_pages_of_older_versions_are_made_again(runs: list[Path], kind: str) -> 
     assert page.read_text("utf-8") == new
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_figures_are_written_where_they_are_asked_for(made: Path, tmp_path: Path) -> None:
     """Of all runs, also where their pages are up to date; the kinds of pages of older versions are warned of."""
     root = Path(shutil.copytree(made / "two_balls", tmp_path / "two_balls"))

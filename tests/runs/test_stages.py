@@ -131,7 +131,7 @@ def test_side_by_side(tmp_path: Path, recorder: Any, seeds: int) -> None:
         assert without_times(one) == without_times(other)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_what_only_the_smoothed_rollout_meets_has_advice(tmp_path: Path) -> None:
     (asked,) = job(tmp_path, (0.1,), "ipopt")
     result = run(asked)

@@ -44,7 +44,7 @@ def made_of(tables: dict[str, Any], **simulation: Any) -> Transcription:
     return transcribe(problem, backend="casadi")
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_a_sled_slides_over_ice_then_asphalt() -> None:
     """Before it stops: velocities exact, places of second order, and exact where no impact may split a step."""
     tables = {**SLED, "phase": [{**SLED["phase"][0], "share": 2 / 3}, {"name": "asphalt"}]}

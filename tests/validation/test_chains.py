@@ -50,7 +50,7 @@ def test_a_cradle_with_gaps_hands_the_blow_on(gap: float) -> None:
     assert cradle.ambiguous == 0
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_enough_cuts_or_a_small_step_resolve_it_in_time() -> None:
     """Four impacts 1 ms apart."""
     assert Cradle(1e-3, Scheme(dt=0.01, cuts=4)).crowded == 0

@@ -98,6 +98,7 @@ vector = st.tuples(number, number, number)
 @pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(vector, vector, vector, vector, st.sampled_from(sorted(LAWS)), st.sampled_from(SMOOTHINGS), st.booleans())
+@pytest.mark.thorough
 def test_random_scenes_are_finite(a, b, va, wa, law, smoothing, snap):
     """Touching, overlapping, aligned, moving: value and slope of five steps."""
     derivatives = slopes_under(law)

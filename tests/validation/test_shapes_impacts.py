@@ -35,8 +35,8 @@ def falling_box(dt: float, mu: float, time_of_impact: bool = True) -> tuple[Arra
     return states["b.position"][-1], states["b.orientation"][-1]
 
 
-@pytest.mark.slow
-@first("mu", [0.3, 0.0])
+@pytest.mark.thorough
+@pytest.mark.parametrize("mu", [0.3, 0.0])
 def test_v12_corner_impact_converges_at_second_order(mu: float) -> None:
     """A turning box: position and orientation against a fine step; without the time of impact it is worse by far."""
     fine = falling_box(0.01 / 32, mu)

@@ -94,8 +94,11 @@ MORE: dict[str, Tables] = {
 }
 
 
-LONGEST = {"load on two boards", "inertia and centre of mass", "orientation", "reactions of joints"}
-"""Examined with ``make thorough``: their steps take up to half a minute to build."""
+LONGEST = {"load on two boards", "inertia and centre of mass", "orientation", "reactions of joints"} | {
+    *("a leg that lands", "loop of joints", "soft joint", "coupling", "screw", "universal joint"),
+    *("anchor and start of a joint", "rolling and torsion", "velocity motor", "affine motor"),
+}
+"""Examined with ``make thorough``: their steps take long to build, and others are examined in the same way."""
 
 
 @few(

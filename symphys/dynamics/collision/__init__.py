@@ -16,6 +16,7 @@ from symphys.dynamics.collision.pairs.capsule_capsule import capsule_capsule
 from symphys.dynamics.collision.pairs.convex_ground import convex_plane, convex_terrain
 from symphys.dynamics.collision.pairs.cylinder_ground import cylinder_plane, cylinder_terrain
 from symphys.dynamics.collision.pairs.ellipsoid_ground import ellipsoid_plane, ellipsoid_terrain
+from symphys.dynamics.collision.pairs.solid_solid import solid_solid
 from symphys.dynamics.collision.pairs.sphere_box import sphere_box
 from symphys.dynamics.collision.pairs.sphere_capsule import sphere_capsule
 from symphys.dynamics.collision.pairs.sphere_sphere import sphere_sphere
@@ -63,6 +64,12 @@ RULES: dict[tuple[type, type], Rule] = {
     (Sphere, Convex): sphere_convex,
     (Capsule, Cylinder): capsule_cylinder,
     (Capsule, Ellipsoid): capsule_ellipsoid,
+    (Capsule, Convex): solid_solid,
+    (Box, Cylinder): solid_solid,
+    (Box, Convex): solid_solid,
+    (Convex, Cylinder): solid_solid,
+    (Convex, Convex): solid_solid,
+    (Cylinder, Cylinder): solid_solid,
 }
 """The rule of each pair of surfaces; ``shapes.POINTS`` says how many points each returns."""
 
@@ -71,7 +78,7 @@ SEPARATE_POINTS = frozenset({(Capsule, Plane), (Box, Plane), (Capsule, Capsule)}
 """Pairs whose points have little in common: each is computed by itself, so that it may be far by itself."""
 
 
-IN_PARTS = frozenset({(Box, Box)})
+IN_PARTS = frozenset({(Box, Box)} | {kinds for kinds, rule in RULES.items() if rule is solid_solid})
 """Pairs whose rules call traced functions."""
 
 
@@ -80,6 +87,8 @@ def collide(first: Surface, second: Surface, a: PredictedPath, b: PredictedPath)
     kinds = type(first), type(second)
     if kinds in IN_PARTS:
         return RULES[kinds](first, second, a, b)
+    if kinds[::-1] in IN_PARTS:
+        return [flipped(contact) for contact in RULES[kinds[::-1]](second, first, b, a)]
     if kinds in SEPARATE_POINTS:
         return [_point(k, first, second, a, b) for k in range(points_of_kinds(*kinds))]
     return _points(first, second, a, b)

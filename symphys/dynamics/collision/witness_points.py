@@ -11,6 +11,9 @@ from symphys.maths.smoothing import length
 from symphys.records import dataclass
 from symphys.types import Expr
 
+HALF = 0.5
+"""The share of a point of contact that lies midway; see ``Witness``."""
+
 
 @dataclass(frozen=True)
 class Witness:
@@ -24,6 +27,7 @@ class Witness:
         off: 1 where the points are no candidates for contact.
         far: the gap [m] that such points are said to have.
         end: of the step [s].
+        share: where the point of contact lies between them: 1 at the first, as of a corner on a face, 0 at the second.
     """
 
     points: tuple[Parabola, Parabola]
@@ -33,6 +37,7 @@ class Witness:
     off: Expr
     far: Expr
     end: Expr
+    share: Expr | float = HALF
 
     def gap(self, t: Expr) -> Expr:
         """Return the gap [m] at time t in the step."""
@@ -42,7 +47,11 @@ class Witness:
         """Implement ``ContactGeometry.frame``; both arms end midway between the surfaces, which adds no spin."""
         n, (a, b), (r_a, r_b) = self._direction(t), self.points, self.radii
         half = ((a - b).at(t) - (r_a + r_b) * n) / 2
-        return Frame(n, (self.arms[0].at(t) - r_a * n - half, self.arms[1].at(t) + r_b * n + half))
+        first, second = self.arms[0].at(t) - r_a * n - half, self.arms[1].at(t) + r_b * n + half
+        if self.share is HALF:
+            return Frame(n, (first, second))
+        beside = (2 * self.share - 1) * half
+        return Frame(n, (first + beside, second + beside))
 
     def gap_after(self, first: Displacement, second: Displacement) -> Expr:
         """Implement ``ContactGeometry.gap_after``."""

@@ -34,7 +34,15 @@ class Convex(SolidShape):
     size_keys: ClassVar[tuple[SizeKey, ...]] = (
         SizeKey("points", "from the centre of the part, along its own axes [m]; 4 to 2000, not in a plane", count=0),
     )
-    contact_points: ClassVar[Mapping[str, int]] = {"plane": SLOTS, "terrain": SLOTS, "sphere": 1}
+    contact_points: ClassVar[Mapping[str, int]] = {
+        "plane": SLOTS,
+        "terrain": SLOTS,
+        "sphere": 1,
+        "capsule": 4,
+        "box": 4,
+        "cylinder": 4,
+        "convex": 4,
+    }
 
     points: Sequence[Sequence[float]]
     centre: tuple[Scalar, ...] = (0.0, 0.0, 0.0)

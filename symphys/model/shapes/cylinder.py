@@ -30,7 +30,14 @@ class Cylinder(SolidShape):
     summary: ClassVar[str] = "A solid cylinder along its own z axis."
     example: ClassVar[str] = "{ radius = 0.05, length = 0.3 }"
     size_keys: ClassVar[tuple[SizeKey, ...]] = (SizeKey("radius"), SizeKey("length", "from end to end [m]"))
-    contact_points: ClassVar[Mapping[str, int]] = {"plane": 6, "terrain": 6, "sphere": 1, "capsule": 3}
+    contact_points: ClassVar[Mapping[str, int]] = {
+        "plane": 6,
+        "terrain": 6,
+        "sphere": 1,
+        "capsule": 3,
+        "box": 4,
+        "cylinder": 4,
+    }
 
     radius: Scalar
     half_length: Scalar

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import cos, sin
+from typing import Protocol
 
 import casadi as ca
 
@@ -32,7 +33,7 @@ from symphys.dynamics.collision.box_geometry import (
 )
 from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.predicted_path import Parabola, PredictedPath
-from symphys.dynamics.collision.witness_points import Witness, contact_of
+from symphys.dynamics.collision.witness_points import HALF, Witness, contact_of
 from symphys.dynamics.tracing.decorator import traced
 from symphys.model.shapes import Box
 from symphys.records import dataclass
@@ -74,10 +75,18 @@ class BoxApproach:
     apart: Expr
     far: Expr
 
-    def contact(self, points: tuple[Parabola, Parabola], normal: Parabola, on: Expr, radius: Expr = 0.0) -> Contact:
-        """Return the midpoint of two points."""
+    def contact(
+        self,
+        points: tuple[Parabola, Parabola],
+        normal: Parabola,
+        on: Expr,
+        radius: Expr = 0.0,
+        share: Expr | float = HALF,
+    ) -> Contact:
+        """Return the contact of two points; ``share``: where it lies between them, see ``Witness``."""
         arms = points[0] - self.bodies[0].centre(), points[1] - self.bodies[1].centre()
-        met = contact_of(Witness(points, arms, normal, (radius, 0.0), ca.logic_not(on), self.far, self.bodies[0].dt))
+        off, dt = ca.logic_not(on), self.bodies[0].dt
+        met = contact_of(Witness(points, arms, normal, (radius, 0.0), off, self.far, dt, share))
         return replace(met, hit=ca.logic_and(met.hit, ca.logic_not(self.apart)))
 
     def flipped(self) -> BoxApproach:
@@ -98,15 +107,18 @@ class FacePoint:
         points: paths of the points on both boxes.
         normal: path of the direction across it, from the second box to the first.
         on: 1 if there is such a corner.
+        share: where contact is between the points; see ``Witness``.
     """
 
     points: tuple[Parabola, Parabola]
     normal: Parabola
     on: Expr
+    share: Expr | float = HALF
 
     def flipped(self) -> FacePoint:
         """Return the corner as seen from the other box."""
-        return FacePoint((self.points[1], self.points[0]), -1 * self.normal, self.on)
+        share = HALF if self.share is HALF else 1 - self.share
+        return FacePoint((self.points[1], self.points[0]), -1 * self.normal, self.on, share)
 
 
 def box_box(first: Box, second: Box, a: PredictedPath, b: PredictedPath) -> list[Contact]:
@@ -138,7 +150,21 @@ def _contact(approach: BoxApproach, point: FacePoint) -> Contact:
     return approach.contact(point.points, point.normal, point.on)
 
 
-def spread_out(candidates: list[FacePoint], ground: Face, t: Expr, size: Expr) -> list[FacePoint]:
+class Flat(Protocol):
+    """A face, of which two directions in it are known."""
+
+    @property
+    def u(self) -> Parabola:
+        """Return the path of one."""
+        ...
+
+    @property
+    def v(self) -> Parabola:
+        """Return the path of the other."""
+        ...
+
+
+def spread_out(candidates: list[FacePoint], ground: Flat, t: Expr, size: Expr) -> list[FacePoint]:
     """Return four of the candidates that carry what all carry; see the module.
 
     Args:
@@ -163,7 +189,10 @@ def spread_out(candidates: list[FacePoint], ground: Face, t: Expr, size: Expr) -
         paths = [(*each.points, each.normal) for each in candidates]
         first, second, normal = (summed(shares, each) for each in zip(*paths, strict=True))
         x, y = (sum(share * place[k] for share, place in zip(shares, places, strict=True)) for k in range(2))
-        return FacePoint((first, second), normal, on), x, y
+        between: Expr | float = HALF
+        if any(each.share is not HALF for each in candidates):
+            between = sum(share * each.share for share, each in zip(shares, candidates, strict=True))
+        return FacePoint((first, second), normal, on, between), x, y
 
     c, s = OUTERMOST
     one, x0, y0 = choose([c * x + s * y - z / TILT for (x, y), z in zip(places, heights, strict=True)], -FAR * size)
