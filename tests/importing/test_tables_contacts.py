@@ -178,3 +178,22 @@ def test_more_points_than_a_world_may_have() -> None:
     tables, findings = read(f"<worldbody>{floor}{links}{'</body>' * 40}</worldbody>")
     assert "there would be 3284 points of contact, and a world may have 2000" in texts(findings, "left out")
     assert len(laws_here(problem_of(tables))) == 40
+
+
+@pytest.mark.parametrize(("corners", "meet"), [(8, True), (60, False)])
+def test_hulls_of_one_robot_meet_if_they_have_few_corners(corners: int, meet: bool) -> None:
+    """Those of two robots do in any case."""
+    points = np.random.default_rng(1).normal(size=(corners, 3))
+    vertices = " ".join(f"{x:.6f}" for x in np.ravel(0.1 * points / np.linalg.norm(points, axis=1)[:, None]))
+    links = "".join(
+        f'<body name="l{k}" pos="{k} 0 1"><joint axis="0 1 0"/><geom type="mesh" mesh="m"/></body>' for k in range(3)
+    )
+    xml = f"""<asset><mesh name="m" vertex="{vertices}"/></asset><worldbody><body name="base" pos="0 0 1"><freejoint/>
+    <geom type="mesh" mesh="m" pos="0 2 0"/>{links}</body>
+    <body name="rock" pos="0 5 1"><freejoint/><geom type="mesh" mesh="m"/></body></worldbody>"""
+    tables, findings = read(xml)
+    lost = texts(findings, "left out")
+    assert ("pairs of bodies of one robot: their hulls have 360 corners" in lost) == (not meet)
+    touching = laws_here(problem_of(tables)).keys()
+    assert (frozenset(("l0", "l1")) in touching) == meet
+    assert frozenset(("l0", "rock")) in touching

@@ -10,6 +10,7 @@ import pytest
 import symphys
 from symphys import simulate
 from symphys.trajectory import Trajectory
+from symphys.transcription import transcribe
 
 CAN = {"cylinder": {"radius": 0.05, "length": 0.1}}
 BOARD = {"name": "board", "shape": {"box": {"size": [1, 1, 0.2]}}, "position": [0, 0, 0.1]}
@@ -181,3 +182,26 @@ def test_hulls_of_many_corners_are_refused_beside_solids() -> None:
         symphys.load({"body": [rock, other], **rest})
     ball = body("ball", {"sphere": {"radius": 0.1}}, (1, 0, 1))
     assert symphys.load({"body": [rock, ball], **rest}).world().pairs
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shape", [pytest.param(CAN, marks=pytest.mark.thorough), cube(0.05)], ids=["can", "hull"])
+def test_gradients_through_their_impacts_are_those_of_differences(shape: Any) -> None:
+    """A bounce with friction on a corner or on a rim."""
+    spun = {"orientation": {"roll_deg": 25, "pitch_deg": 35}, "angular_velocity": [3, 1, 2]}
+    problem = symphys.load(
+        {
+            "simulation": {"duration": 0.25, "dt": 0.01},
+            "contact": {"friction": 0.4, "restitution": 0.4},
+            "block": [BOARD],
+            "body": [body("it", shape, (0, 0, 0.32), **spun)],
+            "variable": [{"name": "v", "sets": "it.velocity", "guess": [0.5, 0.2, -1]}],
+            "cost": [{"name": "c", "value": "sumsqr(it.position - [0.3, 0.1, 0.4]) + 0.1 * sumsqr(it.velocity)"}],
+        }
+    )
+    made = transcribe(problem, backend="casadi")
+    evaluator, z, h = made.shooting.evaluator, made.shooting.start(0), 1e-6
+    slope = evaluator.gradient(z[None], 0.0).gradient
+    assert slope is not None and np.abs(made.simulate(z).contact_force).max() > 0
+    ahead, behind = (evaluator.value(z + sign * h * np.eye(3), 0.0).merit for sign in (1, -1))
+    np.testing.assert_allclose((ahead - behind) / (2 * h), slope[0], rtol=1e-5, atol=1e-7)

@@ -33,6 +33,8 @@ Statement = tuple[tuple[str, Any], ...]
 NO_CONTACT: Statement = (("collide", False),)
 MAX_POINTS = 2000
 """Points of contact that a world may have."""
+MAX_OWN_CORNERS = 200
+"""Corners of hulls, pair by pair, that meet other parts of their own robot: a gripper's fingers have few."""
 MAX_START_OVERLAP = 5e-4
 """[m] Overlap at the start beyond which contact is left out, since it would be pushed out in the first steps."""
 
@@ -63,7 +65,7 @@ def read_contacts(
             reading.note("left out", f"contact of {len(apart)} pairs of bodies of the robot", "as the caller chose")
     kinds = {name: kinds_of(table) for name, table in {**still, **surfaces}.items()}
     meet = without_overlap(reading, owners, without_rule(reading, kinds, meet))
-    meet = few_enough(reading, owners, surfaces, kinds, meet)
+    meet = few_enough(reading, owners, surfaces, kinds, few_hulls(reading, owners, surfaces, meet))
     pairs = write_contacts(reading, classes_of(reading, owners), surfaces, still, meet)
     directed = directed_pairs(reading, owners, meet)
     named = [set(table["between"]) for table in directed]
@@ -239,6 +241,32 @@ def kinds_of(table: Mapping[str, Any]) -> Counter[str]:
 def contact_points(one: str, other: str) -> int:
     """Return the number of contact points of two kinds of surfaces; 0: no rule covers them."""
     return points_of_kinds(SURFACES[one], SURFACES[other])
+
+
+def few_hulls(reading: ModelReading, owners: dict[int, str], surfaces: Tables, meet: PairLaws) -> PairLaws:
+    """Drop contact of hulls with other parts of their own robot, if they have many corners together.
+
+    A step looks at every corner some hundred times, and a robot of meshes has tens of such pairs, of which few meet.
+    """
+    corners = {name: hull_corners(table) for name, table in surfaces.items()}
+    trees = {name: int(reading.model.body_rootid[reading.model.geom_bodyid[geom]]) for geom, name in owners.items()}
+    costs = {
+        names: sum(corners[name] for name in names)
+        for names in meet
+        if set(names) <= surfaces.keys() and trees[names[0]] == trees[names[1]]
+    }
+    hulls, total = {names for names, cost in costs.items() if cost}, sum(costs.values())
+    if total <= MAX_OWN_CORNERS:
+        return meet
+    text = f"their hulls have {total} corners, pair by pair, and those of a robot may have {MAX_OWN_CORNERS}"
+    reading.note("left out", f"contact of {len(hulls)} pairs of bodies of one robot", f"{text}; fit simpler shapes")
+    return {names: law for names, law in meet.items() if names not in hulls}
+
+
+def hull_corners(table: Mapping[str, Any]) -> int:
+    """Return how many points the hulls of a surface have."""
+    parts = table["shape"].get("parts", [table["shape"]]) if "shape" in table else []
+    return sum(len(part["convex"]["points"]) for part in parts if "convex" in part)
 
 
 def few_enough(
