@@ -53,7 +53,7 @@ def test_a_world_is_what_the_file_says() -> None:
     assert np.allclose(*after, rtol=0, atol=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_joints_move_alike() -> None:
     """Of every kind, on either side of bodies, with motors, springs and limits; thirty steps, all bent at the start."""
     world, start = mixed()

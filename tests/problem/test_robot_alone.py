@@ -40,7 +40,7 @@ def alone(tmp_path: Path, text: str, **settings: object) -> Problem:
     return robot_alone(path, settings)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_it_begins_just_above_a_ground_and_holds_its_pose(tmp_path: Path) -> None:
     """The leg, lifted to the side, is the lowest: 0.05 m below its centre."""
     problem = alone(tmp_path, ROBOT)

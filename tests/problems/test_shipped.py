@@ -556,7 +556,7 @@ TABLE = [
     *rows("arm_reach", {"gradient": 150}, "gradient", solved=None, law=reaches_the_point,
           settings=(("simulation.dt", 0.02),)),
     *rows("arm_reach", {"gradient": 150}, "gradient", solved=None, law=reaches_the_point, seeds=3),
-    *rows("bank_shot", {"gradient": 25, "least_squares": 4, "ipopt": 14, "cma": 350}, "gradient", seeds=2),
+    *rows("bank_shot", {"gradient": 25, "least_squares": 4, "ipopt": 14, "cma": 350}, "gradient least_squares", seeds=2),
     *rows("basket", {"least_squares": 5}, quick="least_squares", law=is_the_throw_of_the_formulas, polish=True,
           backend="casadi"),
     *rows("basket", {"gradient": 12, "ipopt": 16, "cma": 300}, law=scores_off_the_board, seeds=2, backend="casadi"),

@@ -49,7 +49,7 @@ def test_v12_corner_impact_converges_at_second_order(mu: float) -> None:
     assert np.abs(falling_box(0.01, mu, time_of_impact=False)[0] - fine[0]).max() > 100 * errors[0, 0]
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_v12_block_topples_about_its_edge() -> None:
     """Angle after half a second, against the pendulum that it is: two corners on the ground, friction holds them."""
     halves, tilt = (0.2, 0.3, 0.5), 0.5
