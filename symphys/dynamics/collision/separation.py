@@ -9,7 +9,6 @@ a rim is nearest, the direction itself, as it is when they meet.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import combinations
 
 import casadi as ca
@@ -18,6 +17,7 @@ from symphys.dynamics.collision.box_geometry import EDGE_MARGIN, MIN_OVERLAP, PA
 from symphys.dynamics.collision.predicted_path import Parabola, chosen
 from symphys.dynamics.collision.solids import MovingSolid
 from symphys.dynamics.collision.witness_points import steady
+from symphys.dynamics.tracing.decorator import traced
 from symphys.maths.smoothing import TINY_SQUARE
 from symphys.records import dataclass
 from symphys.types import Expr
@@ -55,38 +55,77 @@ class SeparatingDirection:
 
 
 def separation_of(a: MovingSolid, b: MovingSolid, dt: Expr) -> SeparatingDirection:
-    """Return how two solids are kept apart within a step."""
-    size = a.solid.size + b.solid.size
-    apart = (a.centre - b.centre).start
-    away = apart + ca.if_else(ca.dot(apart, apart) > TINY_SQUARE, 0, 1) * ca.vertcat(0, 0, size)
-    time, farthest, found = ca.SX(0), ca.SX(1), None
+    """Return how two solids are kept apart within a step, by traced parts."""
+    away, time, found = _between_centres(a, b), ca.SX(0), None
     for rounds, choices in ROUNDS:
-        away, place = nearest_of_cores(a, b, away, time, rounds, size)
-        farthest = ca.SX(1)
+        away, place = nearest_of_cores(a, b, away, time, rounds)
+        farthest: Expr = ca.SX(1)
         for _ in range(choices):
-            found = _along(a, b, away / ca.sqrt(ca.dot(away, away) + TINY_SQUARE), place, time, dt, size)
-            away, time, farthest = found.direction.at(found.time), found.time, ca.logic_and(farthest, found.farthest)
+            found = _along(a, b, away, place, time, dt, farthest)
+            away, time, farthest = _now(found), found.time, found.farthest
     assert found is not None
-    return replace(found, farthest=farthest)
+    return found
 
 
-def nearest_of_cores(a: MovingSolid, b: MovingSolid, away: Expr, t: Expr, rounds: int, size: Expr) -> tuple[Expr, Expr]:
+@traced
+def _between_centres(a: MovingSolid, b: MovingSolid) -> Expr:
+    """Return the vector (3,) from the second centre to the first; upwards where that is none."""
+    apart = (a.centre - b.centre).start
+    return apart + ca.if_else(ca.dot(apart, apart) > TINY_SQUARE, 0, 1) * ca.vertcat(0, 0, _size(a, b))
+
+
+@traced
+def _now(found: SeparatingDirection) -> Expr:
+    return found.direction.at(found.time)
+
+
+def _size(a: MovingSolid, b: MovingSolid) -> Expr:
+    return a.solid.size + b.solid.size
+
+
+@dataclass(frozen=True)
+class Simplex:
+    """Four differences of points of two cores: the first's points, the differences, and shares of the nearest point."""
+
+    firsts: tuple[Expr, ...]
+    points: tuple[Expr, ...]
+    shares: tuple[Expr, ...]
+
+
+def nearest_of_cores(a: MovingSolid, b: MovingSolid, away: Expr, t: Expr, rounds: int) -> tuple[Expr, Expr]:
     """Return the shortest vector (3,) from the core of the second to that of the first, and the first's end of it.
 
     ``away``: a guess.
     """
-    first = a.core(-away, t)
-    firsts, points = [first] * 4, [first - b.core(away, t)] * 4
-    shares, away = [ca.SX(1), ca.SX(0), ca.SX(0), ca.SX(0)], points[0]
+    simplex, away = _simplex_at(a, b, away, t)
     for _ in range(rounds):
-        first, free = a.core(-away, t), ca.SX(1)
-        new = first - b.core(away, t)
-        for k in range(4):  # the new point takes the place of the first one without a share
-            taken = ca.logic_and(free, shares[k] <= 0)
-            firsts[k], points[k] = ca.if_else(taken, first, firsts[k]), ca.if_else(taken, new, points[k])
-            free = ca.logic_and(free, ca.logic_not(taken))
-        away, shares = _nearest_to_origin(points, size)
-    return away, sum(share * point for share, point in zip(shares, firsts, strict=True))
+        simplex, away = _nearer(a, b, simplex, away, t)
+    return away, _place(simplex)
+
+
+@traced
+def _simplex_at(a: MovingSolid, b: MovingSolid, away: Expr, t: Expr) -> tuple[Simplex, Expr]:
+    first = a.core(-away, t)
+    point = first - b.core(away, t)
+    return Simplex((first,) * 4, (point,) * 4, (ca.SX(1), ca.SX(0), ca.SX(0), ca.SX(0))), point
+
+
+@traced
+def _nearer(a: MovingSolid, b: MovingSolid, simplex: Simplex, away: Expr, t: Expr) -> tuple[Simplex, Expr]:
+    firsts, points, shares = list(simplex.firsts), list(simplex.points), simplex.shares
+    first, free = a.core(-away, t), ca.SX(1)
+    new = first - b.core(away, t)
+    for k in range(4):  # the new point takes the place of the first one without a share
+        taken = ca.logic_and(free, shares[k] <= 0)
+        firsts[k], points[k] = ca.if_else(taken, first, firsts[k]), ca.if_else(taken, new, points[k])
+        free = ca.logic_and(free, ca.logic_not(taken))
+    away, found = _nearest_to_origin(points, _size(a, b))
+    return Simplex(tuple(firsts), tuple(points), tuple(found)), away
+
+
+@traced
+def _place(simplex: Simplex) -> Expr:
+    return sum(share * point for share, point in zip(simplex.shares, simplex.firsts, strict=True))
 
 
 def _nearest_to_origin(points: list[Expr], size: Expr) -> tuple[Expr, list[Expr]]:
@@ -126,11 +165,23 @@ def _nearest_to_origin(points: list[Expr], size: Expr) -> tuple[Expr, list[Expr]
     return found, shares
 
 
+@traced
 def _along(
-    a: MovingSolid, b: MovingSolid, away: Expr, place: Expr, t: Expr, dt: Expr, size: Expr
+    a: MovingSolid, b: MovingSolid, away: Expr, place: Expr, t: Expr, dt: Expr, before: Expr
 ) -> SeparatingDirection:
-    """Choose among directions near a unit vector; see the module. ``place``: (3,) where the first's core is nearest."""
-    still = ca.SX.zeros(3)
+    """Choose among directions near a vector; see the module.
+
+    Args:
+        a: the first.
+        b: the second.
+        away: (3,) from the second to the first.
+        place: (3,) where the first's core is nearest.
+        t: when they are looked at [s].
+        dt: length of the step [s].
+        before: 0 where a choice before preferred a top.
+    """
+    still, size = ca.SX.zeros(3), _size(a, b)
+    away = away / ca.sqrt(ca.dot(away, away) + TINY_SQUARE)
     near = Parabola(away, still, still)
     gravity = a.path.gravity if a.path.gravity is not None else b.path.gravity
     # each direction with what it gains: edges must be farther apart than faces, tops are preferred
@@ -164,7 +215,7 @@ def _along(
     now = best.at(t)
     unit = now / ca.sqrt(ca.dot(now, now) + TINY_SQUARE)
     nearest = a.outermost(place, -unit, t), b.outermost(place, unit, t)
-    farthest = own >= highest - 3 * EDGE_MARGIN * size
+    farthest = ca.logic_and(before, own >= highest - 3 * EDGE_MARGIN * size)
     apart = ca.logic_and(first > 0, last > 0)
     return SeparatingDirection(steady(best, met * dt, dt), met * dt, first, apart, nearest, farthest)
 

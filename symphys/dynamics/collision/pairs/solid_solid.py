@@ -24,9 +24,8 @@ from symphys.dynamics.collision.pairs.box_box import (
 )
 from symphys.dynamics.collision.predicted_path import PredictedPath
 from symphys.dynamics.collision.separation import FAR, SeparatingDirection, separation_of
-from symphys.dynamics.collision.solids import MovingFace, Place, moving_solids
+from symphys.dynamics.collision.solids import MovingFace, MovingSolid, Place, moving_solids
 from symphys.dynamics.tracing.decorator import traced
-from symphys.model.shapes import Capsule, Cylinder
 from symphys.types import Expr
 
 DEEPER_SHARE = 1e-5
@@ -37,17 +36,22 @@ Clip = tuple[Expr, Expr]
 
 def solid_solid(first: Any, second: Any, a: PredictedPath, b: PredictedPath) -> list[Contact]:
     """Return four points of the region that both faces cover."""
-    approach, points = _shared_region(first, second, a, b)
+    one, other = _solids(first, second, a, b)
+    near = separation_of(one, other, a.dt)
+    approach, points = _shared_region(one, other, near)
     return [_contact(approach, point) for point in points]
 
 
 @traced
+def _solids(first: Any, second: Any, a: PredictedPath, b: PredictedPath) -> tuple[MovingSolid, MovingSolid]:
+    return moving_solids((first, second), (a, b))
+
+
+@traced
 def _shared_region(
-    first: Any, second: Any, a: PredictedPath, b: PredictedPath
+    one: MovingSolid, other: MovingSolid, near: SeparatingDirection
 ) -> tuple[BoxApproach, tuple[FacePoint, ...]]:
-    one, other = moving_solids((first, second), (a, b))
-    near = separation_of(one, other, a.dt)
-    size = one.solid.size + other.solid.size
+    size, (a, b) = one.solid.size + other.solid.size, (one.path, other.path)
     approach = BoxApproach((a, b), near.direction, near.time, near.apart, ca.fmax(near.distance, 0) + size)
     now = approach.normal.at(near.time)
     unit = now / ca.norm_2(now)
@@ -58,7 +62,7 @@ def _shared_region(
         *(each.flipped() for each in corners_over(ground, face, flipped)),
         *crossings(face, ground, approach),
     ]
-    if isinstance(second, Cylinder | Capsule):  # a line has no inside that others could enter
+    if other.round:  # a line has no inside that others could enter
         candidates += [each.flipped() for each in crossings(ground, face, flipped)]
         candidates.append(lines_crossing(face, ground, approach))
     candidates.append(nearest_points(near, candidates, size))
