@@ -2,7 +2,7 @@
 
 The nearest points of the solids' cores give a first direction (Gilbert, Johnson and Keerthi, A fast procedure for
 computing the distance between complex objects in three-dimensional space, 1988). Cores lie within the solids, so that
-these may touch, and overlap by half of a smallest half size, and still have one. The direction is then that of the
+these may touch, and overlap by a tenth of a smallest half size, and still have one. The direction is then that of the
 normal of a face, or of an edge across an edge, near it, whichever keeps the solids farther apart; or where a corner or
 a rim is nearest, the direction itself, as it is when they meet.
 """

@@ -5,7 +5,7 @@ sides of the one enter and leave the other; of two cylinders also where their ax
 carry, as of two boxes (``box_box``). Where there is none, as of a rim on an edge, the nearest points count.
 
 What it cannot do: two pairs of faces that meet in the same step; solids that have sunk into each other deeper than
-about half of the thinner one may be pushed out at another side.
+about a tenth of the thinner one may be pushed out at another side; rims on rims and edges, beyond about a millimetre.
 """
 
 from __future__ import annotations
