@@ -268,7 +268,7 @@ class Rollout:
 
     @cached_property
     def applied_wrenches(self) -> ca.Function:
-        """What inputs exert on bodies in a step; see ``applied_function``."""
+        """Forces and torques of inputs on bodies in a step; see ``applied_function``."""
         return self.built(applied_function)
 
     @property

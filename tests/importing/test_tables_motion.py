@@ -176,17 +176,21 @@ def test_actuators_at_sites_act_as_mujoco_has_them() -> None:
     <motor name="thrust" site="mount" gear="0 0 1 0 0 0.02" ctrlrange="0 2"/>
     <general name="turn" site="mount" gear="0 0 0 0 0.1 0" gainprm="2" forcerange="-5 3"/>
     <motor name="away" site="mount" refsite="pole" gear="1 0 0 0 0 0"/>
-    <general name="damped" site="mount" gear="1 0 0 0 0 0" biastype="affine" biasprm="0 0 -1"/></actuator>"""
+    <general name="damped" site="mount" gear="1 0 0 0 0 0" biastype="affine" biasprm="0 0 -1"/>
+    <motor name="idle" site="mount" gear="0 0 0 0 0 0"/></actuator>"""
     tables, findings = read(xml)
     sites = by_name(tables, "site")
     assert [name for name, table in sites.items() if "motor" in table] == ["left", "thrust", "turn"]
     assert sites["turn"]["motor"] == {"torque": [0, 0.2, 0], "command_range": [-2.5, 1.5]}
     left = texts(findings, "left out")
     assert "away: it acts along the axes of another site" in left
-    assert "damped: what it gives is not in proportion to its command" in left
+    assert "damped, idle: what it gives is not in proportion to its command" in left
+    still, said = read(f'<option><flag actuation="disable"/></option>{xml}')
+    assert not any("motor" in table for table in still["site"])
+    assert "left, thrust, turn, away, damped, idle: the model's options switch actuators off" in texts(said, "left out")
     model = model_of(xml)
     model.actuator_biasprm[:] = 0  # what is left out
-    data, commands = mujoco_motion(model, 0.3, [3.0, 3.0, 3.0, 0.0, 0.0]), ("left", "thrust", "turn")
+    data, commands = mujoco_motion(model, 0.3, [3.0, 3.0, 3.0, 0.0, 0.0, 0.0]), ("left", "thrust", "turn")
     drive = [{"name": f"u_{name}", "sets": f"{name}.command", "guess": 3.0} for name in commands]
     off = [
         apart(model, data, symphys.simulate(problem_of(tables, 0.3, dt, variable=drive, cost=COST)))

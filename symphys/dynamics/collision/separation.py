@@ -13,7 +13,15 @@ from itertools import combinations
 
 import casadi as ca
 
-from symphys.dynamics.collision.box_geometry import EDGE_MARGIN, MIN_OVERLAP, PARALLEL, crossed, is_nearly_vertical
+from symphys.dynamics.collision.box_geometry import (
+    EDGE_MARGIN,
+    MAX_STEP_UP,
+    MAX_STEP_UP_SHARE,
+    MIN_OVERLAP,
+    PARALLEL,
+    crossed,
+    is_nearly_vertical,
+)
 from symphys.dynamics.collision.predicted_path import Parabola, chosen
 from symphys.dynamics.collision.solids import MovingSolid
 from symphys.dynamics.collision.witness_points import steady
@@ -29,13 +37,11 @@ MIN_SQUARE = 1e-24
 """Squared area or length, by the solids' size, below which points of the search are in a line, or one."""
 FAR = 1e3
 """Times the solids' size: more than any distance."""
-MAX_STEP_UP, MAX_STEP_UP_SHARE = 0.0015, 0.1
-"""[m] the highest step onto which a solid slides or rolls, and as a share of the smaller one's size."""
 
 
 @dataclass(frozen=True)
 class SeparatingDirection:
-    """How two solids are kept apart.
+    """The direction that separates two solids within a step.
 
     Attributes:
         direction: its path, from the second to the first.

@@ -22,8 +22,6 @@ from symphys.model.shapes.hull import face_table
 from symphys.records import dataclass
 from symphys.types import Expr
 
-Own = Sequence[Any]
-"""Three numbers along a solid's own axes."""
 Place = tuple[Expr, Expr]
 """Two numbers in a face [m]."""
 MARGIN, ROUND_MARGIN = 0.1, 0.3
@@ -197,10 +195,8 @@ class CylinderSolid:
         stands = ca.fabs(d[2]) > FLAT_COSINE * ca.sqrt(ca.dot(d, d))
         up, side = sign_of(d[2]) * ca.SX([0, 0, 1]), around
         end = [(r, 0), (0, r), (-r, 0), (0, -r)]
-        line = [(-half, 0), (half, 0), (half, 0), (-half, 0)]
-        corners = tuple(
-            (ca.if_else(stands, x, s), ca.if_else(stands, y, z)) for (x, y), (s, z) in zip(end, line, strict=True)
-        )
+        both = zip(end, self._line, strict=True)
+        corners = tuple((ca.if_else(stands, x, s), ca.if_else(stands, y, z)) for (x, y), (s, z) in both)
         normal = ca.if_else(stands, up, side)
         u = ca.if_else(stands, side, ca.SX([0, 0, 1]))
         origin = ca.if_else(stands, half * up, r * side)
@@ -211,22 +207,20 @@ class CylinderSolid:
         around = self._around(d)
         return [ca.SX([0, 0, 1]), ca.vertcat(-around[1], around[0], 0)]
 
+    @property
+    def _line(self) -> tuple[Place, ...]:
+        """Return the corners of the line of its side."""
+        half = self.half_length
+        return ((-half, 0), (half, 0), (half, 0), (-half, 0))
+
     def _around(self, d: Expr) -> Expr:
         """Return the unit vector (3,) across the axis that is nearest to d."""
         return downhill(-d, ca.SX([0, 0, 1]), ca.SX([1, 0, 0]))
 
 
 @dataclass(frozen=True)
-class CapsuleSolid:
+class CapsuleSolid(CylinderSolid):
     """A capsule along z, by its radius and half length [m]; its core is its axis."""
-
-    radius: Expr
-    half_length: Expr
-
-    @property
-    def size(self) -> Expr:
-        """Implement ``FacedSolid.size``."""
-        return ca.SX(self.radius + self.half_length)
 
     def core(self, d: Expr) -> Expr:
         """Implement ``FacedSolid.core``."""
@@ -238,12 +232,8 @@ class CapsuleSolid:
 
     def face(self, d: Expr) -> OwnFace:
         """Implement ``FacedSolid.face``: along its axis, a radius farther along d."""
-        unit, half = d / ca.sqrt(ca.dot(d, d) + TINY_SQUARE), self.half_length
-        around = downhill(-d, ca.SX([0, 0, 1]), ca.SX([1, 0, 0]))
-        places = ((-half, 0), (half, 0), (half, 0), (-half, 0))
-        return OwnFace(
-            self.radius * unit, around, ca.SX([0, 0, 1]), ca.cross(around, ca.SX([0, 0, 1])), places, ca.SX(0)
-        )
+        unit, around, axis = d / ca.sqrt(ca.dot(d, d) + TINY_SQUARE), self._around(d), ca.SX([0, 0, 1])
+        return OwnFace(self.radius * unit, around, axis, ca.cross(around, axis), self._line, ca.SX(0))
 
     def edges(self, d: Expr) -> list[Expr]:
         """Implement ``FacedSolid.edges``."""

@@ -36,13 +36,14 @@ def site_motor(reading: ModelReading, actuator: int) -> dict[str, Any] | None:
     """Return the motor of a site that an actuator is; None, with a note, if it is none."""
     model, what = reading.model, reading.called("actuator", actuator)
     site, other = (int(each) for each in model.actuator_trnid[actuator])
-    law = None if reading.off("ACTUATION") else actuator_law(reading, actuator)
-    why = ""
-    if other >= 0:
+    law, why = actuator_law(reading, actuator), ""
+    if reading.off("ACTUATION"):
+        why = "the model's options switch actuators off"
+    elif other >= 0:
         why = "it acts along the axes of another site"
     elif reading.links.get(int(model.site_bodyid[site])) is None:
         why = "its site is on a body that cannot move"
-    elif law is not None and (law.bias[0] or law.bias[2] or not law.gain):
+    elif law is not None and (law.bias[0] or law.bias[2] or not law.gain * np.any(model.actuator_gear[actuator])):
         why = "what it gives is not in proportion to its command"
     if why:
         reading.note("left out", what, why)
@@ -52,6 +53,7 @@ def site_motor(reading: ModelReading, actuator: int) -> dict[str, Any] | None:
     if model.actuator_forcelimited[actuator]:
         held = sorted(float(end) / law.gain for end in model.actuator_forcerange[actuator])
         ends = [max(ends[0], held[0]), min(ends[1], held[1])]
+        ends = [ends[0], max(ends)]
     gear = law.gain * np.array(model.actuator_gear[actuator], float)
     motor = {key: numbers(part) for key, part in (("force", gear[:3]), ("torque", gear[3:])) if part.any()}
     return motor | ({"command_range": ends} if np.isfinite(ends).any() else {})

@@ -16,6 +16,7 @@ import casadi as ca
 
 from symphys.dynamics.collision.contact_geometry import Contact
 from symphys.dynamics.collision.pairs.box_box import (
+    FAR,
     MIN_EDGE_CHANGE,
     RIM_SHARE,
     BoxApproach,
@@ -23,7 +24,7 @@ from symphys.dynamics.collision.pairs.box_box import (
     spread_out,
 )
 from symphys.dynamics.collision.predicted_path import PredictedPath
-from symphys.dynamics.collision.separation import FAR, SeparatingDirection, separation_of
+from symphys.dynamics.collision.separation import SeparatingDirection, separation_of
 from symphys.dynamics.collision.solids import MovingFace, MovingSolid, Place, moving_solids
 from symphys.dynamics.tracing.decorator import traced
 from symphys.types import Expr
