@@ -2,11 +2,11 @@
 
 Where hands do not touch the box, or feet leave the ground too late, descent ends in a stationary point far from every
 target. A search among few numbers sees further, and finishes nothing. So CMA-ES searches for a round of generations
-among splines of few knots about the guess. If it is far then, ilqr has a try from the guess, with the problem's own
-costs. A finisher goes on from what was found: exactly first, since a search leaves little to do, then through all
-stages of smoothing. Where that misses, a search has a round near the best point, or the first one goes on. Whenever one
-has found something better, the finisher starts again. The race ends with the first point that meets everything, from
-which it goes on to a stationary point where the problem asks for one.
+among splines of few knots about the guess. If it is far then, ilqr has two tries from the guess: for what is asked for
+alone, and with the problem's own costs. A finisher goes on from what was found: exactly first, since a search leaves
+little to do, then through all stages of smoothing. Where that misses, a search has a round near the best point, or the
+first one goes on. Whenever one has found something better, the finisher starts again. The race ends with the first
+point that meets everything, from which it goes on to a stationary point where the problem asks for one.
 
 Until then costs hold nobody back from what is asked for. The search compares points by ``distance``, and ilqr takes
 targets and constraints in units of their tolerances, beside which costs count little. (A car that should be quick
@@ -73,14 +73,16 @@ LOWEST = "everything is met, and from there no step lowers what it costs: good e
 USED_UP = "the finisher's iterations are used up: raise `finisher_iterations`"
 NEAR_SIGMA = 0.3
 """First standard deviation of a search near what the finisher has found, in units of that of the first search."""
-OWN_ITERATIONS = 100
-"""Iterations of ilqr from the guess with the problem's own costs, in each stage of smoothing."""
+TRY_ITERATIONS = 100
+"""Iterations of ilqr from the guess, in each stage of smoothing."""
 PROMISING = 5.0
 """[tolerances] The largest miss after ``finisher_iterations`` of these with which it goes on. A search that is so near
 is finished first."""
+HALF = 0.5
+"""Share of what the search misses with which a try for what is asked for goes on, too."""
 NAME, SEARCH, NEAR, FINISH, RELAX, POLISH = "race", "search", "near", "finish", "relax", "polish"
-OWN = "own"
-SEARCHES = SEARCH, NEAR
+ASKED, OWN = "asked", "own"
+SEARCHES, TRIES = (SEARCH, NEAR), (ASKED, OWN)
 
 
 @dataclass(frozen=True)
@@ -119,8 +121,8 @@ class RacePart:
 
     Attributes:
         kind: SEARCH; NEAR, a search about what the finisher has found; FINISH, exactly, until everything is met; RELAX
-            likewise through all stages of smoothing; OWN, likewise with the problem's own costs; POLISH, exactly, until
-            the objective is stationary.
+            likewise through all stages of smoothing; ASKED and OWN, as FINISH and RELAX from the guess, OWN with the
+            problem's own costs; POLISH, exactly, until the objective is stationary.
         status, advice: how it ended; INTERRUPTED: a search that goes on.
         z: (n,) its best point.
         objective, max_violation, met: of that point, exactly; see ``Point``.
@@ -192,7 +194,7 @@ class WithFinerSteps:
     """
 
     def __init__(self, problem: ShootingProblem, finer: Callable[[Array], Array], measure: Measure) -> None:
-        """Wrap the evaluator of a problem; ``finer``: z (n,) -> errors (k,); ``measure``: which points come first."""
+        """Wrap the evaluator of a problem; ``finer``: Z (B, n) -> errors (B, k); ``measure``: what comes first."""
         self.problem, self.finer, self.measure = problem, finer, measure
 
     def value(self, Z: Array, smoothing: float) -> Values:
@@ -203,9 +205,9 @@ class WithFinerSteps:
             return values
         errors = values.errors.copy()
         first = met[np.argsort(self.measure(values.objective[met], errors[met]), kind="stable")]
-        for row in first[:CHECKED]:
-            found = self.finer(Z[row])
-            errors[row] = np.maximum(errors[row], np.where(np.isnan(found), FAR, found))
+        checked = first[:CHECKED]
+        found = self.finer(Z[checked])
+        errors[checked] = np.maximum(errors[checked], np.where(np.isnan(found), FAR, found))
         errors[first[CHECKED:]] = np.maximum(errors[first[CHECKED:]], UNCHECKED)
         return replace(values, errors=errors)
 
@@ -302,7 +304,10 @@ class Race:
 
     def _poor(self, kind: str, row: TraceRow) -> bool:
         """Whether a try from the guess ends with this row of its own: it is far after some iterations."""
-        return kind == OWN and row.iteration == self.options.finisher_iterations and row.max_violation > PROMISING
+        if kind not in TRIES or row.iteration != self.options.finisher_iterations:
+            return False
+        searched = min((part.max_violation for part in self.parts if part.kind == SEARCH), default=0.0)
+        return row.max_violation > (PROMISING if kind == OWN else max(PROMISING, HALF * searched))
 
     @property
     def _round_ends(self) -> int:
@@ -322,15 +327,15 @@ class Race:
                 return
             if number + 1 < alone or found.distance >= BETTER * tried:
                 continue
-            tried, trial = found.distance, OWN if self.finisher is ILQR else RELAX
-            if trial == OWN and not guessed and found.max_violation > PROMISING:
+            tried = found.distance
+            if self.finisher is ILQR and not guessed and found.max_violation > PROMISING:
                 guessed = True
-                if (yield from self._finishing(guess, trial)):
+                if (yield from self._from_guess(guess)):
                     return
             guessed = guessed or np.array_equal(found.z, guess)
             if (yield from self._finishing(found.z, FINISH)):
                 return
-            if not guessed and (yield from self._finishing(guess, trial)):
+            if not guessed and (yield from self._from_guess(guess)):
                 return
             guessed = True
         if not guessed and (yield from self._finishing(guess, RELAX)):
@@ -338,6 +343,19 @@ class Race:
         best = self._best()
         assert best is not None, "there was a guess"
         yield POLISH, best.z
+
+    def _from_guess(self, guess: Array) -> Generator[tuple[str, Array], RacePart, bool]:
+        """Say what is tried from the guess (n,); return whether the race is over."""
+        if self.finisher is not ILQR:
+            return (yield from self._finishing(guess, RELAX))
+        for kind in TRIES:
+            found = yield kind, guess
+            if self._over(found):
+                return True
+            if found.met:
+                polished = yield POLISH, found.z
+                return found.confirmed or self._over(polished)
+        return False
 
     def _finishing(self, start: Array, first: str) -> Generator[tuple[str, Array], RacePart, bool]:
         """Say how the finisher goes on from ``start`` (n,), as ``first`` does; return whether the race is over."""
@@ -348,8 +366,6 @@ class Race:
             found = yield kind, start
             if self._over(found):
                 return True
-            if kind == OWN and not found.met:
-                return False
             if found.met or not asks:
                 polished = yield POLISH, found.z
                 return found.confirmed or self._over(polished)
@@ -425,12 +441,12 @@ class Race:
             own = self.finisher.Options(iterations=options.finisher_iterations, **patience)
             return self.finisher, replace(self.problem, smoothing=last), own
         meeting = replace(self.problem, stop_when_met=True)
-        if kind == FINISH:
+        if kind in (FINISH, ASKED):
             meeting = replace(meeting, smoothing=last)
         if kind != OWN and self.finisher is ILQR and self.problem.asking is not None:
             staged = self.problem.asking(start)
             meeting = replace(meeting, staged=lambda: staged, measure=self.compared.measure)
-        iterations = OWN_ITERATIONS if kind == OWN else options.finisher_iterations
+        iterations = TRY_ITERATIONS if kind in TRIES else options.finisher_iterations
         return self.finisher, meeting, self.finisher.Options(iterations=iterations, **patience)
 
     def _measure(self, objectives: Array, errors: Array) -> Array:

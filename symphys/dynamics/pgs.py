@@ -252,18 +252,6 @@ def runs(constraints: Sequence[PlacedConstraint], momenta: Sequence[Velocities])
     return found
 
 
-def apply_start(
-    constraints: Sequence[PlacedConstraint], momenta: AllVelocities, impulses: Sequence[AnyImpulse]
-) -> Iterate:
-    """Apply the impulses that the sweeps start from."""
-    started = list(momenta)
-    for each, impulse in zip(constraints, impulses, strict=True):
-        after = _apply(each.constraint, tuple(started[i] for i in each.carriers), impulse)
-        for i, momentum in zip(each.carriers, after, strict=True):
-            started[i] = momentum
-    return Iterate(tuple(started), tuple(impulses), tuple(impulses))
-
-
 def _with_known_terms(
     constraints: tuple[PlacedConstraint, ...], momenta: Sequence[Velocities]
 ) -> tuple[PlacedConstraint, ...]:
@@ -321,8 +309,3 @@ def _project_run(
 
 def _uses_previous_change(constraint: VelocityConstraint) -> bool:
     return isinstance(constraint, CoordinateConstraint) and constraint.pushed is not None
-
-
-@traced
-def _apply(constraint: VelocityConstraint, momenta: AllVelocities, impulse: AnyImpulse) -> AllVelocities:
-    return constraint.apply(momenta, impulse)

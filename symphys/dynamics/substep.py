@@ -1,4 +1,4 @@
-"""A substep of time: free motion, constraints, loads of faces, sweeps, positions, and the state at its end."""
+"""A substep of time: free motion, constraints, sweeps, positions, and the state at its end."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from symphys.dynamics.collision.contact_geometry import Displacement
 from symphys.dynamics.contact.constraint import ZERO_IMPULSE, ContactConstraint, ContactImpulse
 from symphys.dynamics.contact.coupling import coupled_pairs
 from symphys.dynamics.contact.preparation import SubstepFlags, prepare
+from symphys.dynamics.contact.warm_start import apply_start, distribute_loads, warm_impulses, within_energy
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.free_rotation import turned
 from symphys.dynamics.joints.assembly import (
@@ -35,23 +36,17 @@ from symphys.dynamics.joints.warm_start import (
     project_velocities,
 )
 from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply, isotropic
-from symphys.dynamics.pgs import apply_start, iterate
+from symphys.dynamics.pgs import iterate
 from symphys.dynamics.position_correction import CorrectedConfiguration, close_gaps, displacements, unwrapped_angles
 from symphys.dynamics.prediction import bodies_of, detect_contacts, free_motions, jointed_bodies, predicted_motions
 from symphys.dynamics.tracing.decorator import contiguous, traced
-from symphys.dynamics.unknowns import AllVelocities, Momenta, Momentum, PlacedConstraint
+from symphys.dynamics.unknowns import AllVelocities, Iterate, Momenta, Momentum, PlacedConstraint
 from symphys.maths import rotation
 from symphys.maths.smoothing import TINY_SQUARE
-from symphys.model.shapes import Plane, Terrain
 from symphys.model.state_layout import BODY_FIELDS
-from symphys.model.world import Pair, World
 from symphys.records import dataclass
 from symphys.types import Expr
 
-MAX_DETERMINED_POINTS = 3
-"""Points whose loads follow from the resultant."""
-MIN_SPREAD_SHARE = 1e-12
-"""Least spread of the points along a direction that shares a torque, as a share of their largest."""
 ZERO = ca.SX(0)
 SLIDING_SHARE = 0.999
 """Surfaces count as sliding from this share of the largest friction on."""
@@ -114,10 +109,13 @@ def advance(
     jointed, joints, fitted = joint_constraints(context, x, trees, paths, duration, kick)
 
     # 5-6. velocities: warm start (16), then projections (14, 15, 17)
-    given = distribute_loads(context, constraints, _warm_start(context, constraints, x, kick))
+    given = distribute_loads(context, constraints, warm_impulses(context, constraints, x, kick))
     every = (*(each.placed for each in joints), *constraints)
     states = contiguous(trees.states) if context.near else trees.states
-    start = apply_start(every, states, (*warm_started(context, joints, x, kick), *given))
+    start = apply_start(every[: len(joints)], states, warm_started(context, joints, x, kick))
+    given = within_energy(context, constraints, start.momenta, given)
+    pressed = apply_start(constraints, start.momenta, given)
+    start = Iterate(pressed.momenta, (*start.impulses, *given), (*start.impulses, *given))
     solved = iterate(context, every, start, trees)
     by_joints, impulses = solved.impulses[: len(joints)], solved.impulses[len(joints) :]
     momenta = momenta_of(context, trees, solved.momenta)
@@ -197,34 +195,6 @@ def _stored_joint_forces(context: StepContext, joints: Sequence[JointConstraint]
 def _times(duration: Expr, lag: Expr) -> tuple[Expr, Expr]:
     """Return the time over which impulses act as forces, and the next lag [s]; equation 2."""
     return duration / 2 + lag, duration / 2
-
-
-def _warm_start(
-    context: StepContext, constraints: Sequence[PlacedConstraint], x: State, kick: Expr
-) -> list[ContactImpulse]:
-    """Return the last step's persistent forces, over this step's kick, in this step's frames."""
-    if not context.settings.scheme.warm_start:
-        return [ZERO_IMPULSE for _ in constraints]
-    impulses = []
-    for pair, each in zip(context.world.pairs, constraints, strict=True):
-        force = x[f"{pair.name}.force"]
-        torque = x[f"{pair.name}.torque"] if pair.law.spins else None
-        impulses.append(_warm_impulse(each.constraint, kick, force, torque))
-    return impulses
-
-
-@traced
-def _warm_impulse(constraint: ContactConstraint, kick: Expr, force: Expr, torque: Expr | None) -> ContactImpulse:
-    n = constraint.impulse_normal
-    normal, tangent = _split(kick * force, n)
-    turning = (ZERO_IMPULSE.spin, ZERO_IMPULSE.roll) if torque is None else _split(kick * torque, n)
-    return ContactImpulse(ca.fmax(normal, 0), tangent, *turning).times(constraint.near * constraint.separates)
-
-
-def _split(impulse: Expr, n: Expr) -> tuple[Expr, Expr]:
-    """Split an impulse into its part along n and the rest."""
-    along = ca.dot(n, impulse)
-    return along, impulse - n * along
 
 
 def _store_forces(
@@ -348,66 +318,3 @@ def _end_momentum(motion: PredictedMotion, momentum: Momentum, reactions: tuple[
 @traced
 def _velocities(motion: PredictedMotion, momentum: Momentum, pose: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
     return momentum.velocity, angular_velocity(motion.inertia, pose[1], momentum.angular)
-
-
-def distribute_loads(
-    context: StepContext, constraints: Sequence[PlacedConstraint], impulses: Sequence[ContactImpulse]
-) -> list[ContactImpulse]:
-    """Make normal impulses linear across each face; points that carry no load take no part.
-
-    Rigid bodies leave open how four corners of a box share its weight: sweeps stop at one of many answers, which
-    depends on where they began, with warm start on all steps before. Friction depends on it once the box turns while
-    it slides. So loads are linear across the face, a + b . r, as under a rigid plate on an elastic foundation (Winkler,
-    1867): of all loads with one resultant those with the least sum of squares. The sweeps start from them.
-    """
-    found = list(impulses)
-    if not context.settings.scheme.load_sharing:
-        return found
-    for group in faces(context.world):
-        loads = _linear(tuple(constraints[k].constraint for k in group), tuple(found[k].normal for k in group))
-        for k, load in zip(group, loads, strict=True):
-            found[k] = replace(found[k], normal=load)
-    return found
-
-
-def faces(world: World) -> list[tuple[int, ...]]:
-    """Return pairs, by index, whose points lie in a plane: of one body on a plane, or of two flat shapes."""
-    groups: dict[Any, list[int]] = {}
-    for k, pair in enumerate(world.pairs):
-        if not pair.law.soft:
-            groups.setdefault(_face(world, pair), []).append(k)
-    return [tuple(group) for face, group in groups.items() if face is not None and len(group) > MAX_DETERMINED_POINTS]
-
-
-def _face(world: World, pair: Pair) -> Any:
-    static = world.statics[pair.second.shape] if pair.second.body is None else None
-    if isinstance(static, Terrain):
-        return None
-    return (pair.first.body if isinstance(static, Plane) else pair.first), pair.second
-
-
-@traced
-def _linear(constraints: tuple[ContactConstraint, ...], loads: tuple[Expr, ...]) -> tuple[Expr, ...]:
-    parts = [_share(constraint, load) for constraint, load in zip(constraints, loads, strict=True)]
-    total = sum(parts) + MIN_SPREAD_SHARE
-    arms = [ca.cross(constraint.terms[0].impulse_arm, constraint.impulse_normal) for constraint in constraints]
-    middle = sum(part * arm for part, arm in zip(parts, arms, strict=True)) / total
-    mean = sum(part * load for part, load in zip(parts, loads, strict=True)) / total
-    torque, spread = ca.SX.zeros(3), ca.SX.zeros(3, 3)
-    arms = [arm - middle for arm in arms]
-    for part, arm, load in zip(parts, arms, loads, strict=True):
-        torque += part * load * arm
-        spread += part * ca.mtimes(arm, arm.T)
-    slope = ca.mtimes(
-        ca.inv(spread + (MIN_SPREAD_SHARE * ca.trace(spread) + MIN_SPREAD_SHARE**2) * ca.SX.eye(3)), torque
-    )
-    return tuple(
-        constraint.near * ca.fmax(load + part * (mean + ca.dot(slope, arm) - load), 0)
-        for constraint, part, arm, load in zip(constraints, parts, arms, loads, strict=True)
-    )
-
-
-def _share(constraint: ContactConstraint, load: Expr) -> Expr:
-    """Return the weight of a point, from 0 to 1: 0 for a far one, whatever its numbers are."""
-    near = constraint.near
-    return near * ca.fmax(load - constraint.load, 0) / (ca.fmax(load, constraint.load) + (1 - near))

@@ -65,8 +65,9 @@ def locks(screws: Sequence[Screw], paths: Sequence[Sequence[int]] | None = None)
         q[inner] = np.clip(values, low, high)
         return _least(screws, paths, q)
 
-    if not inner:
-        return least(np.empty(0)) < SINGULAR
+    turning = any(screws[k].point is not None for path in paths for k in path[:-1])
+    if not (inner and turning):  # slides turn nothing that comes after them: all poses are alike
+        return least(np.zeros(len(inner))) < SINGULAR
     from scipy.optimize import minimize  # a start without such chains loads no scipy
 
     starts = np.vstack([low, high, rng.uniform(low, high, (TRIALS, len(inner)))])

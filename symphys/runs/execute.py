@@ -289,15 +289,15 @@ def spent_before(found: RunInspection) -> float:
 
 
 def confirmed(transcription: Transcription, z: Array) -> bool:
-    """Whether z solves the problem, and with half and a quarter of the time step still does."""
+    """Whether z solves the problem, and with finer time steps and more sweeps still does."""
     verdict = transcription.judge(z)
-    finer = Examination.from_json(files.strict({"refined": trust.finer_values(transcription, z)}))
-    return verdict.solved and holds(finer, judged(verdict))
+    rows = ({"refined": [row]} for row in trust.finer_values(transcription, z))
+    return verdict.solved and all(holds(Examination.from_json(files.strict(row)), judged(verdict)) for row in rows)
 
 
-def finer_shares(transcription: Transcription, z: Array) -> Array:
-    """Return (k,) the errors of ``finer_errors`` as shares of what refutes a result."""
-    return trust.finer_errors(transcription, z) / WORST_LIMITS[1]
+def finer_shares(transcription: Transcription, Z: Array) -> Array:
+    """Return (B, k) the errors of ``finer_errors`` as shares of what refutes a result."""
+    return trust.finer_errors(transcription, Z) / WORST_LIMITS[1]
 
 
 def judge(

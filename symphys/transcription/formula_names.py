@@ -20,7 +20,7 @@ from symphys.dynamics.observation import SensedState, named_sensors, sensor_read
 from symphys.expression import Formula
 from symphys.model.state_layout import input_columns, input_sizes, input_symbols
 from symphys.model.world import Scheme, World
-from symphys.problem import ALIVE, DURATION, STEP_LENGTH, Problem, Simulation, Variable, placing
+from symphys.problem import ALIVE, STEP_LENGTH, Problem, Simulation, Variable, placing
 from symphys.problem.references import reference_values
 from symphys.records import dataclass
 from symphys.transcription.sensor_memory import SensorMemory
@@ -122,7 +122,7 @@ class Instant:
 
 @dataclass(frozen=True)
 class Parameters:
-    """The entries of p: physical parameters that variables set, numbers of feedback, the duration if it is free.
+    """The entries of p: physical parameters that variables set, numbers of feedback, the time step if it varies.
 
     Attributes:
         names: in the order of p.
@@ -150,9 +150,7 @@ class Parameters:
         return {name: found[name] for name in self.names[: self.physical]} | self.phases.values(found)
 
     def step_length(self, simulation: Simulation, p: Expr) -> Expr:
-        """Return the time step [s]: a number, or from an entry of ``p`` (np,), as with a free duration."""
-        if DURATION in self.columns:
-            return p[self.columns[DURATION]] / simulation.steps
+        """Return the time step [s]: a number, or an entry of ``p`` (np,), as with a free duration."""
         return p[self.columns[STEP_LENGTH]] if STEP_LENGTH in self.columns else simulation.dt
 
     def scheme(self, simulation: Simulation) -> Scheme:
@@ -164,14 +162,12 @@ def varied_parameters(problem: Problem, timed: bool = False) -> Parameters:
     """Return the parameters that variables set, in order of first mention, and all numbers of feedback.
 
     Feedback is controllers, force laws and phases. Of a problem of a sweep also those in which it differs from others,
-    so that they share what is built. ``timed``: the time step is the last one, where the duration is not free.
+    so that they share what is built. The time step is the last one if ``timed``, or where the duration is free.
     """
     own = dict.fromkeys(slot.name for v in problem.variables if v.kind == "parameter" for slot in v.slots)
     names = (*own, *(name for name in swept_parameters(problem) if name not in own))
     values = {name: problem.parameters[name] for name in names} | problem.weights
-    if problem.free_duration:
-        values |= {DURATION: np.array([problem.simulation.duration])}
-    elif timed:
+    if timed or problem.free_duration:
         values |= {STEP_LENGTH: np.array([problem.simulation.dt])}
     nominal = tuple(ca.DM(value) for value in values.values())
     symbols = tuple(ca.SX.sym(name, value.shape[0]) for name, value in zip(values, nominal, strict=True))

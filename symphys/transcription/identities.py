@@ -60,16 +60,17 @@ OF_STEP = ("sensors", "controllers", "forces", "references", "phases", "terminat
 def step_identity(rollout: Rollout, exact: bool) -> str | None:
     """Return a key of one step: other costs, targets, limits, guesses and durations have the same.
 
-    The duration is part of it where it is free, formulas may name it, or phases act; the time step where it is no
-    parameter.
+    The duration is part of it where formulas may name it, or phases act; the time step where it is no parameter; and
+    whether the duration is free, since tangents then have ``lag``.
     """
     problem, parameters, simulation = rollout.problem, rollout.parameters, rollout.problem.simulation
     world = structure(rollout.world, parameters.symbols, parameters.scheme(simulation))
     columns = [(name, each.start, each.stop) for name, each in parameters.columns.items()]
     own = [getattr(problem, name) for name in OF_STEP]
     phased = any(phase.sets for phase in problem.phases) or any(law.during for law in problem.forces)
-    if problem.free_duration or phased or "duration" in repr(own):
+    if phased or "duration" in repr(own):
         timed: object = simulation
     else:
         timed = None if STEP_LENGTH in parameters.columns else simulation.dt
-    return identity_of(world, timed, own, columns, rollout.inputs, tuple(rollout.memory.columns), exact)
+    columns_of_x = tuple(rollout.memory.columns)
+    return identity_of(world, timed, problem.free_duration, own, columns, rollout.inputs, columns_of_x, exact)

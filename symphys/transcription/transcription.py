@@ -84,6 +84,10 @@ class Transcription:
         _, objective, *parts, _ = (np.array(part).ravel() for part in found)
         return assessment(self.rollout.problem, float(objective[0]), *parts)
 
+    def errors(self, Z: Array) -> Array:
+        """Return (B, k) error / tolerance of what is asked for in the exact rollouts of Z (B, n), side by side."""
+        return self._values_of(Z)[3]
+
     def simulate(self, z: Array, smoothing: float = 0.0) -> Trajectory:
         """Simulate z; NotFinite if a number is not finite."""
         return self.record(z, smoothing).motion
@@ -188,8 +192,12 @@ class Transcription:
         if known is not None:
             return known
         self._cache.gives_probes = False
+        return self._values_of(Z)[-1][:, 0]
+
+    def _values_of(self, Z: Array) -> list[Array]:
+        """Return the results of ``motion_values`` for exact rollouts."""
         X, P = self.steps().states(np.asarray(Z, float), 0.0), row_by_row(self._start, Z)[2]
-        return np.array(row_by_row(self._motion_values, Z, X, P)[-1][:, 0])
+        return row_by_row(self._motion_values, Z, X, P)
 
     def _probe_gradient(self, z: Array) -> Array:
         arrays = self.arrays(z)

@@ -3,7 +3,7 @@
 Its numbers are explained in words by ``symphys.findings``.
 """
 
-from symphys.verification.examination import examine, survey
-from symphys.verification.refinement import finer_errors, finer_values
+from symphys.verification.examination import examine, finer_values, survey
+from symphys.verification.refinement import finer_errors
 
 __all__ = ["examine", "finer_errors", "finer_values", "survey"]

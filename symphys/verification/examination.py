@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,25 @@ PARTS = {
 }
 """The parts of an examination that take time, in their order, and about how much of it each takes; measured with the
 shipped problems, beside some 8 for building the problem."""
+
+
+def finer_values(transcription: Transcription, z: Array) -> Iterator[dict[str, Any]]:
+    """Yield the rows "refined" on which a verdict rests, without gradients, those that take longest last.
+
+    Args:
+        transcription: of a problem.
+        z: (n,) whose motion is finite.
+    """
+    for what in (refinement.FINER_DT, refinement.FINEST_DT):
+        yield refinement.finer_value(transcription, z, what)
+    if transcription.records_contacts and not _settled(transcription, transcription.record(z)):
+        yield refinement.finer_value(transcription, z, refinement.MORE_SWEEPS)
+
+
+def _settled(transcription: Transcription, record: Record) -> bool:
+    """Whether the impulses of contacts have settled, so that more sweeps change nothing."""
+    resolved = contacts(transcription.timed(record).rollout, record)
+    return not resolved["residual"] > refinement.SETTLED * resolved["impulse"]
 
 
 def compare_gradient(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
@@ -158,10 +177,7 @@ def examine(
     tell(SIMULATING)
     record = transcription.record(z)
     timed = transcription.timed(record)
-    settled = False
-    if transcription.records_contacts:
-        resolved = contacts(timed.rollout, record)
-        settled = not resolved["residual"] > refinement.SETTLED * resolved["impulse"]
+    settled = transcription.records_contacts and _settled(transcription, record)
     compared, finer = list[dict[str, Any]](), dict[str, Any]()
     if not slopes:
         finer = refinement.refine(transcription, z, tell, whole, settled, slopes=False)

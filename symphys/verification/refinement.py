@@ -86,19 +86,15 @@ def refine(
     return {"refined": rows, "order": {"objective": order(objectives), "gradient": order(gradients)}}
 
 
-def finer_values(transcription: Transcription, z: Array) -> list[dict[str, Any]]:
-    """Return the rows "refined" of ``refine`` for dt / 2 and dt / 4, without gradients."""
-    rows = []
-    for what in (FINER_DT, FINEST_DT):
-        verdict = finer_problem(transcription, what).judge(z)
-        rows.append({"what": what, "objective": verdict.objective, "worst": verdict.worst, "gradient": {}})
-    return rows
+def finer_value(transcription: Transcription, z: Array, what: str) -> dict[str, Any]:
+    """Return a row "refined" of ``refine`` without gradients."""
+    verdict = finer_problem(transcription, what).judge(z)
+    return {"what": what, "objective": verdict.objective, "worst": verdict.worst, "gradient": {}}
 
 
-def finer_errors(transcription: Transcription, z: Array) -> Array:
-    """Return (k,) error / tolerance of each check with dt / 2 and dt / 4, the larger one; NaN where one is."""
-    verdicts = (finer_problem(transcription, what).judge(z) for what in (FINER_DT, FINEST_DT))
-    return np.asarray(np.max([[check.ratio for check in verdict.checks] for verdict in verdicts], axis=0))
+def finer_errors(transcription: Transcription, Z: Array) -> Array:
+    """Return (B, k) error / tolerance of each check of Z (B, n) with dt / 2 and dt / 4, the larger one, or NaN."""
+    return np.maximum(*(finer_problem(transcription, what).errors(Z) for what in (FINER_DT, FINEST_DT)))
 
 
 def follows(judged: Assessment, row: dict[str, Any]) -> bool:

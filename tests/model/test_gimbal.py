@@ -28,6 +28,7 @@ LOCKING = {
     "axes that are not square": [hinge(Z), hinge([0, 0.6, 0.8]), hinge(X)],
     "three slides and three hinges": [slide(X), slide(Y), slide(Z), hinge(Z), hinge(Y), hinge(X)],
     "two hinges along one line": [hinge(X), hinge(X)],
+    "two slides along one line": [slide(X), slide(X), hinge(Y)],
     "three hinges in a plane, stretched": [hinge(Y), hinge(Y, Z), hinge(Y, 2 * Z)],
     "an armature on the middle hinge alone": [hinge(Z), hinge(Y, carried=True), hinge(X)],
 }
@@ -35,6 +36,7 @@ FREE = {
     "two hinges": [hinge(X), hinge(Y)],
     "two parallel hinges apart": [hinge(X), hinge(X, Z)],
     "a planar root": [slide(X), slide(Z), hinge(Y)],
+    "slides that are not square": [slide(X), slide([0.6, 0, 0.8]), slide(Y), hinge(Y)],
     "an armature on the first hinge": [hinge(Z, carried=True), hinge(Y), hinge(X)],
     "a limit of the middle hinge": [hinge(Z), hinge(Y, limit=1.2), hinge(X)],
 }

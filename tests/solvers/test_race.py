@@ -18,6 +18,7 @@ from symphys.shooting import ShootingProblem
 from symphys.solvers import Counts, Outcome, Status, TraceRow
 from symphys.solvers.core.convergence import PLATEAU_ADVICE
 from symphys.solvers.core.subspace import search_space
+from symphys.solvers.methods import race
 from symphys.solvers.methods.race import CHECKED, FAR, UNCHECKED, WithFinerSteps, distance
 
 SMALL = {"generations": 3, "population": 8, "rounds": 4}
@@ -88,12 +89,13 @@ def test_a_guess_that_is_good_enough_for_ilqr_is_tried_first(monkeypatch: pytest
     found = solve("race", problem, options=tiny, log=words.append)
     assert found.status is Status.MET and [word for word in words if ", part" in word] == [
         "search, part 1 of the race",
-        "own, part 2 of the race",
+        "asked, part 2 of the race",
     ]
+    monkeypatch.setattr(race, "HALF", 0.0)
     short = {**tiny, "finisher_iterations": 2}
     whole = solve("race", problem, options=short, log=given_up.append)
     kinds = [word.split(",")[0] for word in given_up if ", part" in word]
-    assert kinds[:3] == ["search", "own", "finish"] and kinds.count("own") == 1
+    assert kinds[:4] == ["search", "asked", "own", "finish"] and kinds.count("asked") == kinds.count("own") == 1
     for stop in range(6):  # also where the try ends; ilqr rolls out once more where it goes on
         saved = list[dict[str, Any]]()
         keep = partial(lambda saved, make: saved.append(through_json(make())), saved)
@@ -133,9 +135,9 @@ def test_a_search_counts_as_met_what_is_met_with_finer_steps_too() -> None:
     problem = toy(1, lambda z, s: z, errors=lambda z, s: ca.fabs(z))
     asked = list[float]()
 
-    def finer(z: Any) -> Any:
-        asked.append(float(z[0]))
-        return np.array([3.0 if z[0] < 0.2 else np.nan if z[0] < 0.3 else 0.4])
+    def finer(Z: Any) -> Any:
+        asked.extend(Z[:, 0].tolist())
+        return np.where(Z < 0.2, 3.0, np.where(Z < 0.3, np.nan, 0.4))
 
     checked = WithFinerSteps(problem, finer, lambda objectives, errors: objectives)
     Z = np.array([[0.9], [0.1], [2.0], [0.2], [0.5], [0.4]])
@@ -143,7 +145,7 @@ def test_a_search_counts_as_met_what_is_met_with_finer_steps_too() -> None:
     assert asked == [0.1, 0.2, 0.4, 0.5][:CHECKED]
     assert errors.tolist() == [UNCHECKED, 3.0, 2.0, FAR, 0.5, 0.4]
     assert checked.value(Z, 0.1).errors[:, 0].tolist() == pytest.approx(np.abs(Z[:, 0]))
-    found = solve("race", replace(mesa(), finer_errors=lambda z: np.zeros(1)), options=SMALL)
+    found = solve("race", replace(mesa(), finer_errors=lambda Z: np.zeros((len(Z), 1))), options=SMALL)
     same(found, solve("race", mesa(), options=SMALL))
 
 

@@ -11,7 +11,7 @@ from tools.laboratory import Lab
 from worlds.blocks import block
 from worlds.plate import Plate
 
-from symphys.dynamics.substep import faces
+from symphys.dynamics.contact.warm_start import faces
 from symphys.model.shapes import Box, Plane
 from symphys.model.world import Body, Law, Scheme, make_world
 from symphys.types import Array

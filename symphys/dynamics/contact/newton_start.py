@@ -122,9 +122,14 @@ class Member:
     columns: tuple[int, ...]
 
 
-def open_groups(context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State]) -> list[Group]:
-    """Select constraints whose loads may be undetermined, or whose points may lie close together."""
-    if not context.settings.scheme.newton_start:
+def open_groups(
+    context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State], solved: bool = True
+) -> list[Group]:
+    """Select constraints whose loads may be undetermined, or whose points may lie close together.
+
+    ``solved``: those groups alone that Newton's method solves.
+    """
+    if solved and not context.settings.scheme.newton_start:
         return []
     members: dict[int, set[int]] = {k: {k} for k, state in enumerate(states) if state is not None}
     for each in constraints:
@@ -135,7 +140,9 @@ def open_groups(context: StepContext, constraints: Sequence[PlacedConstraint], s
         own = tuple(k for k, each in enumerate(constraints) if each.carriers[0] in carriers)
         size = sum(_size(states[k]) for k in carriers)
         jointed = any(isinstance(states[k], GeneralizedVelocities) for k in carriers)
-        if size <= MAX_GROUP_SIZE and _is_open(context.world, [constraints[k] for k in own], jointed, size):
+        if (size <= MAX_GROUP_SIZE or not solved) and _is_open(
+            context.world, [constraints[k] for k in own], jointed, size
+        ):
             found.append(Group(carriers, own))
     return found
 

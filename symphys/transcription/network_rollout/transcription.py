@@ -52,6 +52,10 @@ class LargeTranscription(Transcription):
         )
         return assessment(self.problem, float(objective[0]), costs, errors, outputs)
 
+    def errors(self, Z: Array) -> Array:
+        """Implement ``Transcription.errors``."""
+        return np.array([[check.ratio for check in self.judge(z).checks] for z in Z])
+
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
         """Implement ``Transcription.record``."""
         motion = self._plain.forward_pass(z, smoothing)

@@ -12,7 +12,7 @@ import numpy as np
 from symphys.codegen.backends import BEST, PRECISIONS, Description
 from symphys.dynamics.observation import SensedState, joint_turn, named_sensors, sensor_readings
 from symphys.model.state_layout import Layout
-from symphys.problem import DURATION, GuessedMotion
+from symphys.problem import STEP_LENGTH, GuessedMotion
 from symphys.problem.guess import ball_joints, guessable, is_orientation, rate_of, turn_between
 from symphys.shooting import AffinePolicy, CompiledRecursion, Expansion, Followed, Linearized, StagedMotion
 from symphys.transcription.objective import bounds
@@ -220,7 +220,7 @@ class RolloutStages:
         problem, columns = self.rollout.problem, self.rollout.parameters.columns
         if not problem.free_duration:
             return 1.0
-        return float(self.parameters(z[None])[0][columns[DURATION]][0]) / problem.simulation.duration
+        return float(self.parameters(z[None])[0][columns[STEP_LENGTH]][0]) / problem.simulation.dt
 
     def prepare(self, slopes: bool) -> None:
         """Implement ``StagedProblem.prepare``."""

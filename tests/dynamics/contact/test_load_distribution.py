@@ -11,8 +11,8 @@ from worlds.contacts import contact_of, numbers
 
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.constraint import ZERO_IMPULSE
+from symphys.dynamics.contact.warm_start import distribute_loads
 from symphys.dynamics.context import make_context
-from symphys.dynamics.substep import distribute_loads
 from symphys.dynamics.unknowns import PlacedConstraint
 from symphys.model.shapes import Box, Plane
 from symphys.model.world import Body, Law, Scheme, make_world
