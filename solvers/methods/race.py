@@ -310,6 +310,11 @@ class Race:
         return row.max_violation > (PROMISING if kind == OWN else max(PROMISING, HALF * searched))
 
     @property
+    def _asks(self) -> bool:
+        """Whether anything is asked for but a low objective."""
+        return not self.parts or not math.isnan(self.parts[0].max_violation)
+
+    @property
     def _round_ends(self) -> int:
         """The number of the row with which a round of the search ends."""
         return len(self.rows) + self.options.generations
@@ -346,7 +351,7 @@ class Race:
 
     def _from_guess(self, guess: Array) -> Generator[tuple[str, Array], RacePart, bool]:
         """Say what is tried from the guess (n,); return whether the race is over."""
-        if self.finisher is not ILQR:
+        if self.finisher is not ILQR or not self._asks:
             return (yield from self._finishing(guess, RELAX))
         for kind in TRIES:
             found = yield kind, guess
@@ -354,12 +359,13 @@ class Race:
                 return True
             if found.met:
                 polished = yield POLISH, found.z
-                return found.confirmed or self._over(polished)
+                if found.confirmed or self._over(polished):
+                    return True
         return False
 
     def _finishing(self, start: Array, first: str) -> Generator[tuple[str, Array], RacePart, bool]:
         """Say how the finisher goes on from ``start`` (n,), as ``first`` does; return whether the race is over."""
-        asks = not self.parts or not math.isnan(self.parts[0].max_violation)
+        asks = self._asks
         kind = first if asks else RELAX
         before, relaxed = math.inf, len(self.problem.smoothing) == 1 or kind == RELAX
         while True:

@@ -297,7 +297,7 @@ def confirmed(transcription: Transcription, z: Array) -> bool:
 
 def finer_shares(transcription: Transcription, Z: Array) -> Array:
     """Return (B, k) the errors of ``finer_errors`` as shares of what refutes a result."""
-    return trust.finer_errors(transcription, Z) / WORST_LIMITS[1]
+    return trust.finer_errors(transcription, Z, WORST_LIMITS[1]) / WORST_LIMITS[1]
 
 
 def judge(

@@ -263,7 +263,7 @@ class ShootingProblem:
             merits, for methods that take no gradient of these. None: by their merits.
         guessed_states: (z (n,), numbers (M,) of states from 1 on, smoothing) -> (M, nx) where the motion is guessed to
             pass. None: where the rollout of z leads.
-        confirms: (z (n,)) -> whether what meets everything still does with finer time steps; None: nobody can say.
+        confirms: (z (n,)) -> whether what meets everything still does in finer simulations; None: nobody can say.
         finer_errors: (Z (B, n)) -> (B, k) the errors with finer time steps, each the largest, as shares of what refutes
             a result; None: nobody can say.
         multipliers: those that a solve of this or a like problem ended with where its guess is, see

@@ -92,9 +92,16 @@ def finer_value(transcription: Transcription, z: Array, what: str) -> dict[str, 
     return {"what": what, "objective": verdict.objective, "worst": verdict.worst, "gradient": {}}
 
 
-def finer_errors(transcription: Transcription, Z: Array) -> Array:
-    """Return (B, k) error / tolerance of each check of Z (B, n) with dt / 2 and dt / 4, the larger one, or NaN."""
-    return np.maximum(*(finer_problem(transcription, what).errors(Z) for what in (FINER_DT, FINEST_DT)))
+def finer_errors(transcription: Transcription, Z: Array, refuted: float) -> Array:
+    """Return (B, k) error / tolerance of each check of Z (B, n) with dt / 2 and dt / 4, the larger one, or NaN.
+
+    Where dt / 2 alone leads to more than ``refuted`` in a check, dt / 4 is not tried.
+    """
+    found = finer_problem(transcription, FINER_DT).errors(Z)
+    held = np.flatnonzero((found <= refuted).all(axis=1))
+    if len(held):
+        found[held] = np.maximum(found[held], finer_problem(transcription, FINEST_DT).errors(Z[held]))
+    return found
 
 
 def follows(judged: Assessment, row: dict[str, Any]) -> bool:

@@ -75,7 +75,7 @@ def test_springs_hold_up_the_planar_hopper_in_the_guess() -> None:
     np.testing.assert_allclose(carried, [0, 0, sum(hops.PLANAR_HOPPER.values()) * GRAVITY], atol=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_with_its_leg_straight_down_the_guess_hops_on_the_spot() -> None:
     """Nothing pushes it aside, and in its three flights the centre of mass falls freely: thrust is an inner force."""
     made = shipped("three_hops", "casadi")

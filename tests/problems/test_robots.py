@@ -20,7 +20,7 @@ from symphys.types import Array
 
 Robot = Callable[..., Problem]
 Simulated = Callable[[str, dict[str, float]], Array]
-QUICK = ("arm", "cart_pendulum", "gait_robot", "hopper")
+QUICK = ("arm", "cart_pendulum", "hopper")
 ROBOTS = ["arm", "cart_pendulum", "gait_robot", "hopper", "mini_cheetah", "quadrotor", "table_robot"]
 LEGS = ("fl", "fr", "hl", "hr")
 SECONDS, DT = 1.0, 0.01

@@ -64,7 +64,7 @@ def test_a_plate_goes_as_far_and_turns_as_far_as_the_formulas() -> None:
     assert angle == pytest.approx(25 / (2 * brake), rel=2e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_the_ground_stops_the_pushed_box_as_coulomb_says() -> None:
     """From 1 m/s it slides by v^2 / (2 mu g) without a turn."""
     sliding = load_problem(find("push_box")).set({"body.box.velocity": [1, 0, 0], "body.feet.velocity": [1, 0, 0]})

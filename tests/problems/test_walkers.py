@@ -92,8 +92,8 @@ def trot(dt: float) -> Transcription:
     return transcribe(load_problem(find("gait_robot_trot"), {"simulation.dt": dt}), backend="casadi")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("dt", [0.01, thorough(0.005)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("dt", [0.01, 0.005])
 def test_the_gait_robot_trots_as_published(dt: float) -> None:
     """0.7 m/s; 80 N m is what the published engine's 4 N m come to in 20 iterations."""
     made = trot(dt)

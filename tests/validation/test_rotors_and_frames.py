@@ -51,7 +51,7 @@ def leg(dt: float) -> Trajectory:
     return simulate(Problem.from_world(world, duration=0.4, dt=dt))
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_rotors_and_several_joints_move_as_mujoco_has_them() -> None:
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(MJCF)

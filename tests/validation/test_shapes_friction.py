@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from tools.laboratory import Lab
-from tools.repeats import first, thorough
+from tools.repeats import thorough
 from worlds.blocks import among, block, turned_by
 
 from symphys.model.shapes import Box, Fixture, Plane
@@ -45,8 +45,8 @@ def slides(kind: str, share: float, heading: float, time: float) -> tuple[Array,
     return np.linalg.norm(states["b.velocity"], axis=1), G * (np.sin(slope) - MU * np.cos(slope)) * time
 
 
-@pytest.mark.slow
-@first("kind", ["plane", "box"])
+@pytest.mark.thorough
+@pytest.mark.parametrize("kind", ["plane", "box"])
 def test_v10_block_sticks_below_the_cone(kind: str) -> None:
     """At 0.998 of it, in every direction: it creeps while the first steps find the forces, then does not move."""
     for heading in SOME[kind]:
