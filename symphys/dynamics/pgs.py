@@ -20,7 +20,7 @@ from itertools import pairwise, takewhile
 import casadi as ca
 
 from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse, precompute
-from symphys.dynamics.contact.newton_start import contact_softness, open_groups, solve_together
+from symphys.dynamics.contact.newton_start import contact_softness, solvable_groups, solve_together
 from symphys.dynamics.context import StepContext
 from symphys.dynamics.joints.assembly import KinematicTrees
 from symphys.dynamics.joints.coordinate_constraint import (
@@ -182,7 +182,7 @@ def iterate(
     """
     world, sweeps, motions = context.world, context.settings.scheme.sweeps, trees.motions
     # loads that statics leaves open: Newton's method
-    for group in open_groups(context, constraints, start.momenta):
+    for group in solvable_groups(context, constraints, start.momenta):
         start = solve_together(group, constraints, start, trees, contact_softness(group, constraints, trees))
     # sweeps, with extrapolations in clusters of unequal masses
     constraints = _with_known_terms(constraints, start.momenta)

@@ -16,7 +16,7 @@ from symphys.dynamics.articulated.forward_kinematics import FinalPose
 from symphys.dynamics.collision.contact_geometry import ZERO_DISPLACEMENT, Contact, Displacement
 from symphys.dynamics.contact.body_term import BodyTerm
 from symphys.dynamics.contact.constraint import ContactConstraint, ContactImpulse
-from symphys.dynamics.contact.newton_start import contact_softness, open_groups, solve_together
+from symphys.dynamics.contact.newton_start import contact_softness, solvable_groups, solve_together
 from symphys.dynamics.context import State, StepContext
 from symphys.dynamics.joints.assembly import JointPath, KinematicTrees
 from symphys.dynamics.joints.coordinate_constraint import CoordinateConstraint
@@ -171,7 +171,7 @@ def _start(
     none = tuple(JointImpulse(ca.SX(0)) for _ in pushes)
     start: Any = along
     found = Iterate(start, none, none)
-    for group in open_groups(context, contacts, along):
+    for group in solvable_groups(context, contacts, along):
         found = solve_together(group, pushes, found, trees, contact_softness(group, contacts, trees), CENTRE_SCHEDULE)
     ended: Any = found.momenta
     return ended, tuple(each.numbers for each in found.impulses)

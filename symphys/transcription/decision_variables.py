@@ -10,7 +10,7 @@ import numpy as np
 from symphys.model.joints.joint import UNWRAPPED
 from symphys.model.state_layout import initial_state, input_columns, inputs_size
 from symphys.model.world import World
-from symphys.problem import DURATION, STEP_LENGTH, Problem, Variable, begin, carried, placing, reposition
+from symphys.problem import STEP_LENGTH, Problem, Variable, begin, carried, placing, reposition
 from symphys.records import dataclass
 from symphys.shooting import VariableBlock
 from symphys.transcription.formula_names import Parameters, spans
@@ -47,8 +47,6 @@ def start_of(
     near = {f"{name}.{UNWRAPPED}": starts[f"{name}.start"] for name in winding}
     initial = {name: ca.MX(ca.DM(value)) for name, value in (problem.initial | starts | near).items()}
     physical = {name: ca.MX(value) for name, value in zip(parameters.names, parameters.nominal, strict=True)}
-    if problem.free_duration:
-        physical[DURATION] = ca.MX(problem.simulation.duration)
     steps, scheduled = problem.simulation.steps, parameters.phases.at(ca.DM(np.arange(problem.simulation.steps)).T)
     u = ca.vertcat(ca.MX.zeros(inputs_size(world, inputs) - scheduled.shape[0], steps), scheduled)
     # Values of z take their places; those of single recordings come last.
@@ -63,11 +61,12 @@ def start_of(
         if variable.kind == "control":
             u = u + _spread_inputs(problem, variable, input_columns(world, inputs), part)
             continue
+        if variable.kind == "duration":
+            physical[STEP_LENGTH] = part / steps
+            continue
         values = initial if variable.kind == "initial" else physical
         for slot in variable.slots:
             values[slot.name] = _replace(values[slot.name], slot.components, part)
-    if problem.free_duration:
-        physical[STEP_LENGTH] = physical.pop(DURATION) / steps
     # Unit quaternions, then bodies carried along by joints and moved parameters.
     varied = {slot.name for variable in problem.variables for slot in variable.slots}
     initial |= {name: _unit(initial[name]) for name in varied if name.endswith(".orientation")}

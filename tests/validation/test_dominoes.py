@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tools.laboratory import Lab
 from tools.repeats import thorough
+from worlds.linkage import energy
 
 from symphys.model.shapes import Box, Plane, Sphere
 from symphys.model.world import Body, Law, Scheme, make_world
@@ -16,7 +17,6 @@ from symphys.types import Array
 HALF, MASS, APART = np.array([0.005, 0.015, 0.03]), 0.01, 0.04
 INERTIA = MASS / 3 * (HALF @ HALF - HALF**2)
 RADIUS, HEAVY = 0.02, 0.03
-GRAVITY = 9.81
 
 
 @cache
@@ -33,17 +33,8 @@ def energies(count: int, speed: float, dt: float) -> Array:
     """The energy after each step [J], of a ball that hits the first domino."""
     start = {"ball.position": [-0.05, 0, RADIUS], "ball.velocity": [speed, 0, 0]}
     start |= {f"d{k}.position": [k * APART, 0, HALF[2]] for k in range(count)}
-    found = row(count, dt).states(start, 0.5)
-    total = np.zeros(len(found["ball.position"]))
-    for name, mass, inertia in (
-        ("ball", HEAVY, 0.4 * HEAVY * RADIUS**2),
-        *((f"d{k}", MASS, INERTIA) for k in range(count)),
-    ):
-        velocity, spin, q = (found[f"{name}.{field}"] for field in ("velocity", "angular_velocity", "orientation"))
-        along = spin + 2 * np.cross(-q[:, 1:], np.cross(-q[:, 1:], spin) + q[:, :1] * spin)  # body frame
-        total += mass * (velocity**2).sum(axis=1) / 2 + (along**2 * inertia).sum(axis=1) / 2
-        total += mass * GRAVITY * found[f"{name}.position"][:, 2]
-    return total
+    lab = row(count, dt)
+    return energy(lab.world, lab.states(start, 0.5))
 
 
 @pytest.mark.slow

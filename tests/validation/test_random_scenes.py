@@ -8,7 +8,7 @@ from worlds.random_worlds import STRUCTURES, draw, lot, steps
 
 Structure = tuple[str, str, str, str]
 FEW = (2, 7)
-"""Structures of the short test: a box and a capsule under all kinds of laws, on the ground, on hills, at a post."""
+"""Structures of the short test: a box and a capsule on the ground and at a post, soft and with torsion."""
 LARGEST = 1e6
 """Of the numbers of a state: bodies of some kg, tenths of a metre apart, at some m/s."""
 

@@ -13,9 +13,9 @@ from symphys.problems import find
 from symphys.shooting import VariableBlock
 from symphys.transcription import transcribe
 from symphys.transcription.judge import Assessment, Criterion
-from symphys.verification import examine
+from symphys.verification import examine, finer_errors, finer_values
 from symphys.verification.examination import _compare_block, compare_gradient
-from symphys.verification.refinement import follows, order
+from symphys.verification.refinement import FINER_DT, FINEST_DT, MORE_SWEEPS, finer_problem, follows, order
 
 THROW = np.array([3.0, 0.1, 3.0, 0.0, -9.0, 0.5])
 
@@ -118,6 +118,24 @@ def test_refined_answers_are_those_of_the_refined_problem(coarse, halved):
     assert [row["objective"] for row in found[::2]] == [half.objective, doubled.objective]
     assert [row["worst"] for row in found[::2]] == [half.worst, doubled.worst]
     assert half.objective != pytest.approx(made.judge(z).objective, rel=1e-6)
+
+
+def test_errors_of_finer_steps_are_those_of_the_judge():
+    """The larger one of half and a quarter of the step; of half of it alone where that refutes a point already."""
+    made = shot()
+    Z = np.array([made.shooting.start(seed) for seed in (1, 2)])
+    half, quarter = (finer_problem(made, what) for what in (FINER_DT, FINEST_DT))
+    both = np.array([[[check.ratio for check in each.judge(z).checks] for z in Z] for each in (half, quarter)])
+    assert (both[1] > 1.0001 * both[0]).any()
+    assert finer_errors(made, Z, np.inf) == pytest.approx(both.max(axis=0), rel=1e-12)
+    assert finer_errors(made, Z, 0.0) == pytest.approx(both[0], rel=1e-12)
+
+
+def test_a_point_is_confirmed_with_more_sweeps_where_impulses_have_not_settled(throw):
+    """As a shot's have not with one sweep, and a throw's have."""
+    made = shot(sweeps=1, newton_start=False)
+    found = [[row["what"] for row in finer_values(each, each.shooting.start(0))] for each in (throw, made)]
+    assert found == [[FINER_DT, FINEST_DT], [FINER_DT, FINEST_DT, MORE_SWEEPS]]
 
 
 @pytest.mark.slow

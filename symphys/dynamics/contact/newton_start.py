@@ -79,10 +79,16 @@ MIN_ENERGY = 1e-30
 
 @dataclass(frozen=True)
 class Group:
-    """Bodies and trees that are solved together, by where their velocities are kept, and all constraints on them."""
+    """Bodies and trees that hang together, by where their velocities are kept, and all constraints on them.
+
+    Attributes:
+        carriers, constraints: by index.
+        size: the number of velocities.
+    """
 
     carriers: tuple[int, ...]
     constraints: tuple[int, ...]
+    size: int
 
 
 @dataclass(frozen=True)
@@ -122,15 +128,17 @@ class Member:
     columns: tuple[int, ...]
 
 
-def open_groups(
-    context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State], solved: bool = True
+def solvable_groups(
+    context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State]
 ) -> list[Group]:
-    """Select constraints whose loads may be undetermined, or whose points may lie close together.
-
-    ``solved``: those groups alone that Newton's method solves.
-    """
-    if solved and not context.settings.scheme.newton_start:
+    """Select the open groups that are small enough to be solved at once; none without ``newton_start``."""
+    if not context.settings.scheme.newton_start:
         return []
+    return [group for group in open_groups(context, constraints, states) if group.size <= MAX_GROUP_SIZE]
+
+
+def open_groups(context: StepContext, constraints: Sequence[PlacedConstraint], states: Sequence[State]) -> list[Group]:
+    """Select constraints whose loads may be undetermined, or whose points may lie close together."""
     members: dict[int, set[int]] = {k: {k} for k, state in enumerate(states) if state is not None}
     for each in constraints:
         together = set().union(*(members[k] for k in each.carriers))
@@ -140,10 +148,8 @@ def open_groups(
         own = tuple(k for k, each in enumerate(constraints) if each.carriers[0] in carriers)
         size = sum(_size(states[k]) for k in carriers)
         jointed = any(isinstance(states[k], GeneralizedVelocities) for k in carriers)
-        if (size <= MAX_GROUP_SIZE or not solved) and _is_open(
-            context.world, [constraints[k] for k in own], jointed, size
-        ):
-            found.append(Group(carriers, own))
+        if _is_open(context.world, [constraints[k] for k in own], jointed, size):
+            found.append(Group(carriers, own, size))
     return found
 
 

@@ -88,13 +88,13 @@ def faces(world: World) -> list[tuple[int, ...]]:
 
 
 def _face(world: World, pair: Pair) -> Any:
-    static = static_of(world, pair)
+    static = _static_of(world, pair)
     if isinstance(static, Terrain):
         return None
     return (pair.first.body if isinstance(static, Plane) else pair.first), pair.second
 
 
-def static_of(world: World, pair: Pair) -> object:
+def _static_of(world: World, pair: Pair) -> object:
     """Return the static shape of a pair; None where its second body moves."""
     return world.statics[pair.second.shape] if pair.second.body is None else None
 
@@ -143,7 +143,7 @@ def within_energy(
     found, shifting = list(impulses), shifting_points(context.world)
     if not (shifting and context.settings.scheme.warm_start):
         return found
-    for group in open_groups(context, constraints, before, solved=False):
+    for group in open_groups(context, constraints, before):
         if shifting.isdisjoint(group.constraints):
             continue
         own = [k for k in group.constraints if not constraints[k].constraint.law.soft]
@@ -162,7 +162,7 @@ def shifting_points(world: World) -> set[int]:
     """Return pairs, by index, of shapes that touch in several points, which are chosen anew in each substep."""
     counts = Counter((pair.first, pair.second) for pair in world.pairs)
     level = {
-        k for k, pair in enumerate(world.pairs) if isinstance(static_of(world, pair), Plane | Terrain) or pair.law.soft
+        k for k, pair in enumerate(world.pairs) if isinstance(_static_of(world, pair), Plane | Terrain) or pair.law.soft
     }
     return {k for k, pair in enumerate(world.pairs) if counts[pair.first, pair.second] > 1} - level
 
