@@ -64,11 +64,13 @@ def rows(
 
 
 def solvers(name: str) -> list[str]:
-    """Return the solvers that a problem names, or those that are chosen for it."""
+    """Return the solvers that a problem names, or those that are chosen for it; none where nothing is asked for."""
     import symphys
     from symphys.runs.choice import chosen
 
     problem = symphys.load(name)
+    if not (problem.costs or problem.targets or problem.constraints):
+        return []  # of `symphys identify`
     return list(problem.solvers or ()) or [each.solver for each in chosen(problem)]
 
 
