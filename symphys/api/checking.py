@@ -20,7 +20,7 @@ from symphys.api.views import html_table
 from symphys.findings import advice
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, MARKS, UNKNOWN, Finding, Judged
-from symphys.findings.numerics import GRADIENT, GRID, reach
+from symphys.findings.numerics import GRADIENT, GRID, SLOPES, reach
 from symphys.findings.physics import sliding
 from symphys.problem import Problem, require_solvable
 from symphys.problem.problem import Source, load
@@ -29,7 +29,7 @@ from symphys.runs import check_tables
 from symphys.transcription import Assessment
 from symphys.verification import examine
 
-TABLE_SUBJECTS = (GRADIENT, GRID)
+TABLE_SUBJECTS = (GRADIENT, GRID, SLOPES)
 """Subjects of findings that the tables of the text show already."""
 MAX_LINE_WIDTH = 110
 """Largest number of characters in a line."""

@@ -26,7 +26,7 @@ def print_examined(examined: Examined) -> None:
     """Print tables, findings and advice."""
     trust, judged = examined.trust, examined.judged
     console = Console(width=None if sys.stdout.isatty() else MAX_LINE_WIDTH)
-    if first := of_influence(trust):
+    if first := of_influence(trust, judged):
         console.print(Text("\n" + printable(first, console)))
     print_table(console, *slopes(trust))
     print_table(console, *answers(trust, judged))

@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, GOOD, MARKS, UNKNOWN, Finding, Judged, worst_of
@@ -14,7 +15,7 @@ from symphys.findings.numerics import (
     GRADIENT,
     GRID,
     GROWTH,
-    SLOPE_LIMITS,
+    SLOPES,
     SMOOTHING,
     gradient_finding,
     growth_finding,
@@ -38,13 +39,16 @@ from symphys.findings.physics import (
 from symphys.findings.writing import capital, listed, percent, show
 
 FAULT, NO_SLOPE = "fault", "zero"
-SUBJECTS = (GRADIENT, GROWTH, GRID, SMOOTHING, ENERGY, CONTACTS)
+SUBJECTS = (GRADIENT, GROWTH, GRID, SLOPES, SMOOTHING, ENERGY, CONTACTS)
 VERDICTS = {GOOD: "agrees", FAIR: "agrees roughly", BAD: "disagrees", UNKNOWN: "not compared"}
 """Of a gradient with differences."""
 
 
 def findings(trust: Examination, judged: Judged) -> list[Finding]:
-    """List a finding for each number of an examination that is known."""
+    """List a finding for each number of an examination that is known.
+
+    None of an accepted result is worse than fair: what is bad there is of its gradients, and refutes nothing.
+    """
     lines = [Finding(FAULT, BAD, "A number that is not finite", "", f"{sentence(trust.fault)}")] if trust.fault else []
     lines += [gradient_finding(check) for check in trust.gradient]
     lines += [refined_finding(refined, judged) for refined in trust.refined]
@@ -55,7 +59,8 @@ def findings(trust: Examination, judged: Judged) -> list[Finding]:
     lines += smoothed_findings(trust.smoothed, judged)
     numbers = ((trust.gained, gains_finding), (trust.momentum, balance_finding))
     lines += [find(trust) for number, find in numbers if not math.isnan(number)]
-    return lines + stop_findings(trust) + jump_findings(trust) + contact_findings(trust, judged)
+    lines += stop_findings(trust) + jump_findings(trust) + contact_findings(trust, judged)
+    return [replace(line, level=FAIR) if line.level == BAD and judged.accepted else line for line in lines]
 
 
 def slopes(trust: Examination) -> tuple[list[str], list[list[str]]]:
@@ -88,11 +93,10 @@ def advice(trust: Examination, judged: Judged) -> str:
         return f"Mend this first, since solvers cannot pass it: {trust.fault}."
     level = {about: worst_of(each.level for each in lines if each.about == about) for about in SUBJECTS}
     parts = (
-        of_influence(trust),
+        of_influence(trust, judged),
         of_misses(trust),
         *(sentence(clause) for clause in obstacles(trust, judged)),
-        of_gradient(level[GRADIENT], level[GROWTH]),
-        of_growth(trust, level[GROWTH], level[GRADIENT]),
+        *(of_accepted(level) if judged.accepted else of_slopes(trust, level)),
         of_grid(trust, level[GRID], judged),
         of_smoothing(level[SMOOTHING]),
         of_physics(lines, level),
@@ -100,15 +104,17 @@ def advice(trust: Examination, judged: Judged) -> str:
     return " ".join(part for part in parts if part)
 
 
-def of_influence(trust: Examination) -> str:
+def of_influence(trust: Examination, judged: Judged) -> str:
     """Advise on variables that change nothing."""
     none = [check.variable for check in trust.gradient if unfelt(check)]
     if not none:
         return ""
+    why = f"The gradient of {listed(none)} is zero or next to it: nothing that the problem asks for depends on it here"
+    if judged.accepted:
+        return f"{why}."
     return (
-        f"The gradient of {listed(none)} is zero or next to it: nothing that the problem asks for depends on it here, "
-        "as where a body is held by friction or misses what it should hit; begin elsewhere, smooth the contacts, or "
-        "use a solver that needs no gradient."
+        f"{why}, as where a body is held by friction or misses what it should hit; begin elsewhere, smooth the "
+        "contacts, or use a solver that needs no gradient."
     )
 
 
@@ -116,6 +122,30 @@ def of_misses(trust: Examination) -> str:
     """Advise on near misses and glancing touches."""
     line = next(iter(miss_findings(trust)), None)
     return f"Close by the motion is another one. {line.meaning}" if line else ""
+
+
+def of_slopes(trust: Examination, level: Mapping[str, str]) -> tuple[str, ...]:
+    """Advise on gradients, for solvers that follow them."""
+    other = (
+        "Simulated more finely the gradient is another one: halve the time step where a solver that follows it stalls."
+    )
+    return (
+        of_gradient(level[GRADIENT], level[GROWTH]),
+        of_growth(trust, level[GROWTH], level[GRADIENT]),
+        other if level[SLOPES] == BAD else "",
+    )
+
+
+def of_accepted(level: Mapping[str, str]) -> tuple[str, ...]:
+    """Say of a result that nothing refutes whether its gradients are right, and whether it is sensitive."""
+    kinks = worst_of([level[GRADIENT], level[SLOPES]]) in (FAIR, BAD)
+    sensitive = level[GROWTH] in (FAIR, BAD)
+    return (
+        "Gradients are right up to what is named below; what was found does not rest on them."
+        if kinks
+        else of_gradient(level[GRADIENT], level[GROWTH]),
+        "The end is sensitive to what comes before." if sensitive else "",
+    )
 
 
 def of_gradient(level: str, growth: str) -> str:
@@ -162,7 +192,7 @@ def of_grid(trust: Examination, level: str, judged: Judged) -> str:
 
 def finer(trust: Examination, judged: Judged) -> str:
     """Name what to refine: that by which the answer changes most."""
-    bad = [row for row in trust.refined if refined_finding(row, judged).level == BAD or row.change > SLOPE_LIMITS[1]]
+    bad = [row for row in trust.refined if refined_finding(row, judged).level == BAD]
     by_sweeps = bad and all(row.what == "sweeps x 2" for row in bad)
     return "add sweeps" if by_sweeps else "halve the time step"
 
@@ -174,7 +204,7 @@ def of_smoothing(level: str) -> str:
     return ""
 
 
-def of_physics(lines: Sequence[Finding], level: dict[str, str]) -> str:
+def of_physics(lines: Sequence[Finding], level: Mapping[str, str]) -> str:
     """Advise on energy, momentum and the contacts."""
     parts = []
     if level[ENERGY] in (FAIR, BAD):

@@ -36,6 +36,8 @@ class Judged:
         met: whether nothing is missed, true also where there is nothing to meet.
         checked: whether there is anything to meet.
         costs: the sum of what is minimised, targets aside; nan where a goal says how small that must be.
+        accepted: whether it is the answer of a run that nothing refutes: what speaks against its gradient alone is no
+            reason not to rely on it.
     """
 
     objective: float
@@ -43,6 +45,7 @@ class Judged:
     met: bool
     checked: bool
     costs: float = math.nan
+    accepted: bool = False
 
 
 def graded(value: float, limits: tuple[float, float]) -> str:

@@ -11,7 +11,7 @@ from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, g
 from symphys.findings.writing import listed, percent, show
 from symphys.records import dataclass
 
-GRADIENT, GRID, GROWTH, SMOOTHING = "gradient", "grid", "growth", "smoothing"
+GRADIENT, GRID, SLOPES, GROWTH, SMOOTHING = "gradient", "grid", "slopes", "growth", "smoothing"
 INFLUENCE = "influence"
 
 NO_INFLUENCE_SHARE = 1e-8
@@ -110,7 +110,7 @@ def slope_finding(trust: Examination) -> list[Finding]:
     if ORDERS[0] <= order <= ORDERS[1]:
         meaning += f" Its error shrinks like dt to the power {show(order, 2)}."
     number = ", ".join(f"{percent(change)} with {what}" for what, change in known)
-    return [Finding(GRID, level, "Change of the gradient", number, meaning)]
+    return [Finding(SLOPES, level, "Change of the gradient", number, meaning)]
 
 
 def unbroken(text: str) -> str:

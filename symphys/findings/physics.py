@@ -48,7 +48,7 @@ COUNTED = (
 """Kinds of steps that are counted: the number in ``Examination``, what it is, and what it means where it is not 0. A
 kind that was not counted is left out, and so are all but the first where there were none."""
 IN_TIME = "Every impact was resolved in time."
-NOT_SOUND = "There were none; but other lines here say that not every impact was resolved."
+NONE = "No body was hit twice in a step."
 
 
 def contact_findings(trust: Examination, judged: Judged) -> list[Finding]:
@@ -147,7 +147,7 @@ def depth_finding(trust: Examination) -> Finding:
         meaning = "The motion begins with surfaces inside each other: bound what is varied so that they begin apart."
     doubt = f"surfaces overlap by {show(trust.deepest, 2)} m{place}"
     number = f"{show(trust.deepest, 2)} m{place}"
-    return Finding(CONTACTS, level, "Deepest penetration", number, meaning, doubt * (level == BAD))
+    return Finding(CONTACTS, level, "Deepest penetration of rigid surfaces", number, meaning, doubt * (level == BAD))
 
 
 def passage_finding(trust: Examination) -> Finding:
@@ -170,7 +170,7 @@ def impact_findings(trust: Examination) -> list[Finding]:
     known = [kind for kind in kinds if not math.isnan(kind[0])]
     sound = not any(number > 0 for number, _, _ in known) and resolved(trust)
     of = f" of {several(int(trust.steps), 'step')}" if math.isfinite(trust.steps) else ""
-    none = IN_TIME if sound else NOT_SOUND
+    none = IN_TIME if sound else NONE
     return [
         Finding(CONTACTS, FAIR if number else GOOD, what, show(number) + of, meaning if number else none)
         for k, (number, what, meaning) in enumerate(known)

@@ -73,6 +73,9 @@ class VariableRecord:
         value, guess: (components, knots); flat in the file, knot after knot, beside their ``shape``.
         lower, upper: (components, knots) bounds, infinite where there is none, which is null in the file.
         unit: of all these; empty for pure numbers, and where it is not known.
+        time: (knots,) [s] of the knots of an input; of one that is held, from when; empty where there are none, and in
+            older files.
+        held: [s] how long each knot holds; 0 where inputs go in straight lines from knot to knot.
     """
 
     name: str
@@ -82,6 +85,8 @@ class VariableRecord:
     lower: Array
     upper: Array
     unit: str = ""
+    time: Array = field(default_factory=lambda: np.zeros(0))
+    held: float = 0.0
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> VariableRecord:
@@ -110,7 +115,8 @@ class VariableRecord:
         flat = {key: getattr(self, key).T.ravel().tolist() for key in ("value", "guess", "lower", "upper")}
         for key in ("lower", "upper"):
             flat[key] = [number if math.isfinite(number) else None for number in flat[key]]
-        return {"sets": list(self.sets), "unit": self.unit, "shape": list(self.value.shape), **flat}
+        times = {"time": self.time.tolist(), "held": self.held} if self.time.size else {}
+        return {"sets": list(self.sets), "unit": self.unit, "shape": list(self.value.shape), **flat, **times}
 
 
 @dataclass(frozen=True)
@@ -191,7 +197,8 @@ class Result:
         counts: evaluations by kind.
         price: measured cost of one evaluation by kind, in rollouts.
         equivalents: the cost of all evaluations in rollouts.
-        seconds: wall time of "build", "compile" and "solve"; what a solver loads beforehand is in none of them.
+        seconds: wall time of "build", "compile", "solve" and, in newer files, "judge"; what a solver loads beforehand
+            is in none of them.
         trust: how far the solution can be trusted, with the keys of ``symphys.findings.examination``; without an
             examination what ``symphys.verification.survey`` measures.
         guess: of the start, exactly: "objective", "worst", the largest error / tolerance, and outputs, by "output: "
@@ -226,7 +233,7 @@ class Result:
     iterations: float = np.nan
     counts: Mapping[str, float] = field(default_factory=dict)
     price: Mapping[str, float] = field(default_factory=dict)
-    equivalents: float = field(default=np.nan, metadata={"label": "Work, in rollouts", "decimals": 1})
+    equivalents: float = field(default=np.nan, metadata={"label": "Work [rollouts]", "decimals": 1})
     seconds: Mapping[str, float] = field(default_factory=dict)
     trust: Mapping[str, Any] = field(default_factory=dict)
     guess: Mapping[str, float] = field(default_factory=dict)

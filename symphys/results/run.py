@@ -62,7 +62,7 @@ class Run(Result):
     @property
     def judged(self) -> Judged:
         """Return the judgement of the exact rollout."""
-        return self.judge(self.met)
+        return replace(self.judge(self.met), accepted=self.accepted)
 
 
 def read_run(folder: Path, root: Path) -> Run:

@@ -221,12 +221,14 @@ def solve(
     spent += spent_before(found)
     at_once = found.result is not None  # without an earlier result nothing counts before the new one is written
     claim.check()
+    began = time.perf_counter()
     keep_guess(job, transcription, start, log, at_once)
     judgement = judge(transcription, outcome, job.examine, tell)
     price = transcription.prices(used(outcome.counts))
     claim.check()
     write(job, transcription, outcome, judgement, price, at_once)
     seconds = {"build": transcription.build_seconds, "compile": transcription.backend.seconds, "solve": spent}
+    seconds["judge"] = time.perf_counter() - began
     return make_result(job, transcription, outcome, judgement, price, seconds)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -14,7 +14,7 @@ from symphys import json_values as values
 from symphys.codegen.backends import Description
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import judge_run
-from symphys.problem import Problem
+from symphys.problem import STEP_LENGTH, Problem, Variable
 from symphys.problem.quantities import formula_units
 from symphys.records import dataclass
 from symphys.results.result import (
@@ -144,10 +144,11 @@ def judged(verdict: Assessment | None) -> Judged:
     return Judged(verdict.objective, verdict.worst, verdict.solved, bool(verdict.checks))
 
 
-def variables(problem: Problem, blocks: Iterable[VariableBlock], z: Array) -> dict[str, VariableRecord]:
+def variables(problem: Problem, blocks: Sequence[VariableBlock], z: Array) -> dict[str, VariableRecord]:
     """Return the variables by name."""
     sets = {v.name: tuple(slot.name for slot in v.slots) for v in problem.variables}
     units = formula_units(problem.world(), (), problem.variables)
+    duration, named = duration_of(problem, z, blocks), {v.name: v for v in problem.variables}
 
     def block(flat: Array, shape: tuple[int, int]) -> Array:
         return flat.reshape(shape[::-1]).T
@@ -161,9 +162,30 @@ def variables(problem: Problem, blocks: Iterable[VariableBlock], z: Array) -> di
             lower=block(each.lower, each.shape),
             upper=block(each.upper, each.shape),
             unit=units.get(each.name, ""),
+            **knot_times(named[each.name], duration),
         )
         for each in blocks
     }
+
+
+def duration_of(problem: Problem, z: Array, blocks: Sequence[VariableBlock]) -> float:
+    """Return how long [s] the motion of z takes."""
+    starts = {each.name: each.start for each in blocks}
+    found = problem.simulation.duration
+    for variable in problem.variables:
+        if variable.kind == "duration":
+            number = float(z[starts[variable.name]])
+            found = number * problem.simulation.steps if variable.slots[0].name == STEP_LENGTH else number
+    return found
+
+
+def knot_times(variable: Variable, duration: float) -> dict[str, Any]:
+    """Return ``time`` and ``held`` of a ``VariableRecord``."""
+    if variable.knots < 2:
+        return {}
+    linear = variable.interpolation == "linear"
+    held = 0.0 if linear else duration / variable.knots
+    return {"time": np.linspace(0, duration, variable.knots, endpoint=linear), "held": held}
 
 
 def guess_values(transcription: Transcription, seed: int) -> dict[str, float]:

@@ -39,6 +39,8 @@ PARTS = {
 }
 """The parts of an examination that take time, in their order, and about how much of it each takes; measured with the
 shipped problems, beside some 8 for building the problem."""
+OF_CONTACTS = ("residual", "deepest", "passed", "gained", "multiple_impacts", "ambiguous_impacts", "paradoxes")
+"""Numbers of ``survey`` that mean nothing where nothing can touch."""
 
 
 def finer_values(transcription: Transcription, z: Array) -> Iterator[dict[str, Any]]:
@@ -230,6 +232,7 @@ def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
     """Measure energy, momentum, jumps, contacts and tunnelling, which takes little time beside a solve.
 
     Where impulses of contacts have not settled, steps or the motion are simulated again with other numbers of sweeps.
+    What is of contacts is nan in a world in which nothing can touch.
 
     Each module says what its numbers are.
     """
@@ -239,4 +242,5 @@ def survey(transcription: Transcription, record: Record) -> dict[str, Any]:
     resolved = contacts(rollout, record)
     size = resolved["residual"], resolved["impulse"]
     again = {**refinement.left(transcription, record, *size), **refinement.resettled(transcription, record.z, *size)}
-    return {**balance(rollout, record), **jumps(rollout, record), **resolved, **again, **tunnelling(rollout, record)}
+    found = {**balance(rollout, record), **jumps(rollout, record), **resolved, **again, **tunnelling(rollout, record)}
+    return found if rollout.world.pairs else found | dict.fromkeys(OF_CONTACTS, np.nan)

@@ -102,7 +102,7 @@ def test_axes_do_not_change_the_numbers(pages: Path) -> None:
     """Errors below the lowest that is drawn are as they were recorded."""
     run = read_run(pages / "ball_throw" / "gradient-seed0", pages)
     found = numbers(run.folder / "figures" / "convergence.csv")
-    assert found["work [rollout equivalents]"] == run.trace["equivalents"].tolist()
+    assert found["work [rollouts]"] == run.trace["equivalents"].tolist()
     assert found["Largest error / tolerance"] == run.trace["max_violation"].tolist()
     assert found["Objective"] == run.trace["objective"].tolist()
 

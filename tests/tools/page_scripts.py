@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from tools.waiting import FOREVER
 
-from symphys.report.pages.markup import HERE, SCRIPTS
+from symphys.report.pages.markup import HERE, SCRIPTS, SHARED
 
 NODE = pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
 
@@ -32,6 +32,8 @@ let frames = 0;
 global.window = { devicePixelRatio: 2 };
 global.document = {
   querySelectorAll: () => [{ querySelector: (name) => parts[name], querySelectorAll: () => views }],
+  addEventListener: (kind, f) => { listeners[`document ${kind}`] = f; },
+  dispatchEvent: (event) => listeners[`document ${event.type}`](event),
 };
 global.ResizeObserver = class { observe() {} };
 global.requestAnimationFrame = (f) => { if (frames++ < 400) setImmediate(() => f(performance.now() + 100 * frames)); };
@@ -74,7 +76,7 @@ def run_script(code: str, *more: str) -> Any:
 def plays_to_the_end(motion: dict[str, Any]) -> None:
     """Look from all sides, go to the middle, then play: time, button and the terminal show that it went well."""
     data = json.dumps(json.dumps(motion))
-    script = "".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
+    script = "".join((HERE / name).read_text(encoding="utf-8") for name in (*SHARED, *SCRIPTS))
     acts = """
     for (const key of ["space click", "side click", "top click"]) listeners[key]();
     parts.input.value = "500";

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from symphys.records import dataclass
+from symphys.report.charts import palette
 from symphys.report.charts.tables import Table, thin
 from symphys.types import Array
 
@@ -34,6 +35,7 @@ class Line:
             "pale" (translucent); "plain": without dots at few samples; "area": shaded down to 0. "points", "dots" and
             "rings" are marks alone: small, large, and hollow ones.
         mark: matplotlib's name of "dots" and "rings" in a figure.
+        links: of "dots" and "rings": the page that each leads to; empty for none.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Line:
     width: float = 1.4
     look: str = ""
     mark: str = "D"
+    links: tuple[str, ...] = ()
 
     def has(self, word: str) -> bool:
         """Whether ``look`` has this word."""
@@ -102,12 +105,12 @@ class Panel:
             x, columns = sampled(group)
             for line, y in zip(group, columns.T, strict=True):
                 values = rounded(y) if self.scale else differences(y)
-                entry = {"x": len(shared), "y": values, "c": line.colour, "w": line.width, "l": line.look}
-                drawn.append({**entry, "n": line.name})
+                entry = {"x": len(shared), "y": values, "w": line.width, "l": line.look, "links": list(line.links)}
+                drawn.append({**entry, "n": line.name, "c": palette.on_page(line.colour)})
             shared.append(x)
         found = {
             "title": f"{self.title}, {self.note}" if self.note else self.title,
-            "lines": [{key: value for key, value in line.items() if value != ""} for line in drawn],
+            "lines": [{key: value for key, value in line.items() if value not in ("", [])} for line in drawn],
             "x": [rounded(x) if self.across else differences(x) for x in shared],
             "along": self.along,
             "scale": self.scale,
@@ -116,7 +119,10 @@ class Panel:
             "beyond": [rounded(np.array(band)) for band in self.beyond],
             "met": self.met,
             "least": list(self.least),
-            "bars": [[bar.name, bar.colour, [list(span) for span in bar.spans], bar.note] for bar in self.bars],
+            "bars": [
+                [bar.name, palette.on_page(bar.colour), [list(span) for span in bar.spans], bar.note]
+                for bar in self.bars
+            ],
             "ticks": rounded(np.array(self.ticks)),
             "stages": [[*rounded(np.array(stage[:2])), stage[2]] for stage in self.stages],
             "end": list(self.end),
@@ -163,7 +169,7 @@ class Chart:
     def to_json(self) -> dict[str, Any]:
         """Return the chart as ``charts.js`` reads it."""
         panels = [panel and panel.to_json() for panel in self.panels]
-        keys = [[key.name, key.colour, key.look] for key in self.keys]
+        keys = [[key.name, palette.on_page(key.colour), key.look] for key in self.keys]
         return {"panels": panels, "columns": self.columns, "keys": keys, "height": self.height}
 
 
@@ -178,6 +184,8 @@ def lines(x: Array, columns: Array, names: Sequence[str], colours: Sequence[str]
 def sampled(group: Sequence[Line]) -> tuple[Array, Array]:
     """Return (rows,) x and (rows, k) y of lines over one x, with as many samples as a page shows."""
     x, columns = group[0].x, np.stack([line.y for line in group], axis=1)
+    if any(line.links for line in group):
+        return x, columns
     if not any(line.has("points") for line in group):
         return thin(x, columns, POINTS)
     chosen = np.linspace(0, len(x) - 1, min(len(x), MARKS)).round().astype(int)

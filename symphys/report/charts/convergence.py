@@ -19,7 +19,7 @@ from symphys.results.trace import OUTPUT
 from symphys.types import Array
 
 WORK, SECONDS = "equivalents", "seconds"
-AXIS_TITLES = {WORK: "work [rollout equivalents]", SECONDS: "time of the solve [s]"}
+AXIS_TITLES = {WORK: "work [rollouts]", SECONDS: "time of the solve [s]"}
 VIOLATION_FLOOR = 1e-3
 """Errors below this share of the tolerance are drawn as this: nothing is gained below it."""
 GRID = 300

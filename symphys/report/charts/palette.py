@@ -43,6 +43,15 @@ def solver_marks(solvers: Iterable[str]) -> dict[str, tuple[str, str]]:
     return {name: KNOWN_SOLVERS.get(name) or spare[name] for name in names}
 
 
+THEMED = {INK: "var(--ink)", BODIES[0]: "var(--accent)", GREY: "var(--grey)"}
+"""Colours that would not be seen on a dark page, as its style sheet names them."""
+
+
+def on_page(colour: str) -> str:
+    """Return a colour as pages write it."""
+    return THEMED.get(colour, colour)
+
+
 def short(text: str, length: int = 38) -> str:
     """Return a name cut to what a figure has room for."""
     return text if len(text) <= length else text[: length - 1] + "\N{HORIZONTAL ELLIPSIS}"

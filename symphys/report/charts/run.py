@@ -185,7 +185,7 @@ def variables_chart(run: Run) -> Chart | None:
         return None
     tables = [table for variable in shown for table in variable_tables(variable)]
     panels = tuple(map(variable_panel, shown))
-    return Chart("variables", "Variables against their knots", panels, tables=tuple(tables), height=2.1)
+    return Chart("variables", "Inputs over time", panels, tables=tuple(tables), height=2.1)
 
 
 def knotted(run: Run) -> list[VariableRecord]:
@@ -208,20 +208,31 @@ def component_names(variable: VariableRecord) -> list[str]:
 
 
 def variable_panel(variable: VariableRecord) -> Panel:
-    """Chart the components against the number of the knot, found and at the guess, and bounds that are near."""
-    knots = np.arange(1, variable.value.shape[1] + 1, dtype=float)
+    """Chart the components over time, found and at the guess, and bounds that are near."""
+    (along, knots), held = abscissa(variable), variable.held > 0
+    if held:  # until its end
+        knots = np.append(knots, knots[-1] + variable.held)
     names = [name or variable.name for name in component_names(variable)][: len(COLOURS)]
     guess = [f"{name} at the guess" for name in names]
-    drawn = [*lines(knots, variable.guess.T, guess, COLOURS, width=0.9, look="dashed")]
-    for name, colour, values, width in zip(names, COLOURS, variable.value, WIDTHS, strict=False):
-        drawn.append(Line(name, colour, knots, values, width))
-    title = f"{variable.name}  ({palette.short(', '.join(variable.sets), 60)}); dashed: the guess"
-    return Panel(title, tuple(drawn), "knot", edges=tuple(near_bounds(variable).tolist()))
+    found, guessed = (np.pad(each, ((0, 0), (0, held)), "edge") for each in (variable.value, variable.guess))
+    drawn = [*lines(knots, guessed.T, guess, COLOURS, width=0.9, look="dashed" + " steps" * held)]
+    for name, colour, values, width in zip(names, COLOURS, found, WIDTHS, strict=False):
+        drawn.append(Line(name, colour, knots, values, width, "steps" * held))
+    unit = f" [{variable.unit}]" * bool(variable.unit)
+    title = f"{variable.name}{unit}, {palette.short(', '.join(variable.sets), 60)}; dashed: the guess"
+    return Panel(title, tuple(drawn), along, edges=tuple(near_bounds(variable).tolist()))
+
+
+def abscissa(variable: VariableRecord) -> tuple[str, Array]:
+    """Return title and values (knots,) of the axis of a variable: time, or numbers of knots in older files."""
+    if variable.time.size == variable.value.shape[1]:
+        return TIME, variable.time
+    return "knot", np.arange(1, variable.value.shape[1] + 1, dtype=float)
 
 
 def variable_tables(variable: VariableRecord) -> list[Table]:
     """Return the numbers of ``variable_panel``."""
-    table: dict[str, Any] = {"knot": np.arange(1, variable.value.shape[1] + 1)}
+    table: dict[str, Any] = dict([abscissa(variable)])
     for k, name in enumerate(component_names(variable)[: len(COLOURS)]):
         label = ".".join(filter(None, [variable.name, name]))
         table |= {label: variable.value[k], f"{label} at the guess": variable.guess[k]}
@@ -258,7 +269,7 @@ def growth_chart(growth: Growth, motion: Trajectory | None) -> Chart | None:
     lost = reach(growth).end
     end = (lost, f"no gradient reaches from the start beyond {show(lost, 2)} s") if math.isfinite(lost) else ()
     title, drawn = "Growth of a change at t until the end", lines(time, factor[:, None], ["growth"], palette.BODIES)
-    panel = Panel(title, drawn, "time t [s]", -1.0, edges=(1.0,), least=least, ticks=ticks, end=end)
+    panel = Panel(title, drawn, TIME, -1.0, edges=(1.0,), least=least, ticks=ticks, end=end)
     tables: list[Table] = [{TIME: time, "growth of a change until the end": factor}]
     tables += [] if begins is None else [{"a contact begins at [s]": begins}]
     return Chart("growth", "Growth of changes until the end", (panel,), tables=tuple(tables), height=1.8)

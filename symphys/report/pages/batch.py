@@ -12,11 +12,14 @@ from symphys.findings.verdict import ACCEPTED
 from symphys.report.charts.convergence import convergence_chart
 from symphys.report.making.stamps import BATCH_PAGE, batch_digest
 from symphys.report.pages import comparison
+from symphys.report.pages.answers import answers_card
 from symphys.report.pages.check_figure import MOST_CHECKS, MOST_DOTS, check_figure, ratios
 from symphys.report.pages.comparison import page_links, run_card, study_card
 from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag
 from symphys.report.pages.run import read_motions
+from symphys.report.pages.sweep import sweep_of, sweep_parts
 from symphys.report.scene.animation import NUMBERS, animation
+from symphys.results.config import settings_words
 from symphys.results.discovery import Entry, Study, read_all, sample, studies
 from symphys.results.drawable import OVERSIZED, drawable, oversized
 from symphys.results.run import BriefReader, Run, with_trace
@@ -54,12 +57,13 @@ def write_batch_report(batch_dir: Path, unmade: Mapping[Path, str] | None = None
     if not runs and not broken:
         raise ReportError(f"{batch_dir}: no run folder at or below it; `symphys solve --out` writes them")
     found = studies(runs)
-    title = found[0].title if len(found) == 1 else f"{writing.several(len(found), 'problem')} in “{name_of(batch_dir)}”"
+    one = len({study.problem for study in found}) == 1
+    title = found[0].title if one else f"{writing.several(len(found), 'problem')} in “{name_of(batch_dir)}”"
     parts = [
         tag("p", "Batch report", class_="kicker"),
         tag("h1", title),
         tag("p", comparison.summary(found, broken), class_="lead"),
-        *(build_tables(found) if len(found) > MOST_STUDIES else build_studies(found)),
+        *build_sections(found),
         comparison.broken_card(broken),
         unmade_card(batch_dir, unmade or {}),
         provenance(runs),
@@ -67,6 +71,24 @@ def write_batch_report(batch_dir: Path, unmade: Mapping[Path, str] | None = None
     ]
     files.write_text(batch_dir / PAGE, page(title, join(parts), digest))
     return batch_dir / PAGE
+
+
+def build_sections(found: Sequence[Study]) -> list[Html]:
+    """Return a sweep as a whole, few problems one after the other, and many as tables."""
+    sweep = sweep_of(found)
+    if sweep is None:
+        return build_tables(found) if len(found) > MOST_STUDIES else build_studies(found)
+    links = page_links(sweep.runs)
+    best = Study(found[0].problem, "", tuple(entry for study in found for entry in study.entries)).best
+    motion = card("The motion", best_motion(best, NUMBERS), note=best_note(best, setting=True))
+    return [*sweep_parts(sweep, links), motion, run_card(found, links)]
+
+
+def best_note(best: Run, setting: bool = False) -> str:
+    """Say which run a motion is of; ``setting``: with its settings."""
+    kind = "best run" if best.verdict in ACCEPTED else "run with the lowest objective" if best.met else CLOSEST
+    where = f" with {settings_words(best.settings)}" * (setting and bool(best.settings))
+    return f"The {kind}: {best.solver}, seed {best.seed}{where}."
 
 
 def unmade_card(root: Path, unmade: Mapping[Path, str]) -> Html:
@@ -135,9 +157,6 @@ def build_study(study: Study, numbers: int, anchor: str, curves: int, every: Htm
     """
     titled, whole = every is None, with_traces(study, curves)
     converged = convergence_chart(f"{anchor}-convergence", drawable(whole))
-    best = study.best
-    kind = "best run" if best.verdict in ACCEPTED else "run with the lowest objective" if best.met else CLOSEST
-    which = f"The {kind}: {best.solver}, seed {best.seed}."
     place = f" in {study.place}" if study.place and study.place != study.problem else ""
     return tag(
         "section",
@@ -146,10 +165,11 @@ def build_study(study: Study, numbers: int, anchor: str, curves: int, every: Htm
         tag("p", f"With {study.settings}.", class_="note") if study.settings else "",
         comparison.study_verdict(study),
         tag("p", OVERSIZED, class_="note") if oversized(whole) or oversized([r.objective for r in study.runs]) else "",
+        answers_card(study),
         card("Solvers", comparison.solver_table(study), note=comparison.table_note(study)),
         every or "",
         card("Convergence", figures([converged] if converged else [], comparison.convergence_note(study, curves))),
-        card("The motion", best_motion(study.best, numbers), note=which),
+        card("The motion", best_motion(study.best, numbers), note=best_note(study.best)),
         targets(study),
         class_="study" if titled else None,
         id=anchor,

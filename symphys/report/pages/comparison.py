@@ -41,7 +41,7 @@ def summary(found: Sequence[Study], broken: Sequence[Run]) -> str:
     for word, meaning in ((DOUBTED, "met, but not to be trusted"), (BEST_FOUND, "the best found with nothing to meet")):
         number = sum(run.verdict == word for run in runs)
         text += f"; {number} {meaning}" if number else ""
-    if len(found) > 1:
+    if len({study.problem for study in found}) > 1:
         whole = sum(all(entry.solved for entry in study.entries) for study in found)
         text += f"; {whole} of {len(found)} problems by every solver that was tried"
     if broken:
@@ -118,9 +118,9 @@ def columns(study: Study) -> list[Measure]:
             fixed.append((kind, lambda run, kind=kind: run.counts.get(kind, math.nan), words.count))  # type: ignore[misc]
     return [
         *fixed,
-        ("work in rollouts", lambda run: run.equivalents, lambda v: words.count(round(v, 1))),
-        ("solve", solve_time, words.seconds),
-        ("build", build_time, words.seconds),
+        ("work [rollouts]", lambda run: run.equivalents, lambda v: words.count(round(v, 1))),
+        ("time of the solve", solve_time, words.seconds),
+        ("time to build", build_time, words.seconds),
     ]
 
 
@@ -134,7 +134,7 @@ def build_time(run: Run) -> float:
     return run.seconds.get("build", math.nan) + run.seconds.get("compile", 0.0)
 
 
-LEAST_IS_BEST = ("work in rollouts", "solve")
+LEAST_IS_BEST = ("work [rollouts]", "time of the solve")
 
 
 def solver_table(study: Study) -> Html:
@@ -205,7 +205,7 @@ def statuses(entry: Entry) -> Html:
 
 def table_note(study: Study) -> str:
     """Explain the table of solvers."""
-    text = "Work counts a rollout as 1 and each derivative by its measured price. Build includes compiling."
+    text = "Work counts a rollout as 1 and each derivative by its measured price. The time to build includes compiling."
     if any(len(entry.runs) > 1 for entry in study.entries):
         text = "Medians over seeds that gave a number. " + text
     return f"{text} {smoothing_note(study)}".rstrip()
@@ -368,8 +368,8 @@ def run_card(found: Sequence[Study], links: Mapping[str, str]) -> Html:
         NumberColumn("error / tolerance", [run.worst_ratio for run in runs]),
         *output_columns(runs),
         NumberColumn("rollouts", [run.counts.get("rollouts", math.nan) for run in runs]),
-        NumberColumn("work in rollouts", [run.equivalents for run in runs]),
-        NumberColumn("solve [s]", [solve_time(run) for run in runs]),
+        NumberColumn("work [rollouts]", [run.equivalents for run in runs]),
+        NumberColumn("time of the solve [s]", [solve_time(run) for run in runs]),
         LinkColumn("page", "open", [links.get(run.place, "") for run in runs]),
     ]
     return card("All runs", row_table(columns, "run"), anchor="runs", note=HOW_SHOWN)
@@ -417,8 +417,10 @@ def study_card(found: Sequence[Study], links: Mapping[str, str], most: int) -> H
         NumberColumn("solved", [entry.solved for _, entry in entries]),
         NumberColumn("objective", [entry.median([run.objective for run in entry.runs]) for _, entry in entries]),
         NumberColumn("lowest objective", [run.objective for run in best]),
-        NumberColumn("work in rollouts", [entry.median([r.equivalents for r in entry.runs]) for _, entry in entries]),
-        NumberColumn("solve [s]", [entry.median([solve_time(run) for run in entry.runs]) for _, entry in entries]),
+        NumberColumn("work [rollouts]", [entry.median([r.equivalents for r in entry.runs]) for _, entry in entries]),
+        NumberColumn(
+            "time of the solve [s]", [entry.median(list(map(solve_time, entry.runs))) for _, entry in entries]
+        ),
         LinkColumn("best run", "open", [links.get(run.place, "") for run in best]),
     ]
     note = (

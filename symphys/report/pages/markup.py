@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
+from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart
 
 VOID = frozenset({"br", "img", "input", "link", "meta"})
@@ -82,7 +83,7 @@ def banner(level: str, title: str, *sentences: str) -> Html:
 
 def dot(colour: str) -> Html:
     """Return a spot of a solver's or body's colour."""
-    return tag("span", class_="dot", style=f"background:{colour}", aria_hidden="true")
+    return tag("span", class_="dot", style=f"background:{palette.on_page(colour)}", aria_hidden="true")
 
 
 def figures(charts: Iterable[Chart], caption: Part = "") -> Html:
@@ -156,7 +157,7 @@ def page(title: str, body: Part, digest: str = "") -> str:
 @cache
 def packed_scripts(animated: bool, charts: bool, rows: bool) -> tuple[str, str, str]:
     """Return the script that unpacks, the script that it unpacks, and the latter compressed."""
-    parts = (SCRIPTS, animated), (SHARED, charts or rows), (CHARTS, charts), (ROWS, rows)
+    parts = (SHARED, animated or charts or rows), (SCRIPTS, animated), (CHARTS, charts), (ROWS, rows)
     then = squeezed(read_static(*(name for names, wanted in parts if wanted for name in names)))
     return read_static(UNPACK), then, pack(then)
 
@@ -186,7 +187,19 @@ def document(title: str, body: Part, scripts: Html, allowed: Collection[str], di
         tag("title", title),
         tag("style", Html(read_static("page.css"))),
     )
-    return "<!doctype html>\n" + tag("html", head, tag("body", tag("main", body), scripts), lang="en") + "\n"
+    return "<!doctype html>\n" + tag("html", head, tag("body", theme(), tag("main", body), scripts), lang="en") + "\n"
+
+
+def theme() -> Html:
+    """Return the switch between light and dark pages, which works without a script."""
+    names = (("system", "System"), ("light", "Light"), ("dark", "Dark"))
+    choices = []
+    for key, title in names:
+        checked = "" if key == "system" else None
+        choices += [
+            tag("label", tag("input", type="radio", name="theme", id=f"theme-{key}", checked=checked), f" {title}")
+        ]
+    return tag("fieldset", *choices, class_="theme", aria_label="Colours of the page")
 
 
 def slug(text: str) -> str:

@@ -29,6 +29,8 @@ from symphys.trajectory import Trajectory
 OFTEN_SATURATED = 0.25
 """A motor that is saturated for this share of the time is marked in the table."""
 MOST_ROWS = 60
+ROUNDING = 1e-9
+"""[m] below which joints hold."""
 MOST_NAMED = 4
 HEADER = ("joint", "moves over", "limits", "motor", "largest torque or force", "saturated")
 HOW_FORCED = (
@@ -150,7 +152,9 @@ def separation_sentence(trajectory: Trajectory) -> str:
     found = separation(trajectory)
     if found is None:
         return ""
-    where = f" ({found.joint} at t = {show(found.time)} s)" if found.most > 0 else ""
+    if found.most < ROUNDING:
+        return "Joints hold to rounding."
+    where = f" ({found.joint} at t = {show(found.time)} s)"
     return f"Joints come apart by {show(found.rms, 2)} m (root mean square) and {show(found.most, 2)} m at most{where}."
 
 

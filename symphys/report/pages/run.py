@@ -121,9 +121,9 @@ def build(run: Run, recording: RecordedMotion, charts: Mapping[str, Chart]) -> H
     motion, scene = recording.trajectory, recording.scene
     played = motion_card(motion, scene, recording.guess, recording.faults)
     cards = [
+        sections.found(run, charts),
         sections.checks(run),
         played if motion is not None or run.readable else Html(""),
-        sections.found(run, charts),
         sections.trusted(run, charts),
         sections.stage_card(run),
         sections.convergence(run, charts),

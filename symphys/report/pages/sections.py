@@ -13,7 +13,7 @@ from symphys import json_values as values
 from symphys.findings import writing
 from symphys.findings.advice import advice, answers, findings, slopes
 from symphys.findings.examination import Examination
-from symphys.findings.levels import MARKS, Judged
+from symphys.findings.levels import GOOD, MARKS, Judged
 from symphys.findings.physics import sliding
 from symphys.findings.verdict import ending
 from symphys.findings.writing import capital, show
@@ -25,6 +25,7 @@ from symphys.report.pages.markup import (
     Html,
     banner,
     card,
+    dot,
     facts,
     fold,
     join,
@@ -49,6 +50,12 @@ FOOTER = tag(
     " writes its figures as SVG, and the numbers in them as CSV.",
 )
 MOST_ROWS = 60
+MOST_COMPONENTS = 8
+"""Components of a variable that have a row each, at most; of more there is the range, and a fold with all."""
+ROUNDING = 1e-9
+"""Share of an objective below which a part of it is rounding."""
+MOST_NUMBERS = 200
+"""Components of a variable that a page lists, at most; result.json has all."""
 LOG_TAIL = 20_000
 HOW_JUDGED = (
     "Judged by an exact rollout of the result, without smoothing. The bar ends at the error, the line is the tolerance."
@@ -77,9 +84,9 @@ HOW_BALANCED = (
 )
 HOW_REFINED = "The same variables, simulated otherwise: the answers, and in percent how much the gradients change."
 CHAPTERS = (
+    ("found", "Found"),
     ("checks", "Checks"),
     ("motion", "Motion"),
-    ("found", "Found"),
     ("trust", "Verification"),
     ("stages", "Stages"),
     ("convergence", "Convergence"),
@@ -105,7 +112,7 @@ def header(run: Run, cards: Sequence[Html]) -> Html:
             tag("p", f"It starts from what {guess} found.", class_="note") if guess else "",
             tag("h1", run.title),
             *(tag("p", part, class_="lead") for part in re.split(r"\n\s*\n", run.description.strip()) if part),
-            banner(words.level(run), words.headline(run), words.verdict(run), run.advice, *unread),
+            banner(words.level(run), words.headline(run), words.verdict(run), words.next_step(run), *unread),
             tag("nav", *links, aria_label="Sections") if run.readable else "",
         ]
     )
@@ -155,17 +162,26 @@ def checks(run: Run) -> Html:
         ]
         for check in run.checks
     ]
-    costs = facts([(name, show(value, 4)) for name, value in run.costs.items()])
+    costs = facts([(name, show(value, 4)) for name, value in objective_parts(run)])
     return card(
         "Targets and constraints",
         table(["name", "error", "tolerance", "ratio", "", ""], rows, "tnnntt", "Checks") if rows else "",
-        tag("h3", "Costs, weighted") if costs else "",
+        tag("h3", f"The objective, {show(run.objective, 4)}, in its parts") if costs else "",
         costs,
         tag("h3", "Reported quantities") if run.outputs else "",
         facts([(name, output_line(run, name)) for name in run.outputs]),
         anchor="checks",
         note=HOW_JUDGED,
     )
+
+
+def objective_parts(run: Run) -> list[tuple[str, float]]:
+    """Return the weighted costs by name, and what targets and penalties add to them, unless it is rounding."""
+    parts = list(run.costs.items())
+    rest = run.objective - sum(run.costs.values())
+    if parts and abs(rest) > ROUNDING * max(map(abs, [run.objective, *run.costs.values()])):
+        parts.append(("targets and constraints, weighted", rest))
+    return parts
 
 
 def joined(number: str, unit: str) -> str:
@@ -187,9 +203,12 @@ def gauge(check: CheckRecord) -> Html:
 
 def found(run: Run, charts: Mapping[str, Chart]) -> Html:
     """Variables with one knot as a table, those with many as curves."""
-    rows = [row for variable in run.variables if variable.value.shape[1] == 1 for row in variable_rows(variable)]
+    single = [variable for variable in run.variables if variable.value.shape[1] == 1]
+    rows = [row for variable in single for row in variable_rows(variable)]
     more = tag("p", f"and {len(rows) - MOST_ROWS} more, in result.json", class_="note") if len(rows) > MOST_ROWS else ""
-    header = ["variable", "guess", "found", "lower bound", "upper bound", "between bounds"]
+    header, kinds = ["variable", "found", "guess", "lower bound", "upper bound", "between bounds"], "tnnnnt"
+    if not any(np.isfinite(each).any() for variable in single for each in (variable.lower, variable.upper)):
+        header, kinds, rows = header[:3], kinds[:3], [row[:3] for row in rows]
     curves = [
         f"{v.name}: {writing.several(v.value.shape[1], 'knot')} of {writing.several(v.value.shape[0], 'component')}"
         + (f" (sets {sets_of(v)})" if len(v.sets) > 1 else "")
@@ -197,8 +216,9 @@ def found(run: Run, charts: Mapping[str, Chart]) -> Html:
     ]
     return card(
         "What was found",
-        table(header, rows[:MOST_ROWS], "tnnnnt", "Variables") if rows else "",
+        table(header, rows[:MOST_ROWS], kinds, "Variables") if rows else "",
         more,
+        *(all_components(variable) for variable in single if MOST_COMPONENTS < len(variable.value) <= MOST_NUMBERS),
         named_figure(charts, "variables", "; ".join(curves)),
         anchor="found",
     )
@@ -206,17 +226,17 @@ def found(run: Run, charts: Mapping[str, Chart]) -> Html:
 
 def variable_rows(variable: VariableRecord) -> list[list[str]]:
     """Return a row for each component; one for all of a variable with very many, such as the weights of a net."""
-    if len(variable.value) > MOST_ROWS:
+    if len(variable.value) > MOST_COMPONENTS:
         return [many_row(variable)]
     rows: list[list[str]] = []
     for index, name in enumerate(component_names(variable)):
         value, guess = variable.value[index, 0], variable.guess[index, 0]
         low, high = variable.lower[index, 0], variable.upper[index, 0]
-        what = ", ".join(filter(None, (sets_of(variable), variable.unit)))
-        sets = tag("small", what) if index == 0 else Html("")
+        sets = tag("small", sets_of(variable)) if index == 0 else Html("")
         label = join([tag("b", variable.name) if index == 0 else "", f" {name} " if name else " ", sets])
-        numbers = [show(guess), tag("b", show(value, 4)), show(low), show(high)]
-        rows.append([label, *numbers, between(value, guess, low, high)])
+        found, begun, *bounds = (joined(show(number, 4), variable.unit) for number in (value, guess, low, high))
+        bounds = [bound if math.isfinite(at) else "none" for bound, at in zip(bounds, (low, high), strict=True)]
+        rows.append([label, tag("b", found), begun, *bounds, between(value, guess, low, high)])
     return rows
 
 
@@ -230,10 +250,26 @@ def many_row(variable: VariableRecord) -> list[str]:
     """Return the range of very many components, and how far they are from the guess."""
     guess, value = variable.guess[:, 0], variable.value[:, 0]
     label = join([tag("b", variable.name), f" {len(value)} numbers ", tag("small", sets_of(variable))])
-    ranges = [f"{show(float(of.min()))} to {show(float(of.max()))}" for of in (guess, value)]
-    bounds = [show(float(variable.lower[:, 0].min())), show(float(variable.upper[:, 0].max()))]
+    guessed, found = (
+        joined(f"{show(float(of.min()))} to {show(float(of.max()))}", variable.unit) for of in (guess, value)
+    )
+    ends = float(variable.lower[:, 0].min()), float(variable.upper[:, 0].max())
+    bounds = [joined(show(end), variable.unit) if math.isfinite(end) else "none" for end in ends]
     change = root_mean_square(value / 2 - guess / 2) * 2
-    return [label, ranges[0], tag("b", ranges[1]), *bounds, f"changed by {show(change)} (rms)"]
+    return [label, tag("b", found), guessed, *bounds, f"changed by {joined(show(change), variable.unit)} (rms)"]
+
+
+def all_components(variable: VariableRecord) -> Html:
+    """Return all components of a variable with many, behind a line that opens them."""
+    numbers = [
+        f"{name or index}: {show(value, 4)} (guess {show(guess, 4)})"
+        for index, (name, value, guess) in enumerate(
+            zip(component_names(variable), variable.value[:, 0], variable.guess[:, 0], strict=True)
+        )
+    ]
+    unit = f" [{variable.unit}]" * bool(variable.unit)
+    title = tag("summary", f"All {len(numbers)} numbers of {variable.name}{unit}")
+    return tag("details", title, tag("ol", *(tag("li", number) for number in numbers), class_="numbers", start="0"))
 
 
 def root_mean_square(numbers: Array) -> float:
@@ -245,7 +281,7 @@ def root_mean_square(numbers: Array) -> float:
 def between(value: float, guess: float, low: float, high: float) -> Html:
     """Draw where value and guess lie between finite bounds, and say where a bound is active."""
     if not (math.isfinite(low) and math.isfinite(high) and high > low and math.isfinite(value)):
-        return tag("small", "free" if math.isinf(low) and math.isinf(high) else "")
+        return Html("")
     value, guess, low, high = (number / 2 for number in (value, guess, low, high))  # differences may overflow else
     spots = [
         tag("i", class_=kind, style=f"left:{100 * np.clip((at - low) / (high - low), 0, 1):.1f}%")
@@ -264,20 +300,34 @@ def trusted(run: Run, charts: Mapping[str, Chart]) -> Html:
     if not lines:
         unknown = tag("p", NOT_EXAMINED) if run.readable else ""
         return card(HOW_FAR, unknown, anchor="trust")
-    rows = [[pill(line.level, MARKS[line.level]), line.what, line.number, line.meaning] for line in lines]
+    rows, fine = (
+        [
+            [pill(line.level, MARKS[line.level]), line.what, line.number, line.meaning]
+            for line in lines
+            if (line.level == GOOD) == good
+        ]
+        for good in (False, True)
+    )
+    header = ["", "check", "value", "interpretation"]
     known = run.examination
     unexamined = "" if known.gradient else ONLY_VALUES if known.refined else ONLY_MOTION
     return card(
         HOW_FAR,
         tag("p", advice(run.examination, judged)),
         tag("p", unexamined) if unexamined else "",
-        table(["", "check", "value", "interpretation"], rows, "tttt", "Verification"),
+        table(header, rows, "tttt", "Verification") if rows else "",
+        folded(f"Good: {writing.several(len(fine), 'check')}", table(header, fine, "tttt", "Good")) if fine else "",
         step_note(run.examination),
         named_figure(charts, "growth", HOW_GROWN),
         named_figure(charts, "energy", " ".join(filter(None, [HOW_BALANCED, sliding(run.examination)]))),
         refined(run.examination, judged),
         anchor="trust",
     )
+
+
+def folded(title: str, content: Html) -> Html:
+    """Return content behind a line that opens it."""
+    return tag("details", tag("summary", title), content)
 
 
 def step_note(trust: Examination) -> Html:
@@ -295,13 +345,12 @@ def refined(trust: Examination, judged: Judged) -> Html:
         return Html("")
     header, rows = answers(trust, judged)
     gradients, changes = slopes(trust)
-    return tag(
-        "details",
-        tag("summary", "Refined and smoothed, as numbers"),
+    content = (
         table(header, rows, "tnnt", "Answers"),
         table(gradients, changes, "tnnt" + "n" * (len(gradients) - 4), "Gradients") if changes else "",
         tag("p", HOW_REFINED, class_="caption"),
     )
+    return folded("Refined and smoothed, as numbers", join(content))
 
 
 def stage_card(run: Run) -> Html:
@@ -355,20 +404,21 @@ def convergence(run: Run, charts: Mapping[str, Chart]) -> Html:
 
 
 def time_split(run: Run) -> Html:
-    """Build, compile and solve as one bar."""
-    colours = {"build": palette.SKY, "compile": palette.ORANGE, "solve": palette.BODIES[0]}
+    """Building, compiling, solving and judging as one bar."""
+    colours = {"build": palette.SKY, "compile": palette.ORANGE, "solve": palette.BODIES[0], "judge": palette.GREY}
     parts = [(name, run.seconds.get(name, math.nan), colour) for name, colour in colours.items()]
     known = [(name, took, colour) for name, took, colour in parts if math.isfinite(took) and took >= 0]
     total = sum(took for _, took, _ in known)
     if total <= 0:
         return Html("")
-    bars = [tag("span", style=f"flex:{took / total:.4f};background:{c}") for _, took, c in known if took > 0]
-    keys = [
-        tag("li", tag("span", class_="dot", style=f"background:{c}"), f"{name} {words.seconds(took)}")
-        for name, took, c in known
+    bars = [
+        tag("span", style=f"flex:{took / total:.4f};background:{palette.on_page(c)}")
+        for _, took, c in known
+        if took > 0
     ]
-    prices = [f"{name} {show(price, 2)}" for name, price in run.price.items() if math.isfinite(price)]
-    priced = f"Measured price in rollouts: {writing.listed(prices)}." if prices else ""
+    keys = [tag("li", dot(c), f"{name} {words.seconds(took)}") for name, took, c in known]
+    prices = [f"{name} takes {show(price, 2)}" for name, price in run.price.items() if math.isfinite(price)]
+    priced = f"In rollouts, a {writing.listed(prices)}: what work is counted by." if prices else ""
     return card(
         "Where the time went",
         tag("div", *bars, class_="split", aria_hidden="true"),

@@ -71,6 +71,13 @@ def verdict(run: Run) -> str:
     return f"{text.strip()} {doubted(run)}".strip()
 
 
+def next_step(run: Run) -> str:
+    """Return the solver's advice; of a solved run whose budget ended, what more of it is for."""
+    if run.solved and run.status == "budget" and run.advice:
+        return f"Its budget ended, and with more what it costs may go lower ({run.advice})."
+    return run.advice
+
+
 def doubted(run: Run) -> str:
     """Say why a run is not to be relied on; empty where it is, or where it came to nothing anyway."""
     return f"But it is not to be relied on: {'; '.join(run.doubts)}." if run.verdict == DOUBTED else ""

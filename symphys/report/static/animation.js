@@ -41,7 +41,11 @@ class Player {
     this.button.addEventListener("click", () => this.toggle());
     this.slider.addEventListener("input", () => {
       this.pause();
-      this.time = this.first + (this.slider.value / 1000) * (this.last - this.first);
+      this.go(this.first + (this.slider.value / 1000) * (this.last - this.first));
+    });
+    document.addEventListener("moment", ({ detail: { time, from } }) => {
+      if (time === null || from === this || this.playing) return;
+      this.time = Math.min(Math.max(time, this.first), this.last);
       this.draw();
     });
     this.views.forEach((b) => b.addEventListener("click", () => this.look(b.dataset.view)));
@@ -52,6 +56,8 @@ class Player {
     });
     this.canvas.addEventListener("keydown", (e) => {
       if (e.key === " ") { e.preventDefault(); this.toggle(); }
+      const step = { ArrowLeft: -1, ArrowRight: 1 }[e.key];
+      if (step) { e.preventDefault(); this.pause(); this.go(this.time + step * (this.last - this.first) / 100); }
     });
     this.canvas.addEventListener("pointerdown", (e) => {
       this.grip = [e.clientX, e.clientY];
@@ -76,10 +82,16 @@ class Player {
     if (!this.grip) return;
     this.azimuth -= (event.clientX - this.grip[0]) * 0.008;
     this.elevation += (event.clientY - this.grip[1]) * 0.008;
-    this.elevation = Math.min(Math.PI / 2, Math.max(-0.1, this.elevation));
+    this.elevation = Math.min(Math.PI / 2, Math.max(0, this.elevation));
     this.grip = [event.clientX, event.clientY];
     this.mark("");
     this.draw();
+  }
+
+  go(time) { // there, and the curves too
+    this.time = Math.min(Math.max(time, this.first), this.last);
+    this.draw();
+    moment(this.time, this);
   }
 
   toggle() { if (this.playing) this.pause(); else this.play(); }
@@ -101,8 +113,8 @@ class Player {
     if (!this.playing) return;
     this.time += Math.max(now - this.clock, 0) / 1000 * Number(this.speed.value);
     this.clock = now;
-    if (this.time >= this.last) { this.time = this.last; this.pause(); }
-    this.draw();
+    if (this.time >= this.last) this.pause();
+    this.go(this.time);
     if (this.playing) requestAnimationFrame((next) => this.advance(next));
   }
 

@@ -1,6 +1,7 @@
 // Draws the curves of a page as SVG, from the numbers that it holds; shows those below the pointer. Comes after numbers.js.
 
 const WIDTH = 1000, NARROW = 400, TOP = 26, BOTTOM = 34, LEFT = 58, GAP = 14, INCH = 97, BAR = 20, LETTER = 7;
+const TIME = "time [s]"; // title of the axes that share a moment
 
 function numbers(packed) { // differences in steps of one size, or numbers as they are
   if (!packed.d) return packed;
@@ -99,8 +100,10 @@ class Panel {
       return `<g fill="none" stroke="${line.c}" stroke-linecap="round" stroke-opacity="0.6"><path d="${ink}" stroke-width="3"/></g>`;
     }
     if (has("dots") || has("rings")) {
-      const spots = line.y.map((v, k) => `<circle cx="${this.x(line.x[k]).toFixed(1)}" cy="${this.y(v).toFixed(1)}" r="4"/>`);
-      return `<g fill="${has("dots") ? line.c : "#fff"}" stroke="${line.c}">${spots.join("")}</g>`;
+      const spot = (v, k) => `<circle cx="${this.x(line.x[k]).toFixed(1)}" cy="${this.y(v).toFixed(1)}" r="4"/>`;
+      const linked = (v, k) => (line.links?.[k] ? `<a href="${escaped(line.links[k])}">${spot(v, k)}</a>` : spot(v, k));
+      const spots = line.y.map((v, k) => (v === null ? "" : linked(v, k)));
+      return `<g fill="${has("dots") ? line.c : "var(--card)"}" stroke="${line.c}">${spots.join("")}</g>`;
     }
     const look = has("dashed") ? 'stroke-dasharray="4 3"' : has("dotted") ? 'stroke-dasharray="1 2"' : has("pale") ? 'stroke-opacity="0.25"' : "";
     const few = line.y.length <= 40 && !["dashed", "dotted", "pale", "plain", "steps"].some(has);
@@ -119,8 +122,8 @@ class Panel {
   axes() {
     const { left, top, width, height, data } = this, bottom = top + height;
     const level = (v, c) => `<path d="M${left} ${this.y(v).toFixed(1)}h${width}" class="${c}"/>`;
-    const room = Math.floor((width + GAP + 20) / LETTER), title = data.title.length > room ? `${data.title.slice(0, room - 1)}…` : data.title;
-    const out = [`<text x="${left}" y="${top - 9}" class="title"><title>${escaped(data.title)}</title>${escaped(title)}</text>`];
+    const room = width + GAP, squeezed = data.title.length * LETTER > room ? ` textLength="${room}" lengthAdjust="spacingAndGlyphs"` : "";
+    const out = [`<text x="${left}" y="${top - 9}" class="title"${squeezed}>${escaped(data.title)}</text>`];
     const along = data.across ? ticksOf(data.across, ...this.wide) : evenTicks(...this.wide, Math.max(2, Math.round(width / 60)));
     for (const v of along) {
       out.push(`<path d="M${this.x(v).toFixed(1)} ${top}v${height}" class="grid"/>`);
@@ -168,10 +171,14 @@ class Panel {
     return `<g>${this.axes()}${curves}${this.data.end ? this.end() : ""}</g>`;
   }
 
-  at(x) { // the numbers below the pointer, in words; null beside the panel
+  value(x) { // what the axis has at a place of the page
     const place = this.wide[0] + ((x - this.left) / this.width) * (this.wide[1] - this.wide[0]);
-    if (place < this.wide[0] || place > this.wide[1] || !this.lines.length) return null;
-    const value = this.data.across ? 10 ** place : place;
+    return this.data.across ? 10 ** place : place;
+  }
+
+  at(x) { // the numbers below the pointer, in words; null beside the panel
+    if (x < this.left || x > this.left + this.width || !this.lines.length) return null;
+    const value = this.value(x);
     const parts = this.lines.filter((line) => line.n && !line.l.includes("dots") && !line.l.includes("rings")).map((line) => {
       const before = line.x.findLastIndex((v) => v !== null && v <= value);
       const nearest = () => line.x.reduce((best, v, k) => (Math.abs(v - value) < Math.abs(line.x[best] - value) ? k : best), 0);
@@ -201,16 +208,41 @@ function drawChart(chart, width = WIDTH) {
   return { html: `<div class="legend">${keys.join("")}<output></output></div>${svg}`, panels };
 }
 
-document.querySelectorAll("figure.chart").forEach((root) => {
-  const place = root.querySelector("div"), width = place.clientWidth < 520 ? NARROW : WIDTH;
-  const { html, panels } = drawChart(JSON.parse(root.querySelector("script").textContent), width);
-  place.innerHTML = html;
-  const svg = place.querySelector("svg"), output = place.querySelector("output");
-  svg.addEventListener("pointermove", (event) => {
-    const box = svg.getBoundingClientRect(), scale = width / box.width;
+class Figure { // draws a chart in its place, shows the numbers below the pointer, and one moment in all charts over time
+  constructor(root) {
+    const place = root.querySelector("div"), width = place.clientWidth < 520 ? NARROW : WIDTH;
+    const { html, panels } = drawChart(JSON.parse(root.querySelector("script").textContent), width);
+    place.innerHTML = html;
+    [this.svg, this.output, this.panels, this.width] = [place.querySelector("svg"), place.querySelector("output"), panels, width];
+    this.timed = panels.filter((panel) => panel.data.along === TIME);
+    this.cursor = this.svg.appendChild(document.createElementNS(this.svg.namespaceURI, "path"));
+    this.cursor.setAttribute("class", "cursor");
+    this.svg.addEventListener("pointermove", (event) => this.point(event));
+    this.svg.addEventListener("pointerleave", () => moment(null, this));
+    document.addEventListener("moment", (event) => this.show(event.detail));
+  }
+
+  point(event) {
+    const box = this.svg.getBoundingClientRect(), scale = this.width / box.width;
     const [x, y] = [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale];
-    const panel = panels.find((p) => y >= p.top - TOP && y <= p.top + p.height + BOTTOM && x >= p.left && x <= p.left + p.width);
-    output.textContent = (panel && panel.at(x)) || "";
-  });
-  svg.addEventListener("pointerleave", () => { output.textContent = ""; });
-});
+    const panel = this.panels.find((p) => y >= p.top - TOP && y <= p.top + p.height + BOTTOM && x >= p.left && x <= p.left + p.width);
+    if (!panel) return moment(null, this);
+    if (panel.data.along === TIME) moment(panel.value(x), this);
+    else this.lines([panel], () => x);
+    this.output.textContent = panel.at(x) || "";
+  }
+
+  show({ time, from }) {
+    if (time === null) return this.lines([], null);
+    this.lines(this.timed, (panel) => panel.x(time));
+    if (from !== this) this.output.textContent = (this.timed.length && this.timed[0].at(this.timed[0].x(time))) || "";
+  }
+
+  lines(panels, x) { // a vertical line in each of the panels
+    const inside = panels.filter((p) => x(p) >= p.left - 0.5 && x(p) <= p.left + p.width + 0.5);
+    this.cursor.setAttribute("d", inside.map((p) => `M${x(p).toFixed(1)} ${p.top}v${p.height}`).join(""));
+    if (!panels.length) this.output.textContent = "";
+  }
+}
+
+document.querySelectorAll("figure.chart").forEach((root) => new Figure(root));

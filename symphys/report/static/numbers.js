@@ -1,4 +1,4 @@
-// Numbers and texts as pages write them. Comes before charts.js and rows.js.
+// Numbers and texts as pages write them, and the moment that curves and motion share. Comes before the other scripts.
 
 function escaped(text) { return text.replace(/[&<>"]/g, (c) => `&#${c.charCodeAt(0)};`); }
 
@@ -10,3 +10,5 @@ function written(value) { // a number as people write it
   const raised = String(power).replace("-", "⁻").replace(/\d/g, (d) => digits[d]);
   return `${Math.abs(mantissa) === 1 ? (mantissa < 0 ? "−" : "") : `${mantissa} × `.replace("-", "−")}10${raised}`;
 }
+
+function moment(time, from) { document.dispatchEvent(new CustomEvent("moment", { detail: { time, from } })); } // null: none
