@@ -7,6 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from itertools import chain
 from typing import Any
 
 import click
@@ -19,7 +20,7 @@ from symphys.cli.importing import import_robot
 from symphys.cli.installation import cache, doctor, listing, new, schema
 from symphys.cli.mpc import mpc
 from symphys.cli.replay import replay
-from symphys.cli.report import report
+from symphys.cli.report import open_page, report
 from symphys.cli.runs import best, diff, ls
 from symphys.cli.show import show
 from symphys.cli.solve import solve
@@ -29,29 +30,23 @@ from symphys.version import __version__
 
 SOLVED, WRONG, UNREAD = 0, 2, 141
 """Exit codes; UNREAD is 128 + SIGPIPE, for output that nobody reads."""
-COMMANDS = (
-    new,
-    solve,
-    mpc,
-    identify,
-    report,
-    show,
-    check,
-    ls,
-    best,
-    diff,
-    replay,
-    import_robot,
-    export,
-    listing,
-    schema,
-    doctor,
-    cache,
-)
+GROUPS = {
+    "Problems": (new, check, show, solve, mpc, identify),
+    "Results": (report, open_page, ls, best, diff, replay),
+    "Robots and exports": (import_robot, export),
+    "What is there": (listing, schema, doctor, cache),
+}
+FIRST = "Begin with `symphys solve ball_throw`, then `symphys open`. `symphys COMMAND -h` has the options."
 
 
 class Commands(click.Group):
-    """A group that suggests the nearest command for an unknown one."""
+    """A group that suggests the nearest command for an unknown one, and lists its commands by what they are for."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write each command with the first sentence of its help, whole."""
+        for title, commands in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(each.name or "", each.get_short_help_str(limit=10**4)) for each in commands])
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -63,13 +58,13 @@ class Commands(click.Group):
         return super().resolve_command(ctx, args)
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]}, epilog=FIRST)
 @click.version_option(__version__, prog_name="symphys", message="%(prog)s %(version)s")
 def app() -> None:
     """Trajectory optimisation through contact: a problem file in, a solution and a report out."""
 
 
-for command in COMMANDS:
+for command in chain.from_iterable(GROUPS.values()):
     app.add_command(command)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import textwrap
 from pathlib import Path
 
 import click
@@ -13,20 +15,31 @@ from symphys.cli.arguments import complete_problem
 
 @click.command("list")
 def listing() -> None:
-    """List the shipped problems, the robots and tasks that problems include, and the solvers."""
+    """List the shipped problems with their solvers, the robots and tasks that problems include, and the solvers."""
     from symphys import problems
     from symphys.problem import load_problem
     from symphys.solvers import SOLVERS
 
     click.echo("problems:")
     for name, path in problems.catalogue().items():
-        click.echo(f"  {name:<20} {load_problem(path).title}")
+        problem = load_problem(path)
+        echo_item(name, f"{problem.title} [{', '.join(problem.solvers or ()) or NO_SOLVER}]")
     click.echo("robots and tasks, for [[include]]:")
     for file in problems.parts():
         click.echo(f"  {file}")
     click.echo("solvers:")
     for solver in SOLVERS.values():
-        click.echo(f"  {solver.name:<20} {solver.summary}")
+        echo_item(solver.name, solver.summary)
+
+
+NO_SOLVER = "chosen for it"
+"""In place of the solvers that a problem names."""
+
+
+def echo_item(name: str, text: str) -> None:
+    """Print a name with a text beside it, wrapped between words to the width of the terminal."""
+    width = max(shutil.get_terminal_size().columns, 60)
+    click.echo(textwrap.fill(f"{name:<20} {text}", width, initial_indent="  ", subsequent_indent=" " * 23))
 
 
 @click.command()

@@ -103,6 +103,31 @@ def report(folder: Path, pages: str | None, figures: bool, remake: bool, new: bo
     return UNDRAWN if made.faults else 0
 
 
+@click.command("open")
+@click.argument("folder", metavar="[DIR]", default="reports", type=click.Path(path_type=Path))
+def open_page(folder: Path) -> int:
+    """Show the report of DIR, which is `reports` if it is left out, in a browser, and print its address.
+
+    DIR is a run folder, or one above run folders. A page that is missing or out of date is made first.
+    """
+    import webbrowser
+
+    from symphys.report import outdated, wanted_below, write_run_report
+    from symphys.report.making.stamps import RUN_PAGE
+    from symphys.results.discovery import is_run
+
+    if folder.is_dir() and is_run([path.name for path in folder.iterdir()]):
+        page = write_run_report(folder) if outdated(folder) else folder / RUN_PAGE
+    else:
+        made = make_shown(wanted_below(folder, remake=False), 1)
+        if made.faults:
+            return UNDRAWN
+        page = made.page
+    click.echo(page.resolve().as_uri())
+    webbrowser.open(page.resolve().as_uri())
+    return 0
+
+
 def make_shown(
     wanted: WantedPages, jobs: int, silent: bool = False, limit: float = math.inf, figures: bool = False
 ) -> MadePages:

@@ -275,7 +275,7 @@ def conclude(
     click.echo(time_line(perf_counter() - began, parts))
     there = made is not None and all(fault.page != made.page for fault in made.faults)
     again = f"`symphys report {shlex.quote(str(out))}` makes one"
-    click.echo(f"report: {made.page}" if made and there else f"no report; {again}")
+    click.echo(f"report: {made.page.resolve().as_uri()}" if made and there else f"no report; {again}")
     return exit_code(batch, made)
 
 
@@ -313,20 +313,21 @@ LONG = 10.0
 """[s] Time from which it is said how to shorten it."""
 SHORTER = {
     "compiling": "what was compiled is kept, so that the next command takes less",
-    "judging and reports": "--unexamined and --no-report leave out most of the last",
+    "judging": "--unexamined leaves out most of that",
+    "reports and the rest": "--no-report leaves out most of the last",
 }
 
 
 def time_line(total: float, parts: Mapping[str, float]) -> str:
     """Return the total time of the command and its known parts, as a line; of most of a long time how to shorten it."""
-    named = {"building": "build", "compiling": "compile", "solving": "solve"}
+    named = {"building": "build", "compiling": "compile", "solving": "solve", "judging": "judge"}
     shares = {word: parts[key] for word, key in named.items() if parts.get(key)}
     if not shares:
         return f"time: {duration(total)} s in all"
-    shares["judging and reports"] = max(total - sum(shares.values()), 0.0)
+    shares["reports and the rest"] = max(total - sum(shares.values()), 0.0)
     most = max(shares, key=lambda word: shares[word])
     hint = f"; {SHORTER[most]}" if most in SHORTER and shares[most] > max(total / 2, LONG) else ""
-    listed = ", ".join(f"{word} {duration(part)}" for word, part in shares.items())
+    listed = ", ".join(f"{word} {duration(part)} s" for word, part in shares.items())
     return f"time: {duration(total)} s in all; {listed}{hint}"
 
 

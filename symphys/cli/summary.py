@@ -13,13 +13,13 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from symphys.cli.wording import duration, first_line, measured, number, verdict, whole
+from symphys.cli.wording import first_line, measured, number, timed, verdict, whole
 from symphys.files import FileError
 from symphys.findings.examination import Examination, HeldBound
 from symphys.findings.obstacles import MAX_BOUNDS, bound_words, holding
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, NOT_SOLVED
 from symphys.results.file_names import RESULT
-from symphys.results.result import VariableRecord, read_result
+from symphys.results.result import CheckRecord, VariableRecord, read_result
 
 if TYPE_CHECKING:
     from symphys.batches import BatchResult
@@ -29,10 +29,10 @@ Groups = Mapping[tuple[str, str], list["Result"]]
 """Results by (problem with its settings, solver)."""
 MIN_WIDTH = 120
 """Least width of the table where the output is no terminal."""
-NUMBERS = ("solved", "objective", "worst", "iterations", "work", "seconds", "ended")
-OPTIONAL = ("work", "iterations", "seconds", "objective", "ended")
+NUMBERS = ("solved", "objective", "worst", "iterations", "work", "time", "ended")
+OPTIONAL = ("work", "iterations", "time", "objective", "ended")
 """Columns that are left out on narrow terminals, in this order; no number is cut."""
-NOTES = {"worst": "worst: largest error / tolerance, met at 1", "work": "work in rollouts"}
+NOTES = {"worst": "worst: largest error / tolerance, met at 1", "work": "work in rollouts", "time": "time of the solve"}
 """What is said below the table of columns that are there."""
 MAX_ROWS = 30
 """Rows of the table; if there are more, the best and the worst are shown."""
@@ -73,14 +73,23 @@ def answers(jobs: Sequence[Job], results: Sequence[Result | None]) -> list[str]:
         if result is None or not result.accepted:
             continue
         try:
-            variables = list(read_result(job.folder.path / RESULT).z.values())
+            found = read_result(job.folder.path / RESULT)
         except FileError:  # a page says what is wrong with the folder
             continue
-        whose = f"{job.name.removesuffix(' seed 0')}: " if len(jobs) > 1 else ""
+        whose, variables = f"{job.name.removesuffix(' seed 0')}: " if len(jobs) > 1 else "", list(found.z.values())
         lines += [whose + answer(variable) for variable in variables[:MAX_VARIABLES]]
         if len(variables) > MAX_VARIABLES:
             lines.append(f"{whose}and {len(variables) - MAX_VARIABLES} more, in result.json")
+        if found.checks:
+            lines.append(whose + met(found.checks))
     return lines
+
+
+def met(checks: Sequence[CheckRecord]) -> str:
+    """Write ``met: lies at 10 m by 0.002 of 0.01 m, ...``: each check with its error, tolerance and unit."""
+    named = [f'"{each.name}" by {number(each.error)} of {measured(each.tolerance, each.unit)}' for each in checks]
+    more = f" and {len(checks) - MAX_VARIABLES} more" if len(checks) > MAX_VARIABLES else ""
+    return f"met: {', '.join(named[:MAX_VARIABLES])}{more}"
 
 
 def answer(variable: VariableRecord) -> str:
@@ -159,7 +168,7 @@ def cells(group: list[Result]) -> dict[str, Text]:
         number(median(result.worst for result in group)),
         whole(median(known(result, "iterations") for result in group)),
         whole(median(known(result, "equivalents") for result in group)),
-        duration(median(result.seconds.get("solve") for result in group)),
+        timed(median(result.seconds.get("solve") for result in group)),
         ", ".join(status if count == len(group) else f"{status} {count}" for status, count in ends.items()),
     ]
     fine = group and all(result.accepted for result in group)

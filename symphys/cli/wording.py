@@ -62,6 +62,11 @@ def duration(seconds: float | None) -> str:
     return f"{seconds:,.0f}" if seconds >= 100 else f"{seconds:.3g}"
 
 
+def timed(seconds: float | None) -> str:
+    """Return a time with its unit; a dash for an unknown one."""
+    return "-" if seconds is None else f"{duration(seconds)} s"
+
+
 def time_words(seconds: float) -> str:
     """Return a time to wait, rounded up, in a suitable unit."""
     if seconds <= 100:

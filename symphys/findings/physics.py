@@ -12,7 +12,7 @@ import numpy as np
 from symphys.findings.examination import Examination, Miss
 from symphys.findings.levels import BAD, FAIR, GOOD, UNKNOWN, Finding, Judged, graded, worst_of
 from symphys.findings.numerics import refined_finding
-from symphys.findings.writing import listed, percent, several, show
+from symphys.findings.writing import beside, listed, percent, several, show
 
 CONTACTS = "contacts"
 
@@ -64,7 +64,7 @@ def residual_finding(trust: Examination, judged: Judged) -> Finding:
     Impulses that have not settled refute a result unless the same comes out where the sweeps end elsewhere. Where more
     sweeps would settle them at other velocities, it is refuted in any case: such a motion can be had, and is another.
     """
-    level, number = residual_level(trust), f"{show(trust.residual, 2)} N s"
+    level, number = residual_level(trust), f"{beside(trust.residual, trust.impulse, 2)} N s"
     if level == BAD and graded(trust.left, LEFT_LIMITS) != BAD and holds_elsewhere(trust, judged):
         meaning = f"Contact impulses had not settled{in_steps(trust)}{more_sweeps(trust)}. {elsewhere(trust)}"
         return Finding(CONTACTS, FAIR, "Contact solver's residual", number, meaning)
@@ -146,7 +146,7 @@ def depth_finding(trust: Examination) -> Finding:
     if level == BAD and trust.depth_time == 0:
         meaning = "The motion begins with surfaces inside each other: bound what is varied so that they begin apart."
     doubt = f"surfaces overlap by {show(trust.deepest, 2)} m{place}"
-    number = f"{show(trust.deepest, 2)} m{place}"
+    number = f"{beside(trust.deepest, trust.size, 2)} m{place}"
     return Finding(CONTACTS, level, "Deepest penetration of rigid surfaces", number, meaning, doubt * (level == BAD))
 
 

@@ -8,6 +8,9 @@ from collections.abc import Sequence
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MINUS = "\N{MINUS SIGN}"
 DASH = "\N{EN DASH}"
+NOTHING = "≈ 0"
+NEGLIGIBLE = 1e-6
+"""Share of what a number is compared with below which it is next to nothing."""
 THIN_SPACE = "\N{NARROW NO-BREAK SPACE}"
 
 
@@ -22,6 +25,11 @@ def show(value: float, digits: int = 3) -> str:
     if value == 0 or -4 < exponent < 6:
         return plain(float(text), max(digits - 1 - exponent, 0) if value else 0)
     return sign(f"{mantissa:g}" if mantissa not in (1, -1) else f"{mantissa:.0f}") + f" × 10{power(exponent)}"  # noqa: RUF001
+
+
+def beside(value: float, scale: float, digits: int = 3) -> str:
+    """Return a number that matters beside ``scale``: what is next to nothing there is written as such."""
+    return NOTHING if 0 < abs(value) < NEGLIGIBLE * scale else show(value, digits)
 
 
 def percent(share: float) -> str:

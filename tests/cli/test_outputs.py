@@ -51,7 +51,7 @@ def test_names_that_are_no_text(throw: Path, tmp_path: Path, monkeypatch: pytest
     out = os.fsdecode(b"out\xff")
     quick = ["--solver", "least_squares", "--backend", "casadi", "--unexamined"]
     assert main(["solve", str(named), "--out", out, *quick]) == 0
-    assert printed.getvalue().decode().endswith("report: out?/index.html\n")
+    assert printed.getvalue().decode().endswith("/out%FF/index.html\n")
     config = Path(out) / "bad\ufffd" / "least_squares-seed0" / "config.json"
     assert "bad\ufffd" in config.read_text("utf-8")
     assert main(["new", os.fsdecode(b"new\xff.toml")]) == 0

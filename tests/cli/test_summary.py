@@ -58,7 +58,7 @@ def test_seeds_share_a_row_of_medians() -> None:
 def test_below_the_table_only_columns_that_are_there_are_explained() -> None:
     group = {("throw", "cma"): [result(), result(seed=1)]}
     whole, narrow = table(group), table(group, ["solved", "worst"])
-    assert str(whole.caption).split("; ")[1:] == ["work in rollouts", "medians over the seeds"]
+    assert str(whole.caption).split("; ")[1:] == ["work in rollouts", "time of the solve", "medians over the seeds"]
     assert "worst" in str(narrow.caption) and "work" not in str(narrow.caption)
 
 
@@ -105,8 +105,8 @@ def test_the_time_of_a_command_counts_once_what_is_built_once() -> None:
     """A run that was done before does not count."""
     notes = Notes()
     for skipped in (False, False, True):
-        notes.new(result(seconds={"build": 1.0, "compile": 2.0, "solve": 3.0}), skipped)
-    assert notes.seconds == {"build": 1.0, "compile": 2.0, "solve": 6.0}
+        notes.new(result(seconds={"build": 1.0, "compile": 2.0, "solve": 3.0, "judge": 4.0}), skipped)
+    assert notes.seconds == {"build": 1.0, "compile": 2.0, "solve": 6.0, "judge": 8.0}
 
 
 def test_live_progress_opens_and_closes_its_lines() -> None:
@@ -167,7 +167,8 @@ def test_answers_are_of_accepted_runs_and_of_few(tmp_path: Path) -> None:
     ("total", "parts", "said"),
     [
         (40.0, {"build": 0.1, "compile": 30.0, "solve": 1.0}, "the next command takes less"),
-        (40.0, {"build": 0.1, "compile": 1.0, "solve": 1.0}, "--unexamined"),
+        (40.0, {"build": 0.1, "compile": 1.0, "solve": 1.0, "judge": 30.0}, "--unexamined"),
+        (40.0, {"build": 0.1, "compile": 1.0, "solve": 1.0}, "--no-report"),
         (40.0, {"build": 0.1, "compile": 1.0, "solve": 30.0}, ""),
         (8.0, {"build": 0.1, "compile": 7.0, "solve": 0.1}, ""),
         (40.0, {}, ""),

@@ -124,13 +124,13 @@ class Notes:
     """Notes of backends, each once, and the seconds of the runs of this batch.
 
     Attributes:
-        seconds: total of "build", "compile" and "solve"; runs that share a problem share its first two.
+        seconds: total of "build", "compile", "solve" and "judge"; runs that share a problem share its first two.
     """
 
     def __init__(self) -> None:
         """Start with no note shown."""
         self.shown: set[str] = set()
-        self.seconds: dict[str, float] = {"build": 0.0, "compile": 0.0, "solve": 0.0}
+        self.seconds: dict[str, float] = {"build": 0.0, "compile": 0.0, "solve": 0.0, "judge": 0.0}
         self.made: set[tuple[str, float]] = set()
 
     def new(self, result: Result, skipped: bool) -> list[str]:
@@ -146,6 +146,6 @@ class Notes:
     def add(self, result: Result) -> None:
         """Add the seconds of a run."""
         built = (result.problem, result.seconds.get("build", 0.0))
-        for key in ("solve",) if built in self.made else self.seconds:
+        for key in ("solve", "judge") if built in self.made else self.seconds:
             self.seconds[key] += result.seconds.get(key, 0.0)
         self.made.add(built)

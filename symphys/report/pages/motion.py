@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from symphys import files
-from symphys.findings.writing import listed, percent, several, show
+from symphys.findings.writing import beside, listed, percent, several, show
 from symphys.report.charts.chart import Chart
 from symphys.report.charts.contacts import by_surfaces, shown_pairs
 from symphys.report.charts.motion import MOST_BODIES, controlled_bodies, motion_charts, shown_bodies
@@ -170,15 +170,23 @@ def use_row(channel: Channel) -> list[Part]:
     """Return the cells of a coordinate."""
     low, high = float(channel.value.min()), float(channel.value.max())
     joint = channel.joint
-    bounded = math.isfinite(joint.lower) or math.isfinite(joint.upper)
     return [
         join([channel.name, Html(" "), tag("small", joint.kind)]),
-        f"{show(low)} to {show(high)} {channel.unit}",
-        f"{show(joint.lower)} to {show(joint.upper)}" if bounded else "",
+        f"{beside(low, 1.0)} to {beside(high, 1.0)} {channel.unit}",
+        limit_words(joint.lower, joint.upper),
         "" if joint.motor is None else motor_words(joint.motor, channel),
         f"{show(float(np.abs(channel.torque).max(initial=0.0)))} {channel.torque_unit}" if channel.driven else "",
         share_words(channel),
     ]
+
+
+def limit_words(lower: float, upper: float) -> str:
+    """Write the limits of a joint; empty where it has none."""
+    if math.isfinite(lower) and math.isfinite(upper):
+        return f"{show(lower)} to {show(upper)}"
+    if math.isfinite(lower):
+        return f"from {show(lower)}"
+    return f"up to {show(upper)}" if math.isfinite(upper) else ""
 
 
 def motor_words(motor: SceneMotor, channel: Channel) -> str:

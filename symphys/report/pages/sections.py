@@ -16,7 +16,7 @@ from symphys.findings.examination import Examination
 from symphys.findings.levels import GOOD, MARKS, Judged
 from symphys.findings.physics import sliding
 from symphys.findings.verdict import ending
-from symphys.findings.writing import capital, show
+from symphys.findings.writing import beside, capital, show
 from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart
 from symphys.report.charts.run import component_names, knotted
@@ -154,9 +154,9 @@ def checks(run: Run) -> Html:
     rows = [
         [
             join([check.name, Html(" "), tag("small", check.kind)]),
-            joined(show(check.error), check.unit),
+            joined(beside(check.error, check.tolerance), check.unit),
             joined(show(check.tolerance), check.unit),
-            show(check.ratio),
+            beside(check.ratio, 1.0),
             gauge(check),
             pill("good", "met") if check.met else pill("bad", "missed"),
         ]
