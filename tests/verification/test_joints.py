@@ -225,3 +225,55 @@ def test_a_limit_takes_energy(make: Make) -> None:
     assert told["energy"]["contact"][-1] < -1e-3
     assert told["gains"] == []
     assert told["drift"] < 1e-2 * max(told["energy"]["kinetic"])
+
+
+LEG = """
+[simulation]
+duration = 0.3
+dt = 0.01
+[ground]
+restitution = 1.0
+[[body]]
+name = "torso"
+shape = { sphere = { radius = 0.1 } }
+mass = 1.0
+position = [0, 0, 0.8]
+collides_with = []
+[[body]]
+name = "foot"
+shape = { sphere = { radius = 0.03 } }
+mass = 0.1
+position = [0, 0, 0.4]
+[[joint]]
+name = "rail"
+between = ["world", "torso"]
+slider = { axis = [0, 0, 1] }
+[[joint]]
+name = "leg"
+between = ["foot", "torso"]
+slider = { axis = [0, 0, 1] }
+motor = { torque = { torque = 200 } }
+[[variable]]
+name = "push"
+sets = "leg.command"
+knots = 1
+guess = 8.0
+[[variable]]
+name = "fall"
+sets = "leg.start_rate"
+guess = 0.0
+[[target]]
+name = "t"
+value = "torso.position"
+tolerance = 1
+"""
+
+
+@pytest.mark.parametrize("push", [2.0, 8.0, 20.0, 50.0])
+def test_a_motor_that_pushes_through_an_impact_is_not_taken_for_its_contact(make: Make, push: float) -> None:
+    """The foot lands at any instant of a step, and its rate against the torso jumps."""
+    for height in np.linspace(0.2, 0.215, 4):
+        text = LEG.replace("0, 0.4]", f"0, {height}]").replace("guess = 8.0", f"guess = {push}")
+        record, told = found(make(text))
+        assert np.abs(record.motion.contact_force).max() > push  # it lands
+        assert told["gained"] < 1e-3 * max(told["energy"]["kinetic"])
