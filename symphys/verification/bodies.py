@@ -65,8 +65,8 @@ def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
     """Return the work of motors, springs and dry friction in each step (N,) [J], and two bounds of its error.
 
     The first bound is the sum of the absolute values. The second one is for steps with impacts, whose instant is not
-    recorded: a force works at the rate before the impact, then at that after it. Up to there the rate changes as it does
-    in the steps beside.
+    recorded: a force works at the rate before the impact, then at that after it. Beside the impact the rate changes as
+    in the steps around.
 
     A commanded torque acts from the start of its step to the end, in addition to the law of the motor. The leapfrog
     scheme has the other forces half a substep ahead of the velocities at the ends of a step; of a split step only the

@@ -12,6 +12,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
+from markdown_it import MarkdownIt
+
 from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart
 
@@ -49,6 +51,17 @@ def tag(name: str, /, *children: Part, **attributes: str | None) -> Html:
     pairs = [(key.rstrip("_").replace("_", "-"), value) for key, value in attributes.items() if value is not None]
     opening = "".join([name, *(f' {key}="{html.escape(value)}"' for key, value in pairs)])
     return Html(f"<{opening}>" if name in VOID else f"<{opening}>{join(children)}</{name}>")
+
+
+@cache
+def renderer() -> MarkdownIt:
+    """Return what makes HTML of Markdown: HTML in it is text, and nothing is loaded."""
+    return MarkdownIt("commonmark", {"html": False}).disable(["image", "heading", "lheading"])
+
+
+def markdown(text: str) -> Html:
+    """Return a description, which may be Markdown."""
+    return Html(renderer().render(text))
 
 
 def card(title: str, *children: Part, anchor: str | None = None, note: Part = "") -> Html:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -29,6 +28,7 @@ from symphys.report.pages.markup import (
     facts,
     fold,
     join,
+    markdown,
     named_figure,
     pill,
     stats,
@@ -111,7 +111,7 @@ def header(run: Run, cards: Sequence[Html]) -> Html:
             tag("p", f"No solver was named: {run.solver}, since {why}.", class_="note") if why else "",
             tag("p", f"It starts from what {guess} found.", class_="note") if guess else "",
             tag("h1", run.title),
-            *(tag("p", part, class_="lead") for part in re.split(r"\n\s*\n", run.description.strip()) if part),
+            tag("div", markdown(run.description), class_="lead") if run.description.strip() else "",
             banner(words.level(run), words.headline(run), words.verdict(run), words.next_step(run), *unread),
             tag("nav", *links, aria_label="Sections") if run.readable else "",
         ]
