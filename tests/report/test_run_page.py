@@ -315,3 +315,29 @@ def test_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
         write_run_report(tmp_path)
     with pytest.raises(ReportError, match="no such folder"):
         write_run_report(tmp_path / "nowhere")
+
+
+def test_a_page_leads_to_that_of_all_runs_where_there_is_one(batch: Path) -> None:
+    folder = batch / "ball_throw" / "gradient-seed0"
+    assert "all runs" not in write_run_report(folder).read_text("utf-8")
+    (batch / ".runs.jsonl").touch()
+    assert '<a href="../../index.html">all runs</a>' in write_run_report(folder).read_text("utf-8")
+
+
+def test_a_solver_that_never_moved_is_not_said_to_have_converged(run_dir: Path, edit: Callable[..., None]) -> None:
+    check = {"kind": "target", "name": "there", "error": 1.0, "tolerance": 0.01, "met": False}
+    none = [{"variable": "push", "error": 0.0, "scale": 0.0, "felt": 0.0}]
+    edit(run_dir / "result.json", solved=False, status="converged", iterations=0, checks=[check])
+    text = write_run_report(run_dir).read_text("utf-8")
+    assert "The solver converged." in text
+    edit(run_dir / "result.json", trust={"gradient": none})
+    text = write_run_report(run_dir).read_text("utf-8")
+    assert "The gradient is zero at the guess, so the solver had nowhere to go." in text
+
+
+def test_descriptions_may_be_markdown_and_stay_harmless(run_dir: Path) -> None:
+    text = 'title = "x"\ndescription = """\nA *fast* `throw`:\n\n- one\n\n<script>alert(1)</script> ![x](http://a/b.png)"""\n'
+    (run_dir / "problem.toml").write_text(text, "utf-8")
+    page = write_run_report(run_dir).read_text("utf-8")
+    assert "<em>fast</em> <code>throw</code>" in page and "<li>one</li>" in page
+    assert "<script>alert" not in page and "<img" not in page

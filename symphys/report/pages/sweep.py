@@ -82,8 +82,14 @@ def sweep_of(found: Sequence[Study]) -> SweptRuns | None:
     at = np.array([[float(values[key]) for key in keys] for values, _ in pairs])
     every = measures(runs)
     varied = [each for each in every if each.varies or each.met]
-    same = tuple(f"{each.title} {show(float(np.nanmean(each.values)))}" for each in every if each not in varied)
+    same = tuple(map(constant_words, (each for each in every if not (each.varies or each.met))))
     return SweptRuns(tuple(keys), runs, at, tuple(varied[:MOST_MEASURES]), same)
+
+
+def constant_words(measure: Measure) -> str:
+    """Write a number that is the same in all runs, with its unit: ``throw.y 0 m/s``."""
+    what, _, unit = measure.title.removesuffix("]").partition(" [")
+    return f"{what} {show(float(np.nanmean(measure.values)))} {unit}".rstrip()
 
 
 def measures(runs: Sequence[Run]) -> list[Measure]:

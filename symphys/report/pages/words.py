@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from symphys.findings.numerics import unfelt
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, ending, verdict_words
 from symphys.findings.writing import capital, listed, plain, show
 from symphys.results.result import CheckRecord
@@ -67,8 +68,16 @@ def verdict(run: Run) -> str:
         total = "The only check is" if len(run.checks) == 1 else f"All {len(run.checks)} checks are"
         text = f"{total} met; the largest error is {show(run.worst_ratio, 2)} of its tolerance{work(run)}."
     else:
-        text = f"{misses(missed, len(run.checks))} {ending(run.status).sentence}"
+        text = f"{misses(missed, len(run.checks))} {how_it_ended(run)}"
     return f"{text.strip()} {doubted(run)}".strip()
+
+
+def how_it_ended(run: Run) -> str:
+    """Say how the solver ended; of one that never left its guess since nothing moves it there, that."""
+    gradient = run.examination.gradient
+    if run.iterations <= 1 and gradient and all(unfelt(check) for check in gradient):
+        return "The gradient is zero at the guess, so the solver had nowhere to go."
+    return ending(run.status).sentence
 
 
 def next_step(run: Run) -> str:
