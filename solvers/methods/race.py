@@ -20,7 +20,7 @@ race is theirs, one after the other.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, astuple, replace
 from typing import Any
 
@@ -64,12 +64,14 @@ NEARER = 0.8
 FIRST_ROUNDS = 4
 """Rounds of the search for controls over time before the finisher starts, whose slopes are compiled meanwhile."""
 PATIENCE = 10
-"""Iterations without progress after which the finisher gives up a start."""
+"""Iterations without progress after which the finisher gives up a start; with something missed, after which it lowers
+the costs of what is met no further."""
 NO_LIMIT = 10**12
 """Evaluations of a search, which its rounds limit."""
 SEEDS = 100_000
 """Between the seeds of searches that begin anew."""
 LOWEST = "everything is met, and from there no step lowers what it costs: good enough, or at a kink"
+ASTRAY = "what costs less misses what is asked for"
 USED_UP = "the finisher's iterations are used up: raise `finisher_iterations`"
 NEAR_SIGMA = 0.3
 """First standard deviation of a search near what the finisher has found, in units of that of the first search."""
@@ -294,7 +296,7 @@ class Race:
         rows = revived_rows(self.running) if self.running else []
         last = self._shift(kind).moved(rows[-1]) if rows else self.rows[-1] if self.rows else None
         self.spent = self.options.spent(last) if last else None
-        poor = bool(rows) and self._poor(kind, rows[-1])
+        poor = bool(rows) and (self._poor(kind, rows[-1]) or strays(kind, rows))
         self.pausing = poor or (kind in SEARCHES and last is not None and last.iteration >= self._round_ends)
         if not rows or not (self.spent or self.pausing):
             return False
@@ -402,13 +404,14 @@ class Race:
     def _solve(self, kind: str, start: Array) -> Outcome:
         """Solve a part, from its checkpoint where it has one."""
         shift, self.pausing = self._shift(kind), False
-        last = self._round_ends
+        last, rows = self._round_ends, revived_rows(self.running) if self.running else []
 
         def see(row: TraceRow) -> None:
             moved = shift.moved(row)
+            rows.append(row)
             self.spent = self.options.spent(moved)
             round_ends = kind in SEARCHES and moved.iteration >= last
-            self.pausing = self.spent is not None or round_ends or self._poor(kind, row)
+            self.pausing = self.spent is not None or round_ends or self._poor(kind, row) or strays(kind, rows)
             try:
                 if self.monitor:
                     self.monitor(moved)
@@ -486,10 +489,16 @@ class Race:
         seconds = rows[-1].seconds - self._seconds() if rows else 0.0
         (point,) = self.evaluator.rate([outcome.z])
         counts = outcome.counts + shift.counts - self._counts() + Counts(rollouts=1)
-        confirmed = point.met and (self.problem.confirms is None or self.problem.confirms(point.z))
+        known = next((part for part in reversed(self.parts) if np.array_equal(part.z, point.z)), None)
+        if known is not None:
+            confirmed = known.confirmed
+        else:
+            confirmed = point.met and (self.problem.confirms is None or self.problem.confirms(point.z))
         goes_on = self.pausing and confirmed >= point.met  # not towards what is met and does not hold
         if kind == SEARCH and self.pausing and not goes_on:
             outcome = replace(outcome, status=Status.MET, advice="")
+        if kind == POLISH and self.pausing and self.spent is None:
+            outcome = replace(outcome, status=Status.STALLED, advice=ASTRAY)
         numbers = point.objective, point.merit, point.max_violation, point.met, confirmed
         part = RacePart(kind, outcome.status, outcome.advice, outcome.z, *numbers, counts, seconds)
         self._add_stages(part, outcome.stages if kind not in SEARCHES else ())
@@ -590,6 +599,12 @@ class Race:
             raise damaged(error) from error
         if size != self.problem.n:
             raise SymphysError(f"this checkpoint has {size} variables, the problem {self.problem.n}")
+
+
+def strays(kind: str, rows: Sequence[TraceRow]) -> bool:
+    """Whether what lowers the costs of what is met leads away from it: some iterations miss it, and ever more."""
+    last = [row.max_violation for row in rows[-PATIENCE:]]
+    return kind == POLISH and len(rows) > PATIENCE and all(each > 1 for each in last) and last[-1] >= last[0]
 
 
 def finisher(problem: ShootingProblem) -> Solver[Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import astuple, replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
@@ -19,7 +20,17 @@ from symphys.solvers import Counts, Outcome, Status, TraceRow
 from symphys.solvers.core.convergence import PLATEAU_ADVICE
 from symphys.solvers.core.subspace import search_space
 from symphys.solvers.methods import race
-from symphys.solvers.methods.race import CHECKED, FAR, UNCHECKED, WithFinerSteps, distance
+from symphys.solvers.methods.race import (
+    CHECKED,
+    FAR,
+    FINISH,
+    PATIENCE,
+    POLISH,
+    UNCHECKED,
+    WithFinerSteps,
+    distance,
+    strays,
+)
 
 SMALL = {"generations": 3, "population": 8, "rounds": 4}
 
@@ -170,6 +181,31 @@ def test_what_keeps_costs_low_and_misses_is_left() -> None:
     assert solve("least_squares", problem).z[0] == pytest.approx(1 / 101, abs=1e-6)
     found = solve("race", problem, options={**SMALL, "generations": 10})
     assert (found.status, found.z[0]) == (Status.MET, pytest.approx(1, abs=1e-2))
+
+
+def test_what_is_met_is_not_lowered_for_long_where_that_misses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Costs pull away from the target, by many iterations of gradient descent."""
+
+    def costs(z: Any, s: Any) -> Any:
+        return 100 * z[0] ** 2 + (z[0] - 1) ** 2 + 1e4 * z[1] ** 2
+
+    monkeypatch.setattr(race, "finisher", lambda problem: race.GRADIENT)
+    made = toy(2, objective=costs, errors=lambda z, s: ca.fabs(z[0] - 1) / 1e-2, bounds=(-3.0, 3.0))
+    problem = replace(made, stop_when_met=False)
+    for patience in (3, 1000):
+        monkeypatch.setattr(race, "PATIENCE", patience)
+        found = solve("race", problem, options={**SMALL, "generations": 10, "finisher_iterations": 100})
+        after = next(k for k, row in enumerate(reversed(found.trace)) if row.max_violation <= 1)
+        assert (after == 3) == (patience == 3) and found.z[0] == pytest.approx(1, abs=1e-2)
+        assert found.status is not Status.INTERRUPTED
+
+
+def test_a_few_iterations_may_miss_on_the_way() -> None:
+    rows: list[Any] = [SimpleNamespace(max_violation=each) for each in (0.5, *[2.0] * PATIENCE)]
+    assert strays(POLISH, rows) and not strays(FINISH, rows) and not strays(POLISH, rows[:-1])
+    assert not strays(POLISH, [*rows[:-1], SimpleNamespace(max_violation=1.5)])  # it comes nearer
+    rows[-3] = SimpleNamespace(max_violation=0.9)
+    assert not strays(POLISH, rows)
 
 
 def test_it_is_that_of_its_seed() -> None:
