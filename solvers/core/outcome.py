@@ -87,7 +87,8 @@ class TraceRow:
         gradient_norm: nan where the solver has none.
         step: length of the step in z (CMA-ES: sigma); nan for none.
         smoothing: in force.
-        outputs: by name, the problem's outputs at the best point so far, and the solver's own of the iteration.
+        outputs: by name, the problem's outputs at the best point so far, of descents over samples at the present one,
+            and the solver's own of the iteration.
     """
 
     iteration: int

@@ -163,7 +163,9 @@ class Descent(Method[DescentState], Generic[OptionsT]):
         if options.validates(k + 1):
             self.validation.keep(z)
         length = float(np.linalg.norm(z - state.z))
-        return Iteration(DescentState(k + 1, z, memory), found.point, found.typical, length, found.outputs)
+        names = self.evaluator.problem.output_names
+        outputs = {**dict(zip(names, found.point.outputs.tolist(), strict=False)), **found.outputs}
+        return Iteration(DescentState(k + 1, z, memory), found.point, found.typical, length, outputs)
 
     def terminate(self, state: DescentState) -> StopReason | None:
         """Return the reason after the last iteration."""

@@ -103,9 +103,9 @@ def at(row: TraceRow) -> str:
     """Return the iteration of a run in words, with the smoothing if there is any, since its numbers are not exact."""
     smoothed = f" at smoothing {row.smoothing:g}" if row.smoothing > 0 else ""
     outputs = "".join(f", {labelled(name, value)}" for name, value in row.outputs.items())
-    return (
-        f"iteration {row.iteration}, objective {number(row.best)}, worst {number(row.max_violation)}{outputs}{smoothed}"
-    )
+    now = f" (now {number(row.objective)})" if number(row.objective) != number(row.best) else ""
+    numbers = f"objective {number(row.best)}{now}, worst {number(row.max_violation)}"
+    return f"iteration {row.iteration}, {numbers}{outputs}{smoothed}"
 
 
 def percent(share: float) -> str:

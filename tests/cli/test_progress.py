@@ -122,7 +122,7 @@ def test_runs_without_news_say_what_they_are_at(clock: Clock, capsys: pytest.Cap
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "throw cma seed 0: begins"
     assert lines[1] == "throw cma seed 0: building and compiling for 7 s"
-    assert lines[2] == "throw cma seed 0: no new iteration for 6 s; iteration 0, objective 1, worst 0.5"
+    assert lines[2] == "throw cma seed 0: no new iteration for 6 s; iteration 0, objective 1 (now 2), worst 0.5"
     assert len(lines) == 3
 
 
@@ -152,7 +152,7 @@ def test_plain_lines_say_share_and_time(clock: Clock, capsys: pytest.CaptureFixt
     plain.advanced(job, row(2, 120, 5.0))  # type: ignore[arg-type]
     line = capsys.readouterr().err.splitlines()[1]
     assert line == (
-        "throw cma seed 0: iteration 2, objective 1, worst 0.5; 30 % of its budget, at most 14 s of solving left; "
+        "throw cma seed 0: iteration 2, objective 1 (now 2), worst 0.5; 30 % of its budget, at most 14 s of solving left; "
         "0 of 2 runs done, 15 % of all"
     )
 

@@ -36,5 +36,5 @@ def test_a_setting_that_cannot_be(run: Run, throw: Path) -> None:
 
 def test_progress_names_the_smoothing_where_numbers_are_not_exact() -> None:
     row = TraceRow(7, 8, 8, 0, 0, 0.1, 2.0, 1.5, 3.0, 0.1, 0.1, 0.03)
-    assert at(row) == "iteration 7, objective 1.5, worst 3 at smoothing 0.03"
-    assert at(replace(row, smoothing=0.0)) == "iteration 7, objective 1.5, worst 3"
+    assert at(row) == "iteration 7, objective 1.5 (now 2), worst 3 at smoothing 0.03"
+    assert at(replace(row, smoothing=0.0)) == "iteration 7, objective 1.5 (now 2), worst 3"

@@ -114,13 +114,12 @@ def build_studies(found: Sequence[Study]) -> list[Html]:
     links = [tag("a", linked(study), href=f"#{anchor}") for study, anchor in zip(found, names, strict=True)]
     curves = curve_count(found)
     runs = [run for study in found for run in study.runs]
-    long = any(len(entry.runs) > comparison.MOST_CHIPS for study in found for entry in study.entries)
-    every = run_card(found, page_links(runs)) if long else Html("")
+    every = run_card(found, page_links(runs)) if len(runs) > 1 else Html("")
     if len(found) == 1:
         return [build_study(found[0], NUMBERS, names[0], curves, every)]
     room = min(NUMBERS, MOST_NUMBERS // len(found))
     parts = [build_study(study, room, name, curves) for study, name in zip(found, names, strict=True)]
-    return [tag("nav", *links, aria_label="Problems"), every, *parts]
+    return [tag("nav", *links, aria_label="Problems"), *parts, every]
 
 
 def linked(study: Study) -> str:
@@ -167,10 +166,10 @@ def build_study(study: Study, numbers: int, anchor: str, curves: int, every: Htm
         tag("p", OVERSIZED, class_="note") if oversized(whole) or oversized([r.objective for r in study.runs]) else "",
         answers_card(study),
         card("Solvers", comparison.solver_table(study), note=comparison.table_note(study)),
-        every or "",
         card("Convergence", figures([converged] if converged else [], comparison.convergence_note(study, curves))),
         card("The motion", best_motion(study.best, numbers), note=best_note(study.best)),
         targets(study),
+        every or "",
         class_="study" if titled else None,
         id=anchor,
     )
