@@ -152,8 +152,8 @@ def test_plain_lines_say_share_and_time(clock: Clock, capsys: pytest.CaptureFixt
     plain.advanced(job, row(2, 120, 5.0))  # type: ignore[arg-type]
     line = capsys.readouterr().err.splitlines()[1]
     assert line == (
-        "throw cma seed 0: iteration 2, objective 1 (now 2), worst 0.5; 30 % of its budget, at most 14 s of solving left; "
-        "0 of 2 runs done, 15 % of all"
+        "throw cma seed 0: iteration 2, objective 1 (now 2), worst 0.5; 30 % of its budget, at most 14 s of solving "
+        "left; 0 of 2 runs done, 15 % of all"
     )
 
 
