@@ -193,6 +193,8 @@ def smoothed_findings(rows: tuple[Smoothed, ...], judged: Judged) -> list[Findin
     if rows[0].own:
         level = smoothed_level(rows[0], judged)
         level = BAD if level == UNKNOWN else level
+        if level != GOOD and judged.accepted:
+            return [Finding(SMOOTHING, UNKNOWN, what, number, "Smoothed it is another motion; it is judged without.")]
         meaning = {
             GOOD: "What the solver sees is what happens without smoothing.",
             FAIR: "The solver sees something a little better or worse than what happens: lower the smoothing at last.",

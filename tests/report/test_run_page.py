@@ -122,7 +122,7 @@ def test_figures_are_files_on_request(shown: Shown, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_knots_and_controls_are_drawn(batch: Path) -> None:
     text = read(batch / "two_balls" / "gradient-seed0")
-    assert "push: 480 knots of 2 components" in Page(text).text
+    assert "push: 2 components at 480 instants" in Page(text).text
     assert {"controls", "variables"} <= set(charts(text))
 
 

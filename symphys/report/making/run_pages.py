@@ -62,7 +62,7 @@ DIED = "the process that made it died: killed from outside, out of memory, or a 
 SLOW = "it was not made within {:g} s"
 STOP_TIMEOUT = 20.0
 """[s] that a worker has for the end of its page once it is asked to stop."""
-MIN_PAGES_PER_WORKER = 80
+MIN_PAGES_PER_WORKER = 40
 """A worker takes a second to start: it is started for so many pages at least."""
 MIN_FIGURES_PER_WORKER = 4
 """A worker is started for the figures of so many runs at least, each of which take a second."""

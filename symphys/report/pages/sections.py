@@ -226,7 +226,7 @@ def found(run: Run, charts: Mapping[str, Chart]) -> Html:
     if not any(np.isfinite(each).any() for variable in single for each in (variable.lower, variable.upper)):
         header, kinds, rows = header[:3], kinds[:3], [row[:3] for row in rows]
     curves = [
-        f"{v.name}: {writing.several(v.value.shape[1], 'knot')} of {writing.several(v.value.shape[0], 'component')}"
+        f"{v.name}: {writing.several(v.value.shape[0], 'component')} at {v.value.shape[1]} instants"
         + (f" (sets {sets_of(v)})" if len(v.sets) > 1 else "")
         for v in knotted(run)
     ]
