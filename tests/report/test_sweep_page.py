@@ -15,6 +15,7 @@ from symphys.report import write_batch_report, write_run_report
 from symphys.report.pages.answers import found_numbers
 from symphys.report.pages.sweep import sweep_of
 from symphys.results.discovery import read_all, studies
+from symphys.results.drawable import OVERSIZED
 from symphys.results.run import BriefReader, read_run
 
 Edit = Callable[..., None]
@@ -98,3 +99,25 @@ def test_numbers_that_were_found_have_names_and_units(run_dir: Path, edit: Edit)
     z["throw"]["unit"] = "m/s"
     edit(run_dir / "result.json", z=z)
     assert found_numbers(read_run(run_dir, run_dir))["throw.x [m/s]"] == 4.0
+
+
+def test_of_very_many_runs_some_are_drawn_and_all_are_counted(
+    run_dir: Path, tmp_path: Path, edit: Edit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("symphys.report.pages.sweep.MOST_RUNS", 4)
+    root = swept(tmp_path / "out", run_dir, edit, [{"ground.friction": 0.1 * k} for k in range(1, 8)], missed=1)
+    text = write_batch_report(root).read_text("utf-8")
+    (panel,) = [panel for panel in charts(text)["sweep"]["panels"] if panel["title"] == "throw.x"]
+    assert sum(len(line.get("links", ())) for line in panel["lines"]) == 4
+    assert "6 of 7 runs solved" in text and "Drawn are 4 of 7 runs" in text
+
+
+def test_numbers_near_the_largest_double(run_dir: Path, tmp_path: Path, edit: Edit) -> None:
+    root = swept(tmp_path / "out", run_dir, edit, [{"ground.friction": 0.1 * k} for k in range(1, 4)])
+    for k, file in enumerate(sorted(root.rglob("result.json"))):
+        z = json.loads(file.read_text())["z"]
+        z["throw"]["value"][:2] = [1.7e308 * (-1) ** k, 1.7e308]
+        edit(file, z=z, objective=1.7e308)
+    text = write_batch_report(root).read_text("utf-8")
+    assert OVERSIZED in text
+    assert not {"throw.x", "throw.y", "objective"} & {panel["title"] for panel in charts(text)["sweep"]["panels"]}

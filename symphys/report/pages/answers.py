@@ -83,7 +83,7 @@ def variable_rows(name: str, every: Sequence[Sequence[VariableRecord]]) -> list[
     first = next(each for each in of_each if each is not None)
     sets = tag("small", " " + ", ".join(first.sets))
     if not is_listed(first):
-        many = f"{first.value.shape[1]} knots" if first.value.shape[1] > 1 else f"{len(first.value)} numbers"
+        many = f"at {first.value.shape[1]} instants" if first.value.shape[1] > 1 else f"{len(first.value)} numbers"
         cells = ["" if each is None else extent(each.value, first.unit) for each in of_each]
         return [[join([tag("b", name), f" {many}", sets]), *cells, extent(first.guess, first.unit)]]
     rows: list[list[Html | str]] = []
@@ -124,6 +124,7 @@ def is_another(first: Sequence[VariableRecord], second: Sequence[VariableRecord]
         if other is None or other.value.shape != variable.value.shape:
             return True
         size = max(float(np.abs(each).max(initial=0.0)) for each in (variable.value, other.value))
-        if float(np.abs(variable.value - other.value).max(initial=0.0)) > ANOTHER * size:
+        apart = np.abs(variable.value / 2 - other.value / 2).max(initial=0.0)  # halves: a difference may overflow
+        if float(apart) > ANOTHER / 2 * size:
             return True
     return False

@@ -78,7 +78,7 @@ def build_sections(found: Sequence[Study]) -> list[Html]:
     sweep = sweep_of(found)
     if sweep is None:
         return build_tables(found) if len(found) > MOST_STUDIES else build_studies(found)
-    links = page_links(sweep.runs)
+    links = page_links(sweep.every)
     best = Study(found[0].problem, "", tuple(entry for study in found for entry in study.entries)).best
     motion = card("The motion", best_motion(best, NUMBERS), note=best_note(best, setting=True))
     return [*sweep_parts(sweep, links), motion, run_card(found, links)]

@@ -285,7 +285,7 @@ def all_components(variable: VariableRecord) -> Html:
     ]
     unit = f" [{variable.unit}]" * bool(variable.unit)
     title = tag("summary", f"All {len(numbers)} numbers of {variable.name}{unit}")
-    return tag("details", title, tag("ol", *(tag("li", number) for number in numbers), class_="numbers", start="0"))
+    return tag("details", title, tag("ul", *(tag("li", number) for number in numbers), class_="numbers"))
 
 
 def root_mean_square(numbers: Array) -> float:

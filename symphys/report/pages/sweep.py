@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,13 +22,14 @@ from symphys.report.pages.answers import found_numbers
 from symphys.report.pages.comparison import solve_time
 from symphys.report.pages.markup import Html, banner, card, figures, tag
 from symphys.results.discovery import Study, middle
+from symphys.results.drawable import OVERSIZED, drawable, oversized
 from symphys.results.run import Run
 from symphys.types import Array
 
 LEAST_STUDIES = 3
 """Settings of one problem that make a sweep, at least."""
-MOST_MEASURES, MOST_SIDE, MOST_NAMED = 12, 30, 20
-"""Numbers that are drawn; values along a side of a table; runs that are named, at most."""
+MOST_RUNS, MOST_MEASURES, MOST_SIDE, MOST_NAMED = 600, 12, 30, 20
+"""Runs and numbers that are drawn; values along a side of a table; runs that are named, at most."""
 SAME = 1e-9
 """Difference, as a share of the number and of 1, below which it counts as the same."""
 WIDE = 100.0
@@ -55,17 +57,21 @@ class SweptRuns:
 
     Attributes:
         keys: the settings that differ.
-        runs: all of them.
+        every: all of them.
+        runs: those that are drawn.
         at: (runs, keys) the values of the keys.
         measures: what is drawn.
         same: numbers that are the same in all runs, in words.
+        oversized: whether numbers are too large to be drawn.
     """
 
     keys: tuple[str, ...]
+    every: tuple[Run, ...]
     runs: tuple[Run, ...]
     at: Array
     measures: tuple[Measure, ...]
     same: tuple[str, ...]
+    oversized: bool
 
 
 def sweep_of(found: Sequence[Study]) -> SweptRuns | None:
@@ -78,18 +84,23 @@ def sweep_of(found: Sequence[Study]) -> SweptRuns | None:
     if not keys or any(type(each.get(key)) not in (int, float) for each in settings for key in keys):
         return None
     pairs = [(values, run) for values, study in zip(settings, found, strict=True) for run in study.runs]
-    runs = tuple(run for _, run in pairs)
-    at = np.array([[float(values[key]) for key in keys] for values, _ in pairs])
-    every = measures(runs)
-    varied = [each for each in every if each.varies or each.met]
-    same = tuple(map(constant_words, (each for each in every if not (each.varies or each.met))))
-    return SweptRuns(tuple(keys), runs, at, tuple(varied[:MOST_MEASURES]), same)
+    every = tuple(run for _, run in pairs)
+    drawn = [pairs[k] for k in np.linspace(0, len(pairs) - 1, min(len(pairs), MOST_RUNS)).round().astype(int)]
+    runs = tuple(run for _, run in drawn)
+    at = np.array([[float(values[key]) for key in keys] for values, _ in drawn])
+    whole = measures(runs)
+    known = [replace(each, values=drawable(each.values)) for each in whole]
+    known = [each for each in known if np.isfinite(each.values).any()]
+    varied = [each for each in known if each.varies or each.met]
+    same = tuple(map(constant_words, (each for each in known if not (each.varies or each.met))))
+    too_large = any(oversized(each.values) for each in whole)
+    return SweptRuns(tuple(keys), every, runs, at, tuple(varied[:MOST_MEASURES]), same, too_large)
 
 
 def constant_words(measure: Measure) -> str:
     """Write a number that is the same in all runs, with its unit: ``throw.y 0 m/s``."""
     what, _, unit = measure.title.removesuffix("]").partition(" [")
-    return f"{what} {show(float(np.nanmean(measure.values)))} {unit}".rstrip()
+    return f"{what} {show(float(measure.values[np.isfinite(measure.values)][0]))} {unit}".rstrip()
 
 
 def measures(runs: Sequence[Run]) -> list[Measure]:
@@ -105,7 +116,7 @@ def measures(runs: Sequence[Run]) -> list[Measure]:
         ("time of the solve [s]", solve_time, False),
     )
     found += [Measure(title, np.array([read(run) for run in runs]), met) for title, read, met in of]
-    return [measure for measure in found if np.isfinite(measure.values).any()]
+    return found
 
 
 def sweep_parts(sweep: SweptRuns, links: Mapping[str, str]) -> list[Html]:
@@ -114,23 +125,28 @@ def sweep_parts(sweep: SweptRuns, links: Mapping[str, str]) -> list[Html]:
     grid = [np.unique(sweep.at[:, k]) for k in range(len(sweep.keys))]
     if len(sweep.keys) == 2 and max(map(len, grid)) <= MOST_SIDE:
         tables = [heat_table(sweep, measure, grid, links) for measure in sweep.measures]
-        framed = "The larger, the darker; framed: not solved. A number leads to the page of its run."
+        framed = "Medians over solvers and seeds. " * (len(sweep.runs) > grid[0].size * grid[1].size)
+        framed += "The larger, the darker; framed: not solved. A number leads to the page of its run."
         shown = [tag("div", *tables, class_="heats"), tag("p", framed, class_="caption")]
     else:
         shown = [figures([chart(sweep, links)], "Filled: solved; hollow: not. A point leads to the page of its run.")]
+    if len(sweep.runs) < len(sweep.every):
+        shown.append(tag("p", f"Drawn are {len(sweep.runs)} of {len(sweep.every)} runs, evenly.", class_="caption"))
+    if sweep.oversized:
+        shown.append(tag("p", OVERSIZED, class_="caption"))
     same = tag("p", f"The same in all runs: {writing.listed(sweep.same)}.", class_="caption") if sweep.same else ""
     return [verdict(sweep), card(f"Results against {named}", *shown, same, anchor="sweep"), unsolved(sweep, links)]
 
 
 def verdict(sweep: SweptRuns) -> Html:
     """Return a banner: how many runs are solved, and from what to what each number goes."""
-    solved = sum(run.solved for run in sweep.runs)
-    level = "good" if solved == len(sweep.runs) else "fair" if solved else "bad"
+    solved = sum(run.solved for run in sweep.every)
+    level = "good" if solved == len(sweep.every) else "fair" if solved else "bad"
     ranges = []
     for key, values in zip(sweep.keys, sweep.at.T, strict=True):
         different = writing.several(len(np.unique(values)), "value")
         ranges.append(f"{key} from {show(values.min())} to {show(values.max())} ({different})")
-    return banner(level, f"{solved} of {writing.several(len(sweep.runs), 'run')} solved", f"{'; '.join(ranges)}.")
+    return banner(level, f"{solved} of {writing.several(len(sweep.every), 'run')} solved", f"{'; '.join(ranges)}.")
 
 
 def chart(sweep: SweptRuns, links: Mapping[str, str]) -> Chart:
@@ -211,7 +227,7 @@ def heat_cell(
 
 def unsolved(sweep: SweptRuns, links: Mapping[str, str]) -> Html:
     """Name the runs that are not solved, with what they came to."""
-    missed = [run for run in sweep.runs if not run.solved]
+    missed = [run for run in sweep.every if not run.solved]
     items = []
     for run in missed[:MOST_NAMED]:
         name = f"{run.place.rpartition('/')[0] or run.problem}, {run.solver}, seed {run.seed}"
