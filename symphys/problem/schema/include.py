@@ -26,7 +26,7 @@ class IncludeTable(SchemaTable):
     file: str = Field(
         min_length=1,
         description='"robots/table_robot.toml": relative to the folder of this file, else a shipped robot of that path;'
-        " a model of MuJoCo (.xml) or a URDF (.urdf) becomes tables, see docs/robots.md",
+        " a model of MuJoCo (.xml) or a URDF (.urdf) becomes tables, see the page Robots of the documentation",
     )
     position: Vector = Field(
         default=[0.0, 0.0, 0.0],
@@ -45,7 +45,7 @@ class IncludeTable(SchemaTable):
     )
     base: Literal["auto", "free", "fixed"] = Field(
         default="auto",
-        description='of a .urdf: whether its root link floats; "auto": see docs/robots.md',
+        description='of a .urdf: whether its root link floats; "auto": see the page Robots of the documentation',
     )
 
 
