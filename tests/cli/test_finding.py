@@ -118,7 +118,22 @@ def test_diff(run: Run, out: Path) -> None:
     assert run("diff", first, first)[1].startswith("no difference")
     _, printed, _ = run("diff", first, out / "throw" / "gradient-seed2")
     assert "second run: result.json: not valid JSON" in printed
+    code, _, err = run("diff", first, out)
+    assert code == 2 and f"{out} is no run folder; `symphys ls DIR` lists those below a folder" in err
     assert run("diff", first, out / "nothing")[0] == 2
+
+
+def test_open_makes_a_page_that_is_missing_and_shows_it(run: Run, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[str] = []
+    monkeypatch.setattr("webbrowser.open", shown.append)
+    single = out / "throw" / "gradient-seed0"
+    for folder, page in ((out, out / "index.html"), (single, single / "report.html")):
+        code, printed, _ = run("open", folder)
+        assert (code, printed.strip()) == (0, page.resolve().as_uri())
+        assert page.is_file() and shown[-1] == page.resolve().as_uri()
+    before = (single / "report.html").stat().st_mtime_ns
+    assert run("open", single)[0] == 0 and (single / "report.html").stat().st_mtime_ns == before
+    assert run("open", out / "nothing")[0] == 2
 
 
 def test_replay(run: Run, throw: Path) -> None:

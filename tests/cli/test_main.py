@@ -17,6 +17,7 @@ from tools.waiting import FOREVER
 
 import symphys
 from symphys import problems
+from symphys.cli.app import app
 from symphys.report import write_batch_report
 from symphys.results.config import case_name
 from symphys.runs import read_result
@@ -242,6 +243,21 @@ def test_show_draws_the_guess(run: Run, throw: Path) -> None:
     assert page.is_file() and page.parts[0] == "pictures"
     panels = charts(page.read_text(encoding="utf-8"))["contacts"]["panels"]
     assert [panel["title"] for panel in panels][1:] == ["ball-ground: gap [m]"]
+
+
+def test_help_has_every_command_in_a_group_with_a_whole_sentence(run: Run) -> None:
+    code, out, _ = run("-h")
+    assert code == 0 and out.count("...") == 1  # of the arguments, in the first line
+    assert [name for name in app.commands if f"\n  {name} " not in out] == []
+    assert "Begin with `symphys solve ball_throw`" in out
+
+
+def test_the_list_wraps_between_words(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "72")
+    _, out, _ = run("list")
+    assert max(map(len, out.splitlines())) <= 72
+    flat = " ".join(out.split())
+    assert "acrobot An acrobot swings up from rest [ilqr]" in flat and "[chosen for it]" in flat
 
 
 def test_list_names_problems_and_solvers(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
