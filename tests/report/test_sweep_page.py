@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from tools.page_scripts import charts
 
-from symphys.report import write_batch_report, write_run_report
+from symphys.report import write_batch_report
 from symphys.report.pages.answers import found_numbers
 from symphys.report.pages.sweep import sweep_of
 from symphys.results.discovery import read_all, studies
@@ -33,7 +33,7 @@ def swept(root: Path, run: Path, edit: Edit, points: list[dict[str, float]], mis
         edit(folder / "result.json", z=z)
         if k == missed:
             edit(folder / "result.json", solved=False, status="stalled", verdict="not_solved")
-        write_run_report(folder)
+        (folder / "report.html").touch()  # a page that is there is linked
     return root
 
 

@@ -269,10 +269,10 @@ tolerance = 1
 """
 
 
-@pytest.mark.parametrize("push", [2.0, 8.0, 20.0, 50.0])
+@pytest.mark.parametrize("push", [8.0, 50.0])
 def test_a_motor_that_pushes_through_an_impact_is_not_taken_for_its_contact(make: Make, push: float) -> None:
     """The foot lands at any instant of a step, and its rate against the torso jumps."""
-    for height in np.linspace(0.2, 0.215, 4):
+    for height in (0.2, 0.21):
         text = LEG.replace("0, 0.4]", f"0, {height}]").replace("guess = 8.0", f"guess = {push}")
         record, told = found(make(text))
         assert np.abs(record.motion.contact_force).max() > push  # it lands
