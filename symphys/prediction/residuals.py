@@ -134,7 +134,9 @@ class RecordingResiduals:
 def residuals_of(problem: Problem, threads: int | None = None) -> RecordingResiduals:
     """Return the residuals of all recordings of a problem; IdentificationError where there is nothing to identify."""
     if not problem.recordings:
-        raise IdentificationError("there is no [[recording]] to identify from; the page Identification of the documentation has an example")
+        raise IdentificationError(
+            "there is no [[recording]] to identify from; the documentation has one, Identification"
+        )
     if not problem.variables:
         raise IdentificationError("there is no [[variable]], so that nothing can be identified")
     return RecordingResiduals(problem, Predictor(problem, problem.recordings, threads))

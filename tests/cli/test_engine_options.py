@@ -24,7 +24,7 @@ def test_a_batch_on_an_engine_ends_like_any_other(run: Any, throw: Path, monkeyp
     command = ("solve", throw, "--solver", "least_squares", "--seeds", 3, "--unexamined", "--jobs", 2, "--on", "dask")
     for _ in range(2):
         code, out, err = run(*command, "--out", "results")
-        assert code == 0 and "3/3" in out and "report: results" in out
+        assert code == 0 and "3/3" in out and "report: file:" in out
     assert opened == [("dask", "", 2, (Path.cwd() / "results"))]
     assert err.count("done before") == 3
     assert [path.name for path in Path("results").iterdir() if path.name.startswith(".")] == [".runs.jsonl"]

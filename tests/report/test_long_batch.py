@@ -77,10 +77,12 @@ def test_rows_are_data_that_hold_every_run(long: tuple[Path, str]) -> None:
 
 
 @pytest.mark.slow
-def test_few_runs_have_no_table(made: Path, tmp_path: Path) -> None:
+def test_few_runs_have_chips_and_a_table_and_one_has_none(made: Path, tmp_path: Path) -> None:
     shutil.copytree(made / "ball_throw", tmp_path / "few")
     text = write_batch_report(tmp_path / "few").read_text(encoding="utf-8")
-    assert not rows_of(text) and 'class="pill good"' in text
+    assert len(rows_of(text)) == 1 and 'class="pill good"' in text
+    shutil.copytree(made / "ball_throw" / "cma-seed0", tmp_path / "one" / "cma-seed0")
+    assert not rows_of(write_batch_report(tmp_path / "one").read_text(encoding="utf-8"))
 
 
 def test_many_settings_are_tables_without_figures(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from symphys.results.discovery import run_folders
+from symphys.results.table.journal import JOURNAL_FILE
 
 RUN_PAGE, BATCH_PAGE = "report.html", "index.html"
 OWN_PAGES = frozenset({RUN_PAGE, BATCH_PAGE})
@@ -42,6 +43,8 @@ DRAWING = (
 )
 """Modules and rooms of the package whose code takes part in a page."""
 SOURCES = (".py", ".js", ".css")
+MOST_UP = 3
+"""Folders between a run's and that of a batch, at most."""
 HEAD = 4096
 """[bytes] of a page that hold its stamp."""
 STAMP = re.compile(rb'<meta name="made-from" content="([0-9a-f]{64})">')
@@ -64,9 +67,18 @@ def read_stamp(page: Path) -> str:
     return found[1].decode("ascii") if found else ""
 
 
+def batch_page(folder: Path) -> str:
+    """Return the address of the page of all runs, seen from a run's; empty where no folder above keeps runs."""
+    for up, above in enumerate(folder.resolve().parents[:MOST_UP], start=1):
+        if (above / JOURNAL_FILE).is_file():
+            return "../" * up + BATCH_PAGE
+    return ""
+
+
 def folder_digest(folder: Path) -> str:
     """Return the checksum of a folder's path, of the files in it but its pages, and of the drawing code."""
-    found = hashlib.sha256(f"{drawing_digest()} {folder.resolve()}".encode(errors="surrogateescape"))
+    made = f"{drawing_digest()} {folder.resolve()} {batch_page(folder)}"
+    found = hashlib.sha256(made.encode(errors="surrogateescape"))
     try:
         with os.scandir(folder) as inside:
             names = sorted(each.name for each in inside if each.name[0] != "." and each.name not in OWN_PAGES)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from symphys.findings.writing import beside, capital, show
 from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart
 from symphys.report.charts.run import component_names, knotted
-from symphys.report.making.stamps import BATCH_PAGE
+from symphys.report.making.stamps import batch_page
 from symphys.report.pages import words
 from symphys.report.pages.markup import (
     Html,
@@ -40,7 +39,6 @@ from symphys.report.pages.markup import (
 from symphys.results.config import settings_words
 from symphys.results.result import CheckRecord, Result, StageRecord, VariableRecord, smoothed
 from symphys.results.run import Run
-from symphys.results.table.journal import JOURNAL_FILE
 from symphys.results.trace import OUTPUT
 from symphys.types import Array
 
@@ -52,8 +50,6 @@ FOOTER = tag(
     tag("code", "symphys report --figures"),
     " writes its figures as SVG, and the numbers in them as CSV.",
 )
-MOST_UP = 3
-"""Folders between a run's and that of a batch, at most."""
 MOST_ROWS = 60
 MOST_COMPONENTS = 8
 """Components of a variable that have a row each, at most; of more there is the range, and a fold with all."""
@@ -124,14 +120,6 @@ def header(run: Run, cards: Sequence[Html]) -> Html:
             tag("nav", *links, aria_label="Sections") if run.readable else "",
         ]
     )
-
-
-def batch_page(folder: Path) -> str:
-    """Return the address of the page of all runs, seen from a run's; empty where no folder above keeps runs."""
-    for up, above in enumerate(folder.resolve().parents[:MOST_UP], start=1):
-        if (above / JOURNAL_FILE).is_file() or (above / BATCH_PAGE).is_file():
-            return "../" * up + BATCH_PAGE
-    return ""
 
 
 def key_numbers(run: Run) -> Html:
