@@ -43,11 +43,11 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
         "applied", the work of applied forces and torques, motors, springs and changes of gravity, and "contact", what
         contacts, limits of joints and joints that give way gave (negative: took) [J].
         "gains": the steps in which rigid contacts gave most, each with "step", "time" [s], "energy" [J], "contacts";
-        what motors may have given at the rates of joints before or after an impact is not counted, and steps in which a
-        soft contact acts are left out, since it gives back what it has stored. "gained" [J]: the sum of all such steps.
-        "stops": the same of the steps in which they took most from a body that lay or rolled on something, by a force
-        from another side: it ran into something, or tripped over an edge. What slip takes under the load of the step
-        before is not counted. "drift" [J]: the largest change in a step that neither forces nor contacts account for.
+        steps in which a soft contact acts are left out, since it gives back what it has stored. "gained" [J]: the sum
+        of all such steps. "stops": the same of the steps in which they took most from a body that lay or rolled on
+        something, by a force from another side: it ran into something, or tripped over an edge. What slip takes under
+        the load of the step before is not counted. "drift" [J]: the largest change in a step that neither forces nor
+        contacts account for.
         "unexplained" [J]: the largest that is more than twice what servos and springs did in the step, whose work is
         not known to that precision, in the step from "drift_at" [s]; "drifted" [J]: the largest sum of such changes
         since the start.
@@ -57,7 +57,7 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
     """
     motion = record.motion
     kinetic, potential, applied = _energies(rollout, record)
-    by_motors, uncertain, when_struck = joint_work(rollout, record)
+    by_motors, uncertain = joint_work(rollout, record)
     applied += by_motors
     surplus = np.diff(kinetic + potential) - applied
     by_joints = uncounted(rollout, record)
@@ -65,7 +65,7 @@ def balance(rollout: Rollout, record: Record) -> dict[str, Any]:
     contact = np.where(touched, surplus, 0.0)
     soft = np.array([pair.law.soft for pair in rollout.world.pairs], bool)
     rigid = ~acting(motion)[:, soft].any(axis=1) & ~by_joints
-    gains = np.where(rigid, contact - when_struck, 0.0)
+    gains = np.where(rigid, contact, 0.0)
     floor = MIN_GAIN * kinetic.max() + 1e-12 * np.abs(potential).max()
     gains = np.where(gains > floor, gains, 0.0)
     first = np.argsort(-gains, kind="stable")[:MAX_GAINS]

@@ -61,12 +61,8 @@ def parameters(rollout: Rollout) -> Any:
     return ca.vertcat(ca.SX(0, 1), *rollout.parameters.symbols)
 
 
-def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
-    """Return the work of motors, springs and dry friction in each step (N,) [J], and two bounds of its error.
-
-    The first bound is the sum of the absolute values. The second one is for steps with impacts, whose instant is not
-    recorded: a force works at the rate before the impact, then at that after it. Beside the impact the rate changes as
-    in the steps around.
+def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
+    """Return the work of motors, springs and dry friction in each step (N,) [J], and the sum of its absolute values.
 
     A commanded torque acts from the start of its step to the end, in addition to the law of the motor. The leapfrog
     scheme has the other forces half a substep ahead of the velocities at the ends of a step; of a split step only the
@@ -74,8 +70,7 @@ def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
     other within a step the result is wrong by up to twice its work.
     """
     layout, x = Layout(rollout.world), record.arrays.x
-    total, gross, struck = (np.zeros(rollout.steps) for _ in range(3))
-    lag = x[:, layout["lag"]]
+    total, gross, lag = np.zeros(rollout.steps), np.zeros(rollout.steps), x[:, layout["lag"]]
     for joint, _, rate in coordinates(rollout, record):
         for part in (part for part in WORKING if part in joint.acting):
             force = x[:, layout[f"{joint.name}.{part}"]]
@@ -87,10 +82,7 @@ def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array, Array]:
             work = impulse * (rate[:-1] + rate[1:]) / 2
             total += work.sum(axis=1)
             gross += 0 if is_torque else np.abs(work).sum(axis=1)
-            change = np.abs(np.diff(rate, axis=0, prepend=rate[:1], append=rate[-1:]))
-            off = change[1:-1] / 2 + np.maximum(change[:-2], change[2:])
-            struck += (np.abs(impulse) * off).sum(axis=1)
-    return total, gross, struck
+    return total, gross
 
 
 def rotor_energy(world: World, x: Any) -> Any:
