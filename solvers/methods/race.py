@@ -296,16 +296,23 @@ class Race:
         rows = revived_rows(self.running) if self.running else []
         last = self._shift(kind).moved(rows[-1]) if rows else self.rows[-1] if self.rows else None
         self.spent = self.options.spent(last) if last else None
-        poor = bool(rows) and (self._poor(kind, rows[-1]) or strays(kind, rows))
-        self.pausing = poor or (kind in SEARCHES and last is not None and last.iteration >= self._round_ends)
+        given_up = bool(rows) and self._gives_up(kind, rows)
+        self.pausing = given_up or (kind in SEARCHES and last is not None and last.iteration >= self._round_ends)
         if not rows or not (self.spent or self.pausing):
             return False
         z, counts = np.array(self.running["best"]["z"], float), Counts(*map(int, self.running["counts"]))
         self._take(kind, Outcome(Status.INTERRUPTED, "", z, tuple(rows), counts, self.running))
         return True
 
-    def _poor(self, kind: str, row: TraceRow) -> bool:
-        """Whether a try from the guess ends with this row of its own: it is far after some iterations."""
+    def _gives_up(self, kind: str, rows: Sequence[TraceRow]) -> bool:
+        """Whether a part ends with the last of its ``rows``.
+
+        A try from the guess does if it is far after some iterations; what lowers the costs of what is met if it leads
+        away from that: some iterations miss it, and ever more.
+        """
+        row, last = rows[-1], [each.max_violation for each in rows[-PATIENCE:]]
+        if kind == POLISH:
+            return len(rows) > PATIENCE and all(each > 1 for each in last) and last[-1] >= last[0]
         if kind not in TRIES or row.iteration != self.options.finisher_iterations:
             return False
         searched = min((part.max_violation for part in self.parts if part.kind == SEARCH), default=0.0)
@@ -411,7 +418,7 @@ class Race:
             rows.append(row)
             self.spent = self.options.spent(moved)
             round_ends = kind in SEARCHES and moved.iteration >= last
-            self.pausing = self.spent is not None or round_ends or self._poor(kind, row) or strays(kind, rows)
+            self.pausing = self.spent is not None or round_ends or self._gives_up(kind, rows)
             try:
                 if self.monitor:
                     self.monitor(moved)
@@ -599,12 +606,6 @@ class Race:
             raise damaged(error) from error
         if size != self.problem.n:
             raise SymphysError(f"this checkpoint has {size} variables, the problem {self.problem.n}")
-
-
-def strays(kind: str, rows: Sequence[TraceRow]) -> bool:
-    """Whether what lowers the costs of what is met leads away from it: some iterations miss it, and ever more."""
-    last = [row.max_violation for row in rows[-PATIENCE:]]
-    return kind == POLISH and len(rows) > PATIENCE and all(each > 1 for each in last) and last[-1] >= last[0]
 
 
 def finisher(problem: ShootingProblem) -> Solver[Any]:

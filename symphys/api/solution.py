@@ -15,7 +15,7 @@ from symphys.errors import SymphysError
 from symphys.problem import Problem, load_problem
 from symphys.records import dataclass
 from symphys.results.config import read_config
-from symphys.results.discovery import is_run
+from symphys.results.discovery import is_run_folder
 from symphys.results.file_names import CONFIG, GAINS, PROBLEM, TRAJECTORY
 from symphys.results.result import CheckRecord
 from symphys.results.run import Run, read_run
@@ -216,7 +216,7 @@ def read(folder: str | Path) -> Solution:
         True
     """
     path = Path(folder)
-    if not path.is_dir() or not is_run([each.name for each in path.iterdir()]):
+    if not is_run_folder(path):
         raise SymphysError(f"{path}: no run folder; one holds result.json, as reports/ball_throw/gradient-seed0 does")
     run = read_run(path, path)
     if not run.readable:

@@ -108,23 +108,23 @@ def report(folder: Path, pages: str | None, figures: bool, remake: bool, new: bo
 def open_page(folder: Path) -> int:
     """Show the report of DIR, which is `reports` if it is left out, in a browser, and print its address.
 
-    DIR is a run folder, or one above run folders. A page that is missing or out of date is made first.
+    DIR is that of a run or an identification, or one above run folders. A page that is out of date is made first.
     """
     import webbrowser
 
-    from symphys.report import outdated, wanted_below, write_run_report
-    from symphys.report.making.stamps import RUN_PAGE
-    from symphys.results.discovery import is_run
+    from symphys.report import identification_folders, wanted_below, write_report
+    from symphys.results.discovery import run_folders
 
-    if folder.is_dir() and is_run([path.name for path in folder.iterdir()]):
-        page = write_run_report(folder) if outdated(folder) else folder / RUN_PAGE
+    if identification_folders(folder) and not run_folders(folder):
+        page = write_report(folder)
     else:
-        made = make_shown(wanted_below(folder, remake=False), 1)
+        made = make_shown(wanted_below(folder), 1)
         if made.faults:
             return UNDRAWN
         page = made.page
-    click.echo(page.resolve().as_uri())
-    webbrowser.open(page.resolve().as_uri())
+    address = page.resolve().as_uri()
+    click.echo(address)
+    webbrowser.open(address)
     return 0
 
 

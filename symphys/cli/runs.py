@@ -274,11 +274,11 @@ def diff(first: Path, second: Path) -> None:
 
     Settings, options, the problem's text, what was found, versions and machines. Times are left out.
     """
-    from symphys.results.discovery import is_run
+    from symphys.results.discovery import is_run_folder
     from symphys.results.table.difference import TEXT, differences
 
     for folder in (first, second):
-        if not (folder.is_dir() and is_run([path.name for path in folder.iterdir()])):
+        if not is_run_folder(folder):
             raise click.UsageError(f"{folder} is no run folder; `symphys ls DIR` lists those below a folder")
     found = differences(first, second)
     if not found:

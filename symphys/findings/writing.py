@@ -32,6 +32,16 @@ def beside(value: float, scale: float, digits: int = 3) -> str:
     return NOTHING if 0 < abs(value) < NEGLIGIBLE * scale else show(value, digits)
 
 
+def with_unit(number: str, unit: str) -> str:
+    """Return a written number and its unit, where it has one."""
+    return f"{number} {unit}" if unit else number
+
+
+def titled(name: str, unit: str) -> str:
+    """Return the title of a number: its name and in brackets its unit, where it has one."""
+    return f"{name} [{unit}]" if unit else name
+
+
 def percent(share: float) -> str:
     """Return a share >= 0 in percent; a dash for nan."""
     if not math.isfinite(share):

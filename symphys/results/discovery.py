@@ -88,6 +88,11 @@ def run_folders(root: Path) -> list[Path]:
     return found
 
 
+def is_run_folder(folder: Path) -> bool:
+    """Whether there is a run folder, finished or not."""
+    return folder.is_dir() and is_run([path.name for path in folder.iterdir()])
+
+
 def is_run(files: list[str]) -> bool:
     """Whether a folder with these files is a run folder, finished or not."""
     return RESULT in files or (CONFIG in files and PROBLEM in files)

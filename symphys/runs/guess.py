@@ -14,7 +14,7 @@ from symphys.problem import Problem, Variable, load_problem
 from symphys.problem.guess import GuessedMotion, recorded_guess
 from symphys.records import dataclass
 from symphys.results.config import read_config
-from symphys.results.discovery import is_run, run_folders
+from symphys.results.discovery import is_run_folder, run_folders
 from symphys.results.file_names import CONFIG, MULTIPLIERS, PROBLEM, TRAJECTORY
 from symphys.results.run import read_run
 from symphys.results.text_files import read_archive
@@ -76,7 +76,7 @@ OWN_GUESS = GuessOrigin()
 def read_guess_run(folder: str | Path) -> RunGuess:
     """Read the solution of a run; SymphysError if the folder is not that of a run, or the run has no solution."""
     path = Path(folder)
-    if not path.is_dir() or not is_run([each.name for each in path.iterdir()]):
+    if not is_run_folder(path):
         inside = run_folders(path)[:1] if path.is_dir() else []
         there = inside[0] if inside else "reports/ball_throw/gradient-seed0"
         raise SymphysError(f"guess: {path} is no run folder; one is, for instance, {there}")

@@ -14,7 +14,7 @@ from symphys import json_values as values
 from symphys.codegen.backends import Description
 from symphys.findings.levels import Judged
 from symphys.findings.verdict import judge_run
-from symphys.problem import STEP_LENGTH, Problem, Variable
+from symphys.problem import Problem, Variable
 from symphys.problem.quantities import formula_units
 from symphys.records import dataclass
 from symphys.results.result import (
@@ -170,13 +170,8 @@ def variables(problem: Problem, blocks: Sequence[VariableBlock], z: Array) -> di
 
 def duration_of(problem: Problem, z: Array, blocks: Sequence[VariableBlock]) -> float:
     """Return how long [s] the motion of z takes."""
-    starts = {each.name: each.start for each in blocks}
-    found = problem.simulation.duration
-    for variable in problem.variables:
-        if variable.kind == "duration":
-            number = float(z[starts[variable.name]])
-            found = number * problem.simulation.steps if variable.slots[0].name == STEP_LENGTH else number
-    return found
+    chosen = {variable.name for variable in problem.variables if variable.kind == "duration"}
+    return next((float(z[each.start]) for each in blocks if each.name in chosen), problem.simulation.duration)
 
 
 def knot_times(variable: Variable, duration: float) -> dict[str, Any]:

@@ -131,8 +131,8 @@ def test_open_makes_a_page_that_is_missing_and_shows_it(run: Run, out: Path, mon
         code, printed, _ = run("open", folder)
         assert (code, printed.strip()) == (0, page.resolve().as_uri())
         assert page.is_file() and shown[-1] == page.resolve().as_uri()
-    before = (single / "report.html").stat().st_mtime_ns
-    assert run("open", single)[0] == 0 and (single / "report.html").stat().st_mtime_ns == before
+    before = (out / "index.html").stat().st_mtime_ns
+    assert run("open", out)[0] == 0 and (out / "index.html").stat().st_mtime_ns == before
     assert run("open", out / "nothing")[0] == 2
 
 

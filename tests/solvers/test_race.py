@@ -29,7 +29,6 @@ from symphys.solvers.methods.race import (
     UNCHECKED,
     WithFinerSteps,
     distance,
-    strays,
 )
 
 SMALL = {"generations": 3, "population": 8, "rounds": 4}
@@ -201,11 +200,14 @@ def test_what_is_met_is_not_lowered_for_long_where_that_misses(monkeypatch: pyte
 
 
 def test_a_few_iterations_may_miss_on_the_way() -> None:
-    rows: list[Any] = [SimpleNamespace(max_violation=each) for each in (0.5, *[2.0] * PATIENCE)]
-    assert strays(POLISH, rows) and not strays(FINISH, rows) and not strays(POLISH, rows[:-1])
-    assert not strays(POLISH, [*rows[:-1], SimpleNamespace(max_violation=1.5)])  # it comes nearer
-    rows[-3] = SimpleNamespace(max_violation=0.9)
-    assert not strays(POLISH, rows)
+    def gives_up(kind: str, *missed: float) -> bool:
+        rows: Any = [SimpleNamespace(max_violation=each, iteration=k) for k, each in enumerate((0.5, *missed))]
+        return race.Race(mesa(), race.RaceOptions(), 0, None, print, None)._gives_up(kind, rows)
+
+    long = (2.0,) * PATIENCE
+    assert gives_up(POLISH, *long) and not gives_up(FINISH, *long) and not gives_up(POLISH, *long[1:])
+    assert not gives_up(POLISH, *long[1:], 1.5)  # it comes nearer
+    assert not gives_up(POLISH, *long[2:], 0.9, 2.0)
 
 
 def test_it_is_that_of_its_seed() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from symphys.findings.examination import Energy, Growth
 from symphys.findings.numerics import reach
-from symphys.findings.writing import capital, show
+from symphys.findings.writing import capital, show, titled
 from symphys.records import dataclass
 from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart, Key, Line, Panel, lines
@@ -207,6 +207,11 @@ def component_names(variable: VariableRecord) -> list[str]:
     return [str(index) for index in range(size)]
 
 
+def component_labels(variable: VariableRecord) -> list[str]:
+    """Name the components with the variable, as ``throw.x``."""
+    return [".".join(filter(None, [variable.name, name])) for name in component_names(variable)]
+
+
 def variable_panel(variable: VariableRecord) -> Panel:
     """Chart the components over time, found and at the guess, and bounds that are near."""
     (along, knots), held = abscissa(variable), variable.held > 0
@@ -218,8 +223,7 @@ def variable_panel(variable: VariableRecord) -> Panel:
     drawn = [*lines(knots, guessed.T, guess, COLOURS, width=0.9, look="dashed" + " steps" * held)]
     for name, colour, values, width in zip(names, COLOURS, found, WIDTHS, strict=False):
         drawn.append(Line(name, colour, knots, values, width, "steps" * held))
-    unit = f" [{variable.unit}]" * bool(variable.unit)
-    title = f"{variable.name}{unit}, {palette.short(', '.join(variable.sets), 60)}; dashed: the guess"
+    title = f"{titled(variable.name, variable.unit)}, {palette.short(', '.join(variable.sets), 60)}; dashed: the guess"
     return Panel(title, tuple(drawn), along, edges=tuple(near_bounds(variable).tolist()))
 
 
@@ -233,8 +237,7 @@ def abscissa(variable: VariableRecord) -> tuple[str, Array]:
 def variable_tables(variable: VariableRecord) -> list[Table]:
     """Return the numbers of ``variable_panel``."""
     table: dict[str, Any] = dict([abscissa(variable)])
-    for k, name in enumerate(component_names(variable)[: len(COLOURS)]):
-        label = ".".join(filter(None, [variable.name, name]))
+    for k, label in enumerate(component_labels(variable)[: len(COLOURS)]):
         table |= {label: variable.value[k], f"{label} at the guess": variable.guess[k]}
     near = near_bounds(variable)
     return [table, {f"bounds of {variable.name}": near}] if near.size else [table]

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from symphys.findings import writing
-from symphys.findings.writing import show
+from symphys.findings.writing import show, titled, with_unit
 from symphys.report.charts import palette
-from symphys.report.charts.run import component_names
+from symphys.report.charts.run import component_labels
 from symphys.report.pages.markup import Html, card, dot, join, table, tag
 from symphys.results.discovery import Entry, Study
 from symphys.results.file_names import RESULT
@@ -44,18 +44,12 @@ def is_listed(variable: VariableRecord) -> bool:
     return variable.value.shape[1] == 1 and len(variable.value) <= MOST_COMPONENTS
 
 
-def labels(variable: VariableRecord) -> list[str]:
-    """Name the components with the variable, as ``throw.x``."""
-    return [f"{variable.name}{'.' * bool(name)}{name}" for name in component_names(variable)]
-
-
 def found_numbers(run: Run) -> dict[str, float]:
     """Return what a run found, by names with units: components of variables that are no inputs over time."""
     found = {}
     for variable in filter(is_listed, variables_of(run)):
-        unit = f" [{variable.unit}]" * bool(variable.unit)
-        for label, value in zip(labels(variable), variable.value[:, 0].tolist(), strict=True):
-            found[f"{label}{unit}"] = value
+        for label, value in zip(component_labels(variable), variable.value[:, 0].tolist(), strict=True):
+            found[titled(label, variable.unit)] = value
     return found
 
 
@@ -87,20 +81,19 @@ def variable_rows(name: str, every: Sequence[Sequence[VariableRecord]]) -> list[
         cells = ["" if each is None else extent(each.value, first.unit) for each in of_each]
         return [[join([tag("b", name), f" {many}", sets]), *cells, extent(first.guess, first.unit)]]
     rows: list[list[Html | str]] = []
-    for k, label in enumerate(labels(first)):
-        cells = ["" if each is None or k >= len(each.value) else with_unit(each.value[k, 0], first) for each in of_each]
-        rows.append([join([tag("b", label), sets if k == 0 else ""]), *cells, with_unit(first.guess[k, 0], first)])
+    for k, label in enumerate(component_labels(first)):
+        numbers = [None if each is None or k >= len(each.value) else each.value[k, 0] for each in of_each]
+        cells = [
+            "" if each is None else with_unit(show(float(each), 4), first.unit)
+            for each in (*numbers, first.guess[k, 0])
+        ]
+        rows.append([join([tag("b", label), sets if k == 0 else ""]), *cells])
     return rows
-
-
-def with_unit(value: float, variable: VariableRecord) -> str:
-    """Write a number with the unit of its variable."""
-    return f"{show(float(value), 4)} {variable.unit}".strip()
 
 
 def extent(values: Array, unit: str) -> str:
     """Write from where to where numbers go."""
-    return f"{show(float(values.min()))} to {show(float(values.max()))} {unit}".strip()
+    return with_unit(f"{show(float(values.min()))} to {show(float(values.max()))}", unit)
 
 
 def difference(entries: Sequence[Entry], every: Sequence[Sequence[VariableRecord]]) -> str:

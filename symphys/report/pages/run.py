@@ -17,7 +17,7 @@ from symphys.report.pages import sections
 from symphys.report.pages.markup import Html, card, join, page, tag
 from symphys.report.pages.motion import motion_card, motion_cards
 from symphys.results import text_files as tables
-from symphys.results.discovery import is_run
+from symphys.results.discovery import is_run_folder
 from symphys.results.drawable import OVERSIZED, drawable, oversized
 from symphys.results.file_names import CONFIG, GUESS, LOG, PROBLEM, SCENE, TRAJECTORY
 from symphys.results.run import Run, read_run
@@ -89,7 +89,7 @@ def read_recorded(run_dir: Path) -> tuple[Run, RecordedMotion]:
     """Read a run folder; ReportError if it is none."""
     if not run_dir.is_dir():
         raise ReportError(f"{run_dir}: there is no such folder")
-    if not is_run([path.name for path in run_dir.iterdir()]):
+    if not is_run_folder(run_dir):
         raise ReportError(f"{run_dir}: no run folder; one holds result.json, or config.json and problem.toml")
     return read_run(run_dir, run_dir), read_motions(run_dir)
 

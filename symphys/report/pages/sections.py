@@ -15,12 +15,13 @@ from symphys.findings.examination import Examination
 from symphys.findings.levels import GOOD, MARKS, Judged
 from symphys.findings.physics import sliding
 from symphys.findings.verdict import ending
-from symphys.findings.writing import beside, capital, show
+from symphys.findings.writing import beside, capital, show, titled, with_unit
 from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart
 from symphys.report.charts.run import component_names, knotted
 from symphys.report.making.stamps import batch_page
 from symphys.report.pages import words
+from symphys.report.pages.answers import extent
 from symphys.report.pages.markup import (
     Html,
     banner,
@@ -158,8 +159,8 @@ def checks(run: Run) -> Html:
     rows = [
         [
             join([check.name, Html(" "), tag("small", check.kind)]),
-            joined(beside(check.error, check.tolerance), check.unit),
-            joined(show(check.tolerance), check.unit),
+            with_unit(beside(check.error, check.tolerance), check.unit),
+            with_unit(show(check.tolerance), check.unit),
             beside(check.ratio, 1.0),
             gauge(check),
             pill("good", "met") if check.met else pill("bad", "missed"),
@@ -186,11 +187,6 @@ def objective_parts(run: Run) -> list[tuple[str, float]]:
     if parts and abs(rest) > ROUNDING * max(map(abs, [run.objective, *run.costs.values()])):
         parts.append(("targets and constraints, weighted", rest))
     return parts
-
-
-def joined(number: str, unit: str) -> str:
-    """Return a number and its unit, where it has one."""
-    return f"{number} {unit}" if unit else number
 
 
 def output_line(run: Run, name: str) -> str:
@@ -238,7 +234,7 @@ def variable_rows(variable: VariableRecord) -> list[list[str]]:
         low, high = variable.lower[index, 0], variable.upper[index, 0]
         sets = tag("small", sets_of(variable)) if index == 0 else Html("")
         label = join([tag("b", variable.name) if index == 0 else "", f" {name} " if name else " ", sets])
-        found, begun, *bounds = (joined(show(number, 4), variable.unit) for number in (value, guess, low, high))
+        found, begun, *bounds = (with_unit(show(number, 4), variable.unit) for number in (value, guess, low, high))
         bounds = [bound if math.isfinite(at) else "none" for bound, at in zip(bounds, (low, high), strict=True)]
         rows.append([label, tag("b", found), begun, *bounds, between(value, guess, low, high)])
     return rows
@@ -254,13 +250,11 @@ def many_row(variable: VariableRecord) -> list[str]:
     """Return the range of very many components, and how far they are from the guess."""
     guess, value = variable.guess[:, 0], variable.value[:, 0]
     label = join([tag("b", variable.name), f" {len(value)} numbers ", tag("small", sets_of(variable))])
-    guessed, found = (
-        joined(f"{show(float(of.min()))} to {show(float(of.max()))}", variable.unit) for of in (guess, value)
-    )
+    guessed, found = (extent(of, variable.unit) for of in (guess, value))
     ends = float(variable.lower[:, 0].min()), float(variable.upper[:, 0].max())
-    bounds = [joined(show(end), variable.unit) if math.isfinite(end) else "none" for end in ends]
+    bounds = [with_unit(show(end), variable.unit) if math.isfinite(end) else "none" for end in ends]
     change = root_mean_square(value / 2 - guess / 2) * 2
-    return [label, tag("b", found), guessed, *bounds, f"changed by {joined(show(change), variable.unit)} (rms)"]
+    return [label, tag("b", found), guessed, *bounds, f"changed by {with_unit(show(change), variable.unit)} (rms)"]
 
 
 def all_components(variable: VariableRecord) -> Html:
@@ -271,9 +265,8 @@ def all_components(variable: VariableRecord) -> Html:
             zip(component_names(variable), variable.value[:, 0], variable.guess[:, 0], strict=True)
         )
     ]
-    unit = f" [{variable.unit}]" * bool(variable.unit)
-    title = tag("summary", f"All {len(numbers)} numbers of {variable.name}{unit}")
-    return tag("details", title, tag("ul", *(tag("li", number) for number in numbers), class_="numbers"))
+    title = f"All {len(numbers)} numbers of {titled(variable.name, variable.unit)}"
+    return folded(title, tag("ul", *(tag("li", number) for number in numbers), class_="numbers"))
 
 
 def root_mean_square(numbers: Array) -> float:
