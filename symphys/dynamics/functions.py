@@ -23,7 +23,7 @@ from symphys.dynamics.tracing.trace import InlineTracer
 from symphys.dynamics.unknowns import AnyImpulse
 from symphys.maths.verbatim import verbatim
 from symphys.model.scalar import is_zero
-from symphys.model.state_layout import Layout
+from symphys.model.state_layout import Layout, force_names
 from symphys.model.world import Pair, Scheme, World
 from symphys.records import dataclass
 from symphys.types import Expr
@@ -49,6 +49,9 @@ class StepReport:
         crowded: 1 if some body has two or more impacts at once (in one substep), or impacts of a chain come late.
         ambiguous: 1 if several bodies meet at one instant and rebound: rigid bodies have no one answer then.
         paradox: 1 if friction pulls a sliding contact together, for which no sliding force may exist (Painleve).
+        along: (k,) impulses of motors, springs and dry friction along coordinates [N m s], [N s]; see ``force_names``.
+        motors: (m,) those of motors, as if a command acted from half a substep before its step to half a substep before
+            the next.
     """
 
     forces: Expr
@@ -57,6 +60,8 @@ class StepReport:
     crowded: Expr
     ambiguous: Expr
     paradox: Expr
+    along: Expr
+    motors: Expr
 
 
 def report(context: StepContext, substeps: list[Substep]) -> StepReport:
@@ -77,7 +82,16 @@ def report(context: StepContext, substeps: list[Substep]) -> StepReport:
         for each, impulse in zip(substep.constraints, substep.impulses, strict=True):
             paradox = _any_paradox(paradox, each.constraint.paradox, impulse.normal)
     gaps = tuple(contact.gap for contact in substeps[0].contacts)
-    return StepReport(_stack(forces), _stack(gaps), residual, crowded, ambiguous, paradox)
+    along = tuple(_sum(tuple(each.by_joints[name] for each in substeps)) for name, _ in force_names(context.world))
+    driven = (f"{joint.name}.motor" for joint in context.world.joints if joint.driven)
+    motors = tuple(_sum(tuple(each.of_motors[name] for each in substeps)) for name in driven)
+    counted = _stack(along), _stack(motors)
+    return StepReport(_stack(forces), _stack(gaps), residual, crowded, ambiguous, paradox, *counted)
+
+
+@traced
+def _sum(columns: tuple[Expr, ...]) -> Expr:
+    return sum(columns[1:], start=columns[0])
 
 
 Met = tuple[Expr, Expr, Expr]
@@ -195,7 +209,7 @@ def step_function(
 def report_function(
     world: World, scheme: Scheme | None = None, inputs: Sequence[str] = (), parameters: Sequence[Any] = ()
 ) -> ca.Function:
-    """Return the step with its ``StepReport``: (x, u, p, smoothing) -> (x_next, forces, gaps, .. paradox).
+    """Return the step with its ``StepReport``: (x, u, p, smoothing) -> (x_next, forces, gaps, .. motors).
 
     It is a graph of the calls of ``trace_step``: one expression would take twice as long to build and ten times as much
     space where it is kept, for 0.6 of the time of an evaluation.

@@ -30,9 +30,11 @@ from symphys.dynamics.joints.warm_start import (
     Rotors,
     add_joint_forces,
     commanded,
+    impulses_along,
     keep_momentum,
     keep_rotors,
     lasting_forces,
+    motor_impulses,
     project_velocities,
 )
 from symphys.dynamics.motion import PredictedMotion, angular_velocity, apply, isotropic
@@ -62,6 +64,8 @@ class Substep:
         constraints, contacts: of the pairs.
         impulses: accumulated, of the pairs.
         changes: of every constraint, joints too, its accumulated impulse, and that before the final sweep.
+        by_joints: impulses (k,) along coordinates, by the name of the force in the state ("hip.motor") [N m s], [N s].
+        of_motors: those of motors, as if a command had acted for the whole time of the impulse.
         ahead: (3,) each [N s]: impulses of persistent forces over the lag, which the true velocities have ahead of the
             sweeps'. The next substep takes them off again, except after an impact, where leapfrog begins anew.
         chained: 1 if impacts were left to the next step.
@@ -72,6 +76,8 @@ class Substep:
     contacts: tuple[Contact, ...]
     impulses: tuple[ContactImpulse, ...]
     changes: tuple[tuple[Any, Any], ...]
+    by_joints: State
+    of_motors: State
     ahead: tuple[Expr, ...] = ()
     chained: Expr = ZERO
 
@@ -138,7 +144,9 @@ def advance(
         values |= _stored_joint_forces(context, joints, forces) | angles
     values |= _moving_bodies(context, motions, momenta, reactions, poses, rotors)
     changes = zip(solved.impulses, solved.last, strict=True)
-    return Substep(values, tuple(constraints), tuple(contacts), whole, tuple(changes))
+    along = impulses_along(context.world, joints, by_joints)
+    motors = along | motor_impulses(joints, by_joints, kick, x["lag"])
+    return Substep(values, tuple(constraints), tuple(contacts), whole, tuple(changes), along, motors)
 
 
 def _poses(

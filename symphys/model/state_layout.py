@@ -33,6 +33,8 @@ BODY_FIELDS = (
 )
 COUPLED = "lock"
 """What a coupling gives along the coordinate that follows."""
+WORKING = ("motor", "spring", "friction")
+"""The parts of a joint whose forces do work along its coordinates; limits are counted with contacts."""
 INPUT_FIELDS = ("force", "torque")
 GIVEN = ("position", "orientation", "velocity", "angular_velocity")
 """The fields of a body that an initial state may give."""
@@ -94,6 +96,12 @@ class Layout:
     def pack(self, values: Mapping[str, Any]) -> Any:
         """x as a casadi column, from a value for every name."""
         return ca.vertcat(*(values[name] for name in self._slices))
+
+
+def force_names(world: World) -> list[tuple[str, int]]:
+    """Return what a state calls the forces that do work along coordinates of joints, and their sizes."""
+    coordinates = [(joint, len(joint.kind.coordinates)) for joint in world.joints]
+    return [(f"{joint.name}.{part}", k) for joint, k in coordinates for part in WORKING if part in joint.acting]
 
 
 def initial_state(world: World, values: Mapping[str, Any] = NOTHING) -> Any:

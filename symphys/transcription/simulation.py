@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from symphys.codegen.backends.calls import row_by_row
+from symphys.dynamics.functions import StepReport
 from symphys.dynamics.observation import reading_function
 from symphys.model.joints import Joint
 from symphys.model.state_layout import GIVEN, Layout, input_columns
@@ -20,21 +21,27 @@ from symphys.transcription.recorded_parts import RolloutArrays
 from symphys.transcription.rollout import Rollout
 from symphys.types import Array
 
+ALONG = [field.name for field in fields(StepReport)].index("along")
 AGREEMENT = 1e-7
 """Relative and absolute difference of two evaluations of a step up to which it is rounding."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """A rollout of ``z`` (n,): its states and arguments, and the motion."""
+    """A rollout of ``z`` (n,): its states and arguments, and the motion.
+
+    Attributes:
+        along: (N, k) impulses of motors, springs and dry friction in each step [N m s], [N s]; see ``force_names``.
+    """
 
     z: Array
     arrays: RolloutArrays
     motion: Trajectory
+    along: Array
 
 
 def recorder(rollout: Rollout) -> Callable[[Array, float], list[Array]]:
-    """Return (z, smoothing) -> (x, u, given, p, forces, gaps, residual, crowded, ambiguous, paradox) over time.
+    """Return (z, smoothing) -> (x, u, given, p, forces, .. motors) over time; see ``StepReport``.
 
     One step is called after the other: a function of all of them would take longer to build than to evaluate.
     """
@@ -79,7 +86,7 @@ def recorded(rollout: Rollout, arrays: RolloutArrays) -> Record | None:
 def _recorded(rollout: Rollout, arrays: RolloutArrays, happened: Sequence[Array]) -> Record:
     motion = _trajectory(rollout, arrays.time, arrays.x, arrays.u, arrays.p, *happened)
     try:
-        return Record(arrays.z, arrays, motion.require_finite())
+        return Record(arrays.z, arrays, motion.require_finite(), happened[ALONG])
     except NotFinite as error:
         raise NotFinite(f"{error}; {first_non_finite(rollout, arrays)}") from None
 
@@ -105,7 +112,11 @@ def _trajectory(
     forces: Array,
     gaps: Array,
     residual: Array,
-    *counted: Array,
+    crowded: Array,
+    ambiguous: Array,
+    paradox: Array,
+    along: Array,
+    motors: Array,
 ) -> Trajectory:
     world, steps = rollout.world, rollout.steps
     layout, (force, torque) = Layout(world), _applied(rollout, x, u, p)
@@ -122,14 +133,11 @@ def _trajectory(
         contact_force=forces.reshape(steps, len(world.pairs), 3),
         contact_gap=np.concatenate([gaps, gaps[-1:]]),
         residual=residual.ravel(),
-        **_counts(*counted),
-        **_joints(rollout, x, u, p),
+        crowded=crowded.ravel(),
+        ambiguous=ambiguous.ravel(),
+        paradox=paradox.ravel(),
+        **_joints(rollout, x, u, p, motors),
     )
-
-
-def _counts(crowded: Array, ambiguous: Array, paradox: Array) -> dict[str, Any]:
-    """Return the fields that count steps of a kind."""
-    return {"crowded": crowded.ravel(), "ambiguous": ambiguous.ravel(), "paradox": paradox.ravel()}
 
 
 def plain(rollout: Rollout, x: Array) -> Array:
@@ -141,18 +149,20 @@ def _stack(parts: list[Any]) -> Array:
     return np.stack(parts, axis=1)
 
 
-def _joints(rollout: Rollout, x: Array, u: Array, p: Array) -> dict[str, Any]:
-    """Return the fields of joints."""
-    joints = rollout.world.joints
+def _joints(rollout: Rollout, x: Array, u: Array, p: Array, motors: Array) -> dict[str, Any]:
+    """Return the fields of joints; ``motors`` (N, m) are the impulses of their motors."""
+    joints, lag = rollout.world.joints, x[:, Layout(rollout.world)["lag"]]
     counts = [len(joint.kind.coordinates) for joint in joints]
     read = reading_function(rollout.world, rollout.parameters.symbols)
-    *parts, separation = row_by_row(read, plain(rollout, x), p)
-    value, rate, torque = (_split(part, counts) for part in parts)
+    value, rate, _, separation = row_by_row(read, plain(rollout, x), p)
+    torque = np.zeros((len(u), sum(counts)))
+    driven = np.repeat([joint.driven for joint in joints], counts).astype(bool)
+    torque[:, driven] = motors / (rollout.dt + lag[:-1] - lag[1:])
     return {
         "joint_names": tuple(joint.name for joint in joints),
-        "joint_value": value,
-        "joint_rate": rate,
-        "joint_torque": torque[1:],
+        "joint_value": _split(value, counts),
+        "joint_rate": _split(rate, counts),
+        "joint_torque": _split(torque, counts),
         "joint_command": _split(_commands(rollout, u, counts), counts),
         "joint_separation": separation,
         "joint_units": tuple(map(_unit, joints)),

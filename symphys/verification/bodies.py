@@ -14,15 +14,13 @@ from symphys.dynamics.joints.warm_start import components
 from symphys.dynamics.motion import inertia_matrix
 from symphys.dynamics.observation import readings
 from symphys.model.joints import Joint, given_torque
-from symphys.model.joints.joint import DRIVE
 from symphys.model.scalar import is_zero
-from symphys.model.state_layout import Layout, input_symbols
+from symphys.model.state_layout import Layout, force_names, input_symbols
 from symphys.model.world import World
 from symphys.records import dataclass
 from symphys.transcription import Record, Rollout
 from symphys.types import Array, Bools
 
-WORKING = ("motor", "spring", "friction")
 LIMIT_DISTANCE = 1e-6
 """[rad], [m] Distance from a limit that counts as being there, plus the motion in a step."""
 
@@ -64,24 +62,22 @@ def parameters(rollout: Rollout) -> Any:
 def joint_work(rollout: Rollout, record: Record) -> tuple[Array, Array]:
     """Return the work of motors, springs and dry friction in each step (N,) [J], and the sum of its absolute values.
 
-    A commanded torque acts from the start of its step to the end, in addition to the law of the motor. The leapfrog
-    scheme has the other forces half a substep ahead of the velocities at the ends of a step; of a split step only the
-    last force is known, and forces are assumed to change in even steps. For a servo that goes from one bound to the
-    other within a step the result is wrong by up to twice its work.
+    An impulse counts until half a substep before the end of its step, and ``lag`` after that (docs/time_step.md).
+    Rates count with their mean over a step, so the work of a servo that goes from one bound to the other within a step
+    is wrong by up to its sum of absolute values.
     """
     layout, x = Layout(rollout.world), record.arrays.x
-    total, gross, lag = np.zeros(rollout.steps), np.zeros(rollout.steps), x[:, layout["lag"]]
-    for joint, _, rate in coordinates(rollout, record):
-        for part in (part for part in WORKING if part in joint.acting):
-            force = x[:, layout[f"{joint.name}.{part}"]]
-            is_torque = part == "motor" and given_torque(joint.motor)
-            ahead = rollout.dt if is_torque else rollout.dt / 2 + lag[:-1] + lag[1:]
-            drive = x[:, layout[f"{joint.name}.{DRIVE}"]] if part == "motor" and joint.drive == DRIVE else 0 * force
-            other = force - drive
-            impulse = rollout.dt * (drive[1:] + other[:-1]) + ahead * (other[1:] - other[:-1])
-            work = impulse * (rate[:-1] + rate[1:]) / 2
-            total += work.sum(axis=1)
-            gross += 0 if is_torque else np.abs(work).sum(axis=1)
+    total, gross, lag = np.zeros(rollout.steps), np.zeros(rollout.steps), x[:, [layout["lag"].start]]
+    rates = {joint.name: (joint, rate) for joint, _, rate in coordinates(rollout, record)}
+    start = 0
+    for name, count in force_names(rollout.world):
+        owner, _, part = name.rpartition(".")
+        joint, rate = rates[owner]
+        ahead = lag * x[:, layout[name]]
+        impulse = record.along[:, start : start + count] + ahead[1:] - ahead[:-1]
+        work, start = impulse * (rate[:-1] + rate[1:]) / 2, start + count
+        total += work.sum(axis=1)
+        gross += 0 if part == "motor" and given_torque(joint.motor) else np.abs(work).sum(axis=1)
     return total, gross
 
 

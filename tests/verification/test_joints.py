@@ -225,3 +225,28 @@ def test_a_limit_takes_energy(make: Make) -> None:
     assert told["energy"]["contact"][-1] < -1e-3
     assert told["gains"] == []
     assert told["drift"] < 1e-2 * max(told["energy"]["kinetic"])
+
+
+SERVO, AFFINE = (
+    PENDULUM.replace("motor = { torque = { torque = 5 } }", f"motor = {{ {motor} }}").replace("stiffness = 2, ", "")
+    for motor in (
+        "servo = { gain = 20, torque = 5, velocity = 8 }",
+        "affine = { gain = 20, kp = 20, kv = 0.5, force_range = [-3, 3] }",
+    )
+)
+
+
+@pytest.mark.parametrize("text", [SERVO, AFFINE], ids=["servo", "affine"])
+def test_split_steps_record_all_that_a_motor_gives(make: Make, text: str) -> None:
+    """Contacts of a body split its steps, far from all that it could touch too: inertia times acceleration is left."""
+    text = "[world]\ngravity = [0, 0, 0]\n" + text
+    feet = "shape = { spheres = [{ radius = 0.02, centre = [0, 0.1, 0] }, { radius = 0.02, centre = [0, -0.1, 0] }] }"
+    ground = "[ground]\nheight = -9.0\n\n[[body]]\n" + feet
+    split = text.replace("[[body]]", ground, 1)
+    record, told = found(make(split))
+    motion, rate = record.motion, record.motion.joint_rate[:, 0, 0]
+    assert len(motion.contact_names) == 2
+    assert told["drift"] < 1e-3 * max(told["energy"]["kinetic"])
+    given = 0.0825 * np.diff(rate) / 0.01 + 0.05 * (rate[1:] + rate[:-1]) / 2
+    print(told["drift"], max(told["energy"]["kinetic"]), np.std(motion.joint_torque[:, 0, 0] - given), np.std(given))
+    assert np.std(motion.joint_torque[:, 0, 0] - given) < 0.1 * np.std(given)

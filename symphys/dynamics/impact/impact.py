@@ -35,6 +35,7 @@ from symphys.maths import rotation
 from symphys.maths.smoothing import either, positive
 from symphys.model.scalar import is_zero
 from symphys.model.shapes import Sphere
+from symphys.model.state_layout import force_names
 from symphys.model.world import Law, Pair, World
 from symphys.records import dataclass
 from symphys.types import Expr
@@ -161,7 +162,13 @@ def resolve_impact(context: StepContext, x: State, split: StepSplit) -> Substep:
     forces = (x[f"{pair.name}.force"] for pair in context.world.pairs)
     ahead = tuple(split.impact * x["lag"] * force for force in forces)
     changes = tuple(zip(solved.impulses, solved.last, strict=True))
-    return Substep(after, tuple(constraints), tuple(contacts), solved.impulses[n:], changes, ahead)
+    along = {name: _while_lagging(split.impact, x["lag"], x[name]) for name, _ in force_names(context.world)}
+    return Substep(after, tuple(constraints), tuple(contacts), solved.impulses[n:], changes, along, along, ahead)
+
+
+@traced
+def _while_lagging(impact: Expr, lag: Expr, force: Expr) -> Expr:
+    return impact * lag * force
 
 
 @traced

@@ -21,7 +21,7 @@ from symphys.dynamics.joints.locked_directions import LockConstraint, in_world
 from symphys.dynamics.tracing.decorator import traced
 from symphys.dynamics.unknowns import AllVelocities, Momenta, Momentum, PlacedConstraint
 from symphys.model.joints import Joint, JointCoupling, kinematic_trees, tree_joints
-from symphys.model.state_layout import COUPLED
+from symphys.model.state_layout import COUPLED, force_names
 from symphys.model.world import World
 from symphys.types import Expr
 
@@ -112,6 +112,34 @@ def _lasting_forces(
         force = _lasting(constraint, impulse, own(old, each.k), impact, (kick, x["lag"], context.shortest_kick))
         forces.setdefault(each.name, []).append(force)
     return {name: _stacked(tuple(parts)) for name, parts in forces.items()}
+
+
+def impulses_along(world: World, constraints: Sequence[JointConstraint], given: Sequence[JointImpulse]) -> State:
+    """Return the impulses (k,) of ``force_names`` in a substep from those ``given`` to constraints."""
+    names, parts = {name for name, _ in force_names(world)}, dict[str, list[Expr]]()
+    for each, impulse in zip(constraints, given, strict=True):
+        if each.name in names:
+            parts.setdefault(each.name, []).append(each.placed.constraint.stored_form(impulse))
+    return {name: _stacked(tuple(each)) for name, each in parts.items()}
+
+
+def motor_impulses(
+    constraints: Sequence[JointConstraint], given: Sequence[JointImpulse], kick: Expr, lag: Expr
+) -> State:
+    """Return the impulses (k,) of motors that a command drives, as if it had acted over all of ``kick`` [s]."""
+    parts = dict[str, list[Expr]]()
+    for each, impulse in zip(constraints, given, strict=True):
+        constraint = each.placed.constraint
+        if isinstance(constraint, CoordinateConstraint) and constraint.drive is not None:
+            parts.setdefault(each.name, []).append(_driven(constraint, impulse, kick, lag))
+    return {name: _stacked(tuple(each)) for name, each in parts.items()}
+
+
+@traced
+def _driven(constraint: CoordinateConstraint, impulse: JointImpulse, kick: Expr, lag: Expr) -> Expr:
+    if constraint.jump is None:
+        return kick * constraint.drive
+    return constraint.bounded(constraint.stored_form(impulse) + lag * constraint.jump)
 
 
 @traced

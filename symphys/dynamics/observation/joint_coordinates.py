@@ -38,7 +38,7 @@ class Reading:
 
     Attributes:
         value, rate: (k,).
-        torque: (k,) of the motor in the step before, [N m] or [N]; zeros without a motor.
+        torque: (k,) of the motor in the last substep before, [N m] or [N]; zeros without a motor.
         separation: how far the frames are apart, as far as the joint holds them together [m].
         tilt: how far they are turned against each other, as far as it holds that [rad].
     """
@@ -242,7 +242,7 @@ JOINT_SENSORS = (
     SensorKind(
         "torque",
         "joint",
-        "what the motor gave in the last step; of a servo its mean over a step until half a step ago",
+        "what the motor gave in the last substep; of a servo its mean until half a substep ago",
         _reads("torque"),
         unit="N m",
         sliding_unit="N",
