@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symphys.errors import SymphysError
-from symphys.findings.writing import show
+from symphys.findings.writing import show, with_unit
 from symphys.results.file_names import GUESS, SCENE, TRAJECTORY
+from symphys.results.result import CheckRecord
 from symphys.results.run import Run
 from symphys.results.text_files import ReportError
 from symphys.results.trace import Trace
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 TRACE = "trace."
 """Prefix of the names of columns of the trace."""
+MOST_ROWS = 24
+"""Rows of what was found, at most."""
 COMPONENTS = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
 """Names of the components of vectors and quaternions."""
 
@@ -160,19 +163,30 @@ def line(run: Run) -> str:
 
 
 def html(run: Run) -> str:
-    """Write the verdict, the checks and the motion of a run as HTML that needs no other file."""
+    """Write the verdict, what was found, the checks and the motion of a run as HTML that needs no other file."""
+    from symphys.report.pages.answers import variable_rows
+    from symphys.report.pages.markup import table
+
     words = run.verdict.replace("_", " ")
     head = f"<b>{markup.escape(run.title)}</b>: {words} by {markup.escape(run.solver)}, seed {run.seed}"
     lines = [f"<p>{head}; objective {show(run.objective)}, {show(run.seconds.get('solve', 0))} s</p>"]
+    found = [row for each in run.variables for row in variable_rows(each.name, [run.variables])]
+    if found:
+        lines.append(table(("", "found", "guess"), found[:MOST_ROWS], "tnn"))
     if run.checks:
         cells = [
-            (each.kind, each.name, show(each.error), show(each.tolerance), "met" if each.met else "missed")
+            (each.kind, each.name, *(with_unit(show(n), each.unit) for n in (each.error, each.tolerance)), met(each))
             for each in run.checks
         ]
-        lines.append(html_table(("", "name", "error", "tolerance", ""), cells))
+        lines.append(table(("", "name", "error", "tolerance", ""), cells, "ttnnt"))
     if not run.solved and run.advice:
         lines.append(f"<p>{markup.escape(run.advice)}</p>")
     return "\n".join([*lines, picture(run.folder)])
+
+
+def met(check: CheckRecord) -> str:
+    """Say whether a check is met."""
+    return "met" if check.met else "missed"
 
 
 def html_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

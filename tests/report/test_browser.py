@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,41 @@ const half = document.querySelectorAll(".chart path.cursor[d^=M]").length;
 const canvas = document.querySelector("canvas");
 canvas.dispatchEvent(new window.KeyboardEvent("keydown", { key: "ArrowRight" }));
 return { half, time: document.querySelector(".animation output").textContent };
+"""
+PAPER = (
+    OVERFLOW.replace("return {", "const seen = {").replace('svg").length };', 'svg").length };')
+    + """
+const shown = (e) => window.getComputedStyle(e).display !== "none";
+seen.controls = [...document.querySelectorAll(".controls, nav, .theme")].filter(shown).length;
+seen.paper = window.getComputedStyle(document.body).backgroundColor;
+return seen;
+"""
+)
+KEYBOARD = """
+const every = [...document.querySelectorAll("a, button, input, select, summary, canvas")];
+const shown = every.filter((e) => e.getClientRects().length && !e.disabled);
+const reached = (e) => { e.focus(); return document.activeElement === e && e.tabIndex >= 0; };
+return { count: shown.length, lost: shown.filter((e) => !reached(e)).map((e) => e.outerHTML.slice(0, 80)) };
+"""
+COMPARE = """
+const boxes = () => [...document.querySelectorAll(".rows input[type=checkbox]")];
+boxes()[0].click();
+const one = document.querySelector(".pair").textContent;
+boxes()[1].click();
+const rows = [...document.querySelectorAll(".pair tr")].map((r) => [...r.children].map((c) => c.textContent.trim()));
+return { one, rows };
+"""
+PEEK = """
+const links = [...document.querySelectorAll("figure.chart[data-name=sweep] a")];
+const over = (e) => e.dispatchEvent(new window.PointerEvent("pointerover", { bubbles: true }));
+const player = document.querySelector(".animation"), says = () => player.querySelector(".shown").textContent;
+player.style.marginTop = "3000px";
+over(links[0].querySelector("circle"));
+const first = says(), floats = player.classList.contains("peek");
+links[1].focus();
+const then = says();
+over(document.querySelector("h1"));
+return { first, floats, then, stays: player.classList.contains("peek") };
 """
 COLOURS = "return window.getComputedStyle(document.body).backgroundColor;"
 THEME = """
@@ -80,3 +116,44 @@ def test_pages_are_light_or_dark(pages: tuple[Path, Path]) -> None:
     light, dark, chosen = visit(pages[0], COLOURS), visit(pages[0], COLOURS, dark=True), visit(pages[0], THEME)
     assert light.seen == "rgb(245, 247, 248)"
     assert dark.seen == chosen.seen == "rgb(18, 24, 30)"
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["run", "batch"])
+def test_on_paper_nothing_is_cut_and_nothing_is_to_be_clicked(pages: tuple[Path, Path], which: int) -> None:
+    found = visit(pages[which], PAPER, 720, printed=True)
+    assert found.seen["charts"] > 0 and found.seen["page"] <= 0 and found.seen["over"] == []
+    assert found.seen["controls"] == 0 and found.seen["paper"] == "rgb(255, 255, 255)"
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["run", "batch"])
+def test_the_keyboard_reaches_everything(pages: tuple[Path, Path], which: int) -> None:
+    found = visit(pages[which], KEYBOARD)
+    assert found.seen["count"] > 10 and found.seen["lost"] == []
+
+
+def test_two_runs_are_compared(pages: tuple[Path, Path]) -> None:
+    found = visit(pages[1], COMPARE)
+    assert found.console == [] and "Tick a second one" in found.seen["one"]
+    heads, *rows = found.seen["rows"]
+    assert heads[-1] == "difference" and len(heads) == 4
+    rows = {row[0]: row[1:] for row in rows}
+    assert "objective" in rows
+    assert all(any(name.startswith(start) for name in rows) for start in ("throw.x", "error of ")), list(rows)
+
+
+def test_the_pointer_on_a_point_of_a_sweep_shows_its_motion(
+    run_dir: Path, tmp_path: Path, edit: Callable[..., None]
+) -> None:
+    root = tmp_path / "out"
+    for k in range(3):
+        folder = Path(shutil.copytree(run_dir, root / f"ball_throw@ball.mass={k + 1}" / "gradient-seed0"))
+        edit(folder / "config.json", settings={"ball.mass": k + 1})
+        write_run_report(folder)
+    found = visit(write_batch_report(root), PEEK)
+    assert found.console == []
+    assert found.seen == {
+        "first": "ball.mass=1, gradient, seed 0",
+        "floats": True,
+        "then": "ball.mass=2, gradient, seed 0",
+        "stays": False,
+    }

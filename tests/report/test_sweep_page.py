@@ -121,3 +121,18 @@ def test_numbers_near_the_largest_double(run_dir: Path, tmp_path: Path, edit: Ed
     text = write_batch_report(root).read_text("utf-8")
     assert OVERSIZED in text
     assert not {"throw.x", "throw.y", "objective"} & {panel["title"] for panel in charts(text)["sweep"]["panels"]}
+
+
+def test_three_keys_give_a_line_for_each_run(run_dir: Path, tmp_path: Path, edit: Edit) -> None:
+    points = [
+        {"ball.mass": m, "ground.friction": f, "ground.restitution": 0.5 * m} for m in (1.0, 2.0) for f in (0.2, 9e3)
+    ]
+    text = write_batch_report(swept(tmp_path / "out", run_dir, edit, points, missed=1)).read_text("utf-8")
+    (picture,) = re.findall(r'<div class="parallel">.*?</svg>', text, re.DOTALL)
+    lines = re.findall(r'<a href="([^"]*)"><title>([^<]*)</title><path d="([^"]*)"', picture)
+    assert len(lines) == 4 and all("report.html" in link for link, *_ in lines)
+    assert lines[1][1] == "ball.mass=1.0, ground.friction=9000.0, ground.restitution=0.5, gradient, seed 0"
+    assert picture.count("stroke-dasharray") == 1
+    heights = [[float(y) for y in re.findall(r"[ML][\d.]+ ([\d.]+)", path)] for *_, path in lines]
+    assert heights[0][:3] == heights[0][:1] * 3 and heights[3][:3] == heights[3][:1] * 3
+    assert heights[0][0] > heights[3][0] and len({len(each) for each in heights}) == 1

@@ -43,9 +43,13 @@ class Visit:
     console: list[str]
 
 
-def visit(page: Path, script: str, width: int = 1400, dark: bool = False) -> Visit:
-    """Open a page in a frame of some width and return what ``script``, the body of a function, gives there."""
+def visit(page: Path, script: str, width: int = 1400, dark: bool = False, printed: bool = False) -> Visit:
+    """Open a page in a frame of some width and return what ``script``, the body of a function, gives there.
+
+    ``printed``: as on paper.
+    """
     text = POLICY.sub("", page.read_text("utf-8"))
+    text = text.replace("@media print", "@media all") if printed else text
     asking = ASK.replace("WIDTH", str(width)).replace("SCRIPT", script).replace("PAGE", html.escape(text))
     wrapper = page.with_name(f"asked-{width}.html")
     wrapper.write_text(f"<!doctype html><html><body>{asking}</body></html>", encoding="utf-8")

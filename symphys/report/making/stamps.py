@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from symphys.report.making.neighbours import neighbours
 from symphys.results.discovery import run_folders
 from symphys.results.table.journal import JOURNAL_FILE
 
@@ -77,7 +78,7 @@ def batch_page(folder: Path) -> str:
 
 def folder_digest(folder: Path) -> str:
     """Return the checksum of a folder's path, of the files in it but its pages, and of the drawing code."""
-    made = f"{drawing_digest()} {folder.resolve()} {batch_page(folder)}"
+    made = f"{drawing_digest()} {folder.resolve()} {batch_page(folder)} {neighbours(folder, RUN_PAGE)}"
     found = hashlib.sha256(made.encode(errors="surrogateescape"))
     try:
         with os.scandir(folder) as inside:

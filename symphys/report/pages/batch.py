@@ -18,7 +18,7 @@ from symphys.report.pages.comparison import page_links, run_card, study_card
 from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag
 from symphys.report.pages.run import read_motions
 from symphys.report.pages.sweep import sweep_of, sweep_parts
-from symphys.report.scene.animation import NUMBERS, animation
+from symphys.report.scene.animation import LEAST_FRAMES, NUMBERS, animation, other_motion
 from symphys.results.config import settings_words
 from symphys.results.discovery import Entry, Study, read_all, sample, studies
 from symphys.results.drawable import OVERSIZED, drawable, oversized
@@ -31,6 +31,8 @@ UNMADE = "0" * 64
 CLOSEST = "run that came closest"
 MOST_NUMBERS = 60_000
 """Numbers that the motions on a page have together, at most about."""
+MOST_MOTIONS = 60
+"""Motions of a sweep that a page can play, at most."""
 MOST_STUDIES = 20
 """Problems and settings that have a section each, at most; of more the page has tables only."""
 MOST_CURVES, LEAST_CURVES = 60, 5
@@ -80,7 +82,9 @@ def build_sections(found: Sequence[Study]) -> list[Html]:
         return build_tables(found) if len(found) > MOST_STUDIES else build_studies(found)
     links = page_links(sweep.every)
     best = Study(found[0].problem, "", tuple(entry for study in found for entry in study.entries)).best
-    motion = card("The motion", best_motion(best, NUMBERS), note=best_note(best, setting=True))
+    others = other_motions(sweep.runs, links)
+    note = best_note(best, setting=True) + " Under the pointer on a number above: that of its run." * bool(others)
+    motion = card("The motion", best_motion(best, NUMBERS, others), note=note)
     return [*sweep_parts(sweep, links), motion, run_card(found, links)]
 
 
@@ -203,13 +207,32 @@ def write_batch_figures(batch_dir: Path, folder: Path) -> list[Path]:
     return paths
 
 
-def best_motion(run: Run, numbers: int) -> Html:
+def other_motions(runs: Sequence[Run], links: Mapping[str, str]) -> list[Html]:
+    """Return the motions of runs that have a page; of an even choice of them where they are many or large."""
+    linked = [run for run in runs if links.get(run.place)]
+    found, count = list[Html](), min(len(linked), MOST_MOTIONS)
+    for k in range(len(linked)):
+        if len(found) * len(linked) > k * count:
+            continue
+        run = linked[k]
+        recording = read_motions(run.folder)
+        if recording.trajectory is None:
+            continue
+        bodies = len(recording.trajectory.body_names)
+        count = min(count, max(MOST_NUMBERS // (LEAST_FRAMES * 7 * bodies), 1))
+        numbers = min(MOST_NUMBERS // count, NUMBERS)
+        title = f"{settings_words(run.settings)}, {run.solver}, seed {run.seed}"
+        found.append(other_motion(recording.trajectory, recording.scene, numbers, links[run.place], title))
+    return found
+
+
+def best_motion(run: Run, numbers: int, others: Sequence[Html] = ()) -> Html:
     """Play the motion of a run; or say why there is none, which ends no page."""
     try:
         recording = read_motions(run.folder)
         if recording.trajectory is None:
             return tag("p", f"There is no motion to draw: {recording.faults[0]}.")
-        return animation(recording.trajectory, recording.scene, recording.guess, numbers)
+        return animation(recording.trajectory, recording.scene, recording.guess, numbers, others)
     except Exception as error:  # what one run has recorded must not take the page of all with it
         return tag("p", f"The motion could not be drawn: {type(error).__name__}: {error}.")
 

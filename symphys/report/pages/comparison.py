@@ -16,6 +16,7 @@ from symphys.records import dataclass
 from symphys.report.charts import palette
 from symphys.report.making.stamps import RUN_PAGE
 from symphys.report.pages import words
+from symphys.report.pages.answers import found_numbers
 from symphys.report.pages.markup import ICONS, Html, banner, card, dot, join, packed_json, pill, table, tag
 from symphys.results.discovery import Entry, Study, middle
 from symphys.results.result import CheckRecord, smoothed
@@ -278,8 +279,11 @@ def broken_card(broken: Sequence[Run]) -> Html:
 
 PER_PAGE = 25
 MOST_KEYS = 8
+MOST_COMPARED, MOST_NUMBERS = 600, 60
+"""Runs whose numbers can be compared two by two, and numbers of each, at most."""
 """Settings that have a column of their own, at most; with more of them all stand in one."""
 DIGITS = 6
+HOW_COMPARED = "Two that are ticked are compared."
 HOW_SHOWN = (
     "A click on a heading sorts. The filter takes words that a row has, and comparisons such as objective<0.1 or "
     "seed=12; where a heading has several words, they are joined by _."
@@ -288,14 +292,16 @@ HOW_SHOWN = (
 
 @dataclass(frozen=True)
 class NumberColumn:
-    """Numbers; nan is shown as a dash."""
+    """Numbers; nan is shown as a dash. What is ``hidden`` appears only where two rows are compared."""
 
     title: str
     values: Sequence[float]
+    hidden: bool = False
 
     def to_json(self) -> dict[str, object]:
         """Return the column as ``rows.js`` reads it."""
-        return {"title": self.title, "kind": "number", "of": [short(value) for value in self.values]}
+        hidden = {"hidden": True} if self.hidden else {}
+        return {"title": self.title, "kind": "number", "of": [short(value) for value in self.values], **hidden}
 
 
 @dataclass(frozen=True)
@@ -339,9 +345,17 @@ def short(value: float) -> float | int | str | None:
     return float(f"{value:.{DIGITS - 1}e}")
 
 
-def row_table(columns: Sequence[Column], noun: str) -> Html:
-    """Return the place of a table, and its rows; ``noun``: what a row is."""
-    data = {"columns": [column.to_json() for column in columns], "noun": noun, "page": PER_PAGE}
+def row_table(columns: Sequence[Column], noun: str, names: Sequence[str] = ()) -> Html:
+    """Return the place of a table, and its rows.
+
+    Args:
+        columns: of the table.
+        noun: what a row is.
+        names: of the rows, any two of which can be compared; empty for none.
+    """
+    data: dict[str, object] = {"columns": [each.to_json() for each in columns], "noun": noun, "page": PER_PAGE}
+    if names:
+        data["names"] = list(names)
     return tag(
         "div",
         tag("p", "The table needs JavaScript; result.json of each run folder has its numbers.", class_="note"),
@@ -372,7 +386,26 @@ def run_card(found: Sequence[Study], links: Mapping[str, str]) -> Html:
         NumberColumn("time of the solve [s]", [solve_time(run) for run in runs]),
         LinkColumn("page", "open", [links.get(run.place, "") for run in runs]),
     ]
-    return card("All runs", row_table(columns, "run"), anchor="runs", note=HOW_SHOWN)
+    if len(runs) <= MOST_COMPARED:
+        columns += compared_columns(runs)
+    names = [run.place or f"{run.solver}, seed {run.seed}" for run in runs]
+    note = f"{HOW_SHOWN} {HOW_COMPARED}"
+    return card("All runs", row_table(columns, "run", names), anchor="runs", note=note)
+
+
+def compared_columns(runs: Sequence[Run]) -> list[Column]:
+    """Return what is seen where two runs are compared: what was found, errors, parts of the objective."""
+    numbers = [
+        found_numbers(run)
+        | {f"error of {c.name}": c.error for c in run.checks}
+        | {f"cost {k}": v for k, v in run.costs.items()}
+        for run in runs
+    ]
+    titles = dict.fromkeys(title for each in numbers for title in each)
+    return [
+        NumberColumn(title, [each.get(title, math.nan) for each in numbers], True)
+        for title in list(titles)[:MOST_NUMBERS]
+    ]
 
 
 def output_columns(runs: Sequence[Run]) -> list[Column]:

@@ -123,10 +123,10 @@ def pack(text: str) -> str:
     return base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
 
 
-def packed_json(value: object) -> Html:
-    """Embed a value of strict JSON for scripts of the page, compressed."""
+def packed_json(value: object, **attributes: str) -> Html:
+    """Embed a value of strict JSON for scripts of the page, compressed; ``attributes``: more of its element."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
-    return tag("script", Html(pack(text)), type="application/json", class_=PACKED)
+    return tag("script", Html(pack(text)), type="application/json", class_=PACKED, **attributes)
 
 
 def stats(pairs: Iterable[tuple[str, str]]) -> Html:

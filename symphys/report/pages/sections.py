@@ -19,7 +19,8 @@ from symphys.findings.writing import beside, capital, show, titled, with_unit
 from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart
 from symphys.report.charts.run import component_names, knotted
-from symphys.report.making.stamps import batch_page
+from symphys.report.making.neighbours import neighbours
+from symphys.report.making.stamps import RUN_PAGE, batch_page
 from symphys.report.pages import words
 from symphys.report.pages.answers import extent
 from symphys.report.pages.markup import (
@@ -108,10 +109,12 @@ def header(run: Run, cards: Sequence[Html]) -> Html:
     why, guess = (values.name(run.provenance.get(key)) for key in ("chosen", "guess"))
     above = batch_page(run.folder)
     every = join([" · ", tag("a", "all runs", href=above)]) if above else ""
+    beside = [tag("a", title, href=at) for title, at in neighbours(run.folder, RUN_PAGE)]
     kicker = tag("p", f"Run report · {run.problem} · {run.solver} · seed {run.seed}", every, class_="kicker")
     return join(
         [
             kicker,
+            tag("p", "Beside it: ", separated(beside), class_="kicker") if beside else "",
             tag("p", f"With {settings_words(run.settings)}.", class_="note") if run.settings else "",
             tag("p", f"No solver was named: {run.solver}, since {why}.", class_="note") if why else "",
             tag("p", f"It starts from what {guess} found.", class_="note") if guess else "",
@@ -121,6 +124,11 @@ def header(run: Run, cards: Sequence[Html]) -> Html:
             tag("nav", *links, aria_label="Sections") if run.readable else "",
         ]
     )
+
+
+def separated(parts: Sequence[Html]) -> Html:
+    """Return parts with dots between them."""
+    return Html(" · ".join(parts))
 
 
 def key_numbers(run: Run) -> Html:

@@ -1,7 +1,7 @@
 """The part of a batch's page on a sweep: what was found, and whether it holds, against the keys that were swept.
 
-Of one key there are curves, of two on a grid tables in colours, of more a panel for each key. Points and cells lead to
-the pages of their runs.
+Of one key there are curves, of two on a grid tables in colours, of more parallel coordinates and a panel for each key.
+Points, cells and lines lead to the pages of their runs.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from symphys.report.pages import words
 from symphys.report.pages.answers import found_numbers
 from symphys.report.pages.comparison import solve_time
 from symphys.report.pages.markup import Html, banner, card, figures, tag
+from symphys.report.pages.parallel import Course, Scale, parallel_coordinates
+from symphys.results.config import settings_words
 from symphys.results.discovery import Study, middle
 from symphys.results.drawable import OVERSIZED, drawable, oversized
 from symphys.results.run import Run
@@ -30,6 +32,9 @@ LEAST_STUDIES = 3
 """Settings of one problem that make a sweep, at least."""
 MOST_RUNS, MOST_MEASURES, MOST_SIDE, MOST_NAMED = 600, 12, 30, 20
 """Runs and numbers that are drawn; values along a side of a table; runs that are named, at most."""
+MOST_AXES = 9
+"""Keys and numbers that have an axis each for three keys and more, at most."""
+POINTS = "Filled: solved; hollow: not. A point leads to the page of its run."
 SAME = 1e-9
 """Difference, as a share of the number and of 1, below which it counts as the same."""
 WIDE = 100.0
@@ -128,14 +133,29 @@ def sweep_parts(sweep: SweptRuns, links: Mapping[str, str]) -> list[Html]:
         framed = "Medians over solvers and seeds. " * (len(sweep.runs) > grid[0].size * grid[1].size)
         framed += "The larger, the darker; framed: not solved. A number leads to the page of its run."
         shown = [tag("div", *tables, class_="heats"), tag("p", framed, class_="caption")]
+    elif len(sweep.keys) > 2:
+        lines = "A line for each run, dashed where it is not solved; it leads to the run's page."
+        shown = [courses(sweep, links), tag("p", lines, class_="caption"), figures([chart(sweep, links)], POINTS)]
     else:
-        shown = [figures([chart(sweep, links)], "Filled: solved; hollow: not. A point leads to the page of its run.")]
+        shown = [figures([chart(sweep, links)], POINTS)]
     if len(sweep.runs) < len(sweep.every):
         shown.append(tag("p", f"Drawn are {len(sweep.runs)} of {len(sweep.every)} runs, evenly.", class_="caption"))
     if sweep.oversized:
         shown.append(tag("p", OVERSIZED, class_="caption"))
     same = tag("p", f"The same in all runs: {writing.listed(sweep.same)}.", class_="caption") if sweep.same else ""
     return [verdict(sweep), card(f"Results against {named}", *shown, same, anchor="sweep"), unsolved(sweep, links)]
+
+
+def courses(sweep: SweptRuns, links: Mapping[str, str]) -> Html:
+    """Return every run as a line through its keys and its numbers."""
+    scales = [Scale(key, sweep.at[:, k], across(sweep.at[:, k]) < 0) for k, key in enumerate(sweep.keys)]
+    scales += [Scale(each.title, each.values, across(each.values) < 0) for each in sweep.measures]
+    marks = palette.solver_marks(run.solver for run in sweep.runs)
+    lines = []
+    for run in sweep.runs:
+        title = f"{settings_words(run.settings)}, {run.solver}, seed {run.seed}"
+        lines.append(Course(marks[run.solver][0], links.get(run.place, ""), title, not run.solved))
+    return parallel_coordinates(scales[:MOST_AXES], lines, f"All runs over {writing.listed(sweep.keys)}")
 
 
 def verdict(sweep: SweptRuns) -> Html:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from symphys.report.charts import palette
@@ -17,15 +19,24 @@ from symphys.types import Array
 
 NUMBERS = 10_000
 """How many numbers a page carries at most for one motion; the player goes evenly from one pose to the next."""
-MOST_FRAMES = 600
+LEAST_FRAMES, MOST_FRAMES = 40, 600
 GUESS_POINTS = 120
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 LEAST_PLAY = 3.0
 """[s] a motion plays at least, slowed down if need be."""
 
 
-def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = None, numbers: int = NUMBERS) -> Html:
-    """Return a canvas with play, time and view controls, and its data of at most ``numbers`` numbers."""
+def animation(
+    trajectory: Trajectory,
+    scene: Scene,
+    guess: Trajectory | None = None,
+    numbers: int = NUMBERS,
+    others: Sequence[Html] = (),
+) -> Html:
+    """Return a canvas with play, time and view controls, and its data of at most ``numbers`` numbers.
+
+    ``others`` are motions that links of the page show; see ``other_motion``.
+    """
     legend = [join([dot(colour), palette.short(name, 24)]) for name, colour in keys(trajectory, scene)]
     return tag(
         "div",
@@ -33,8 +44,14 @@ def animation(trajectory: Trajectory, scene: Scene, guess: Trajectory | None = N
         tag("div", *(tag("span", part) for part in legend), class_="legend") if legend else "",
         controls(float(trajectory.time[-1] - trajectory.time[0]), follow_data(trajectory, scene) is not None),
         packed_json(motion_data(trajectory, scene, guess, numbers)),
+        *([tag("p", "", class_="caption shown", aria_live="polite"), *others] if others else []),
         class_="animation",
     )
+
+
+def other_motion(trajectory: Trajectory, scene: Scene, numbers: int, link: str, title: str) -> Html:
+    """Return the data of a motion that is played while the pointer is on a ``link`` of the page."""
+    return packed_json(motion_data(trajectory, scene, None, numbers), data_of=link, data_title=title)
 
 
 def controls(duration: float, follows: bool) -> Html:
@@ -62,7 +79,7 @@ VIEW_TITLES = (("space", "3D"), ("side", "Side"), ("top", "Top"))
 def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, numbers: int) -> dict[str, object]:
     """Return what animation.js and joints.js read; lists are flat, frame after frame, body after body."""
     bodies = len(trajectory.body_names)
-    frames = int(np.clip(numbers // (7 * bodies), 40, MOST_FRAMES))
+    frames = int(np.clip(numbers // (7 * bodies), LEAST_FRAMES, MOST_FRAMES))
     chosen = even(len(trajectory.time), frames)
     views = choose_views(trajectory, scene)
     return {

@@ -5,15 +5,25 @@ const LOW = 0.12; // below this elevation hills would hide what moves between th
 
 class Player {
   constructor(root) {
-    this.data = JSON.parse(root.querySelector("script").textContent);
+    this.root = root;
     this.canvas = root.querySelector("canvas");
-    this.painter = new Painter(this.canvas, this.data.axes);
     this.button = root.querySelector(".play");
     this.slider = root.querySelector("input");
     this.output = root.querySelector("output");
     this.speed = root.querySelector("select");
     this.views = [...root.querySelectorAll("[data-view]")];
     this.follow = root.querySelector("[data-follow]");
+    this.others = new Map([...root.querySelectorAll("script[data-of]")].map((s) => [s.dataset.of, s]));
+    this.playing = false;
+    this.load(root.querySelector("script"));
+    this.time = this.first;
+    this.listen();
+    this.look(this.data.flat ? "top" : "space");
+  }
+
+  load(script) { // the motion that it plays
+    this.data = JSON.parse(script.textContent);
+    this.painter = new Painter(this.canvas, this.data.axes);
     this.following = Boolean(this.data.follow);
     this.fixtures = this.data.fixtures.map((solid) => place(solid, STILL, FIXED, true));
     this.cells = this.data.terrain.flatMap((terrain) => mesh(terrain, this.data.planes));
@@ -25,10 +35,17 @@ class Player {
     this.seen = mustSee(this.data, this.patches, this.box, [...corners, ...edges]);
     this.first = this.data.time[0];
     this.last = this.data.time[this.data.time.length - 1];
-    this.time = this.first;
-    this.playing = false;
-    this.listen();
-    this.look(this.data.flat ? "top" : "space");
+  }
+
+  peek(target) { // the motion of the run whose page a link below the pointer leads to; beside it where it is out of sight
+    const script = this.others.get(target.closest?.("a")?.getAttribute("href"));
+    if (!script) return this.root.classList.remove("peek");
+    const box = this.root.getBoundingClientRect();
+    if (!this.root.classList.contains("peek") && (box.top > window.innerHeight - 120 || box.bottom < 120)) this.root.classList.add("peek");
+    this.load(script);
+    this.time = Math.min(Math.max(this.time, this.first), this.last);
+    this.root.querySelector(".shown").textContent = script.dataset.title;
+    this.draw();
   }
 
   visible(planes) {
@@ -48,6 +65,7 @@ class Player {
       this.time = Math.min(Math.max(time, this.first), this.last);
       this.draw();
     });
+    if (this.others.size) ["pointerover", "focusin"].forEach((kind) => document.addEventListener(kind, (e) => this.peek(e.target)));
     this.views.forEach((b) => b.addEventListener("click", () => this.look(b.dataset.view)));
     this.follow?.addEventListener("click", () => {
       this.following = !this.following;

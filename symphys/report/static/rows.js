@@ -14,6 +14,8 @@ class Rows {
     this.sorted = null; // [column, 1 or -1]
     this.first = 0;
     this.texts = [];
+    this.visible = data.columns.filter((column) => !column.hidden);
+    this.pair = []; // rows that are compared
   }
 
   value(column, row) { // what is compared: a number or a word; null where nothing is known
@@ -24,7 +26,7 @@ class Rows {
 
   text(row) { // all words and numbers of a row, in small letters
     const of = (column) => { const v = this.value(column, row); return v === null ? "" : String(v); };
-    this.texts[row] ??= this.data.columns.map(of).join(" ").toLowerCase();
+    this.texts[row] ??= this.visible.map(of).join(" ").toLowerCase();
     return this.texts[row];
   }
 
@@ -70,7 +72,9 @@ class Rows {
   }
 
   head() {
-    return this.data.columns.map((column, k) => {
+    const pick = this.data.names ? '<th scope="col">compare</th>' : "";
+    return pick + this.visible.map((column) => {
+      const k = this.data.columns.indexOf(column);
       const sign = this.sorted && this.sorted[0] === column ? (this.sorted[1] > 0 ? " ▲" : " ▼") : "";
       const order = sign ? ` aria-sort="${this.sorted[1] > 0 ? "ascending" : "descending"}"` : "";
       const kind = column.kind === "number" ? ' class="number"' : "";
@@ -80,7 +84,32 @@ class Rows {
 
   body() {
     const rows = this.shown.slice(this.first, this.first + this.data.page);
-    return rows.map((row) => `<tr>${this.data.columns.map((column) => this.cell(column, row)).join("")}</tr>`).join("");
+    return rows.map((row) => `<tr>${this.box(row)}${this.visible.map((column) => this.cell(column, row)).join("")}</tr>`).join("");
+  }
+
+  box(row) { // that picks a row for comparison
+    if (!this.data.names) return "";
+    const checked = this.pair.includes(row) ? " checked" : "";
+    return `<td><input type="checkbox" data-row="${row}"${checked} aria-label="Compare ${escaped(this.data.names[row])}"></td>`;
+  }
+
+  pick(row) { // of three the last two are compared
+    this.pair = this.pair.includes(row) ? this.pair.filter((other) => other !== row) : [...this.pair, row].slice(-2);
+  }
+
+  compared() { // what two rows have, side by side, and how far it is apart
+    if (!this.pair.length) return "";
+    if (this.pair.length < 2) return '<p class="note">Tick a second one to compare them.</p>';
+    const lines = this.data.columns.filter((column) => column.kind !== "link").map((column) => {
+      const [a, b] = this.pair.map((row) => this.value(column, row));
+      if ([a, b].some((v) => v === null || v === "")) return "";
+      const apart = column.kind === "number" ? (a === b ? "the same" : written(Number((b - a).toPrecision(4)))) : a === b ? "the same" : "another";
+      const cells = this.pair.map((row) => this.cell(column, row)).join("");
+      return `<tr><th scope="row">${escaped(column.title)}</th>${cells}<td class="number">${apart}</td></tr>`;
+    });
+    const heads = this.pair.map((row) => `<th scope="col">${escaped(this.data.names[row])}</th>`).join("");
+    return `<h3>Two ${this.data.noun}s</h3><div class="scroll"><table aria-label="Comparison"><thead><tr><th></th>${heads}
+      <th scope="col" class="number">difference</th></tr></thead><tbody>${lines.join("")}</tbody></table></div>`;
   }
 
   place() { // where in the table the page is
@@ -94,11 +123,18 @@ class Rows {
 function frame(root, rows) { // the parts of the table, and what moves them
   root.innerHTML = `<div class="controls"><input type="search" placeholder="Filter" aria-label="Filter of the rows">
     <output></output><span class="views"><button type="button" data-turn="-1">‹</button><button type="button" data-turn="1">›</button></span></div>
-    <div class="scroll"><table><thead><tr></tr></thead><tbody></tbody></table></div>`;
-  const [input, output, head, body] = ["input", "output", "thead tr", "tbody"].map((name) => root.querySelector(name));
+    <div class="scroll"><table><thead><tr></tr></thead><tbody></tbody></table></div><div class="pair"></div>`;
+  const [input, output, head, body, pair] = ["input", "output", "thead tr", "tbody", ".pair"].map((name) => root.querySelector(name));
   const show = () => {
     [output.textContent, head.innerHTML, body.innerHTML] = [rows.place(), rows.head(), rows.body()];
+    pair.innerHTML = rows.compared();
   };
+  body.addEventListener("change", (event) => {
+    const row = Number(event.target.dataset.row);
+    rows.pick(row);
+    show();
+    body.querySelector(`[data-row="${row}"]`)?.focus();
+  });
   input.addEventListener("input", () => { rows.filter(input.value); show(); });
   head.addEventListener("click", (event) => {
     const button = event.target.closest("[data-column]");
