@@ -8,6 +8,7 @@ if __name__ != "symphys.problems":
         "install the project (pip install -e .) and import symphys.problems"
     )
 
+import json
 from pathlib import Path
 
 from symphys.errors import SymphysError
@@ -20,6 +21,11 @@ PARTS = ("robots", "tasks")
 def catalogue() -> dict[str, Path]:
     """Every shipped problem file by its name without ``.toml``."""
     return {path.stem: path for path in sorted(FOLDER.glob("*.toml"))}
+
+
+def typical_seconds() -> dict[str, float]:
+    """Return the seconds that solving a shipped problem took, as ``make bench-shipped`` measured them."""
+    return {str(name): float(took) for name, took in json.loads((FOLDER / "times.json").read_text("utf-8")).items()}
 
 
 def parts() -> dict[str, Path]:

@@ -15,15 +15,21 @@ from symphys.cli.arguments import complete_problem
 
 @click.command("list")
 def listing() -> None:
-    """List the shipped problems with their solvers, the robots and tasks that problems include, and the solvers."""
+    """List the shipped problems, the robots and tasks that problems include, and the solvers.
+
+    A problem has the solvers that it names, and the seconds that the first of them takes, all of the command included,
+    on two cores with AVX2, where all is compiled.
+    """
     from symphys import problems
     from symphys.problem import load_problem
     from symphys.solvers import SOLVERS
 
+    seconds = problems.typical_seconds()
     click.echo("problems:")
     for name, path in problems.catalogue().items():
         problem = load_problem(path)
-        echo_item(name, f"{problem.title} [{', '.join(problem.solvers or ()) or NO_SOLVER}]")
+        took = f", {seconds[name]:g} s" if name in seconds else ""
+        echo_item(name, f"{problem.title} [{', '.join(problem.solvers or ()) or NO_SOLVER}{took}]")
     click.echo("robots and tasks, for [[include]]:")
     for file in problems.parts():
         click.echo(f"  {file}")

@@ -98,8 +98,9 @@ def read_document(data: Mapping[str, Any], faults: Faults) -> Document:
         document = Document.model_validate(data)
     except ValidationError as error:
         report(error, Document, faults)
-        faults.stop_if_any()
-        raise
+        if not faults.issues:
+            raise
+    faults.stop_if_any()  # out here it has no second traceback
     check_names(document, faults)
     faults.stop_if_any()
     return document

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from symphys.codegen.errors import ProgramError
 from symphys.codegen.program.program import Place
 from symphys.codegen.runtime.library import INPUTS, RESULTS, BatchData, RowSource
+from symphys.codegen.runtime.thread_pool import Pace
 from symphys.types import Array
 
 PARTS_PER_THREAD = 4
@@ -59,11 +60,11 @@ class RolloutBatch:
         self.results[name] = np.empty(shape)
         return self.results[name]
 
-    def parts(self, lanes: int, threads: int) -> list[BatchData]:
-        """Cut the batch into parts of whole blocks, a few for each thread."""
+    def parts(self, lanes: int, threads: int, pace: Pace) -> list[BatchData]:
+        """Cut the batch into parts of whole blocks: a few for each thread, one where all is done at once."""
         blocks = -(-self.rows // lanes)
-        count = 1 if threads == 1 else min(blocks, PARTS_PER_THREAD * threads)
-        ends = [lanes * (blocks * i // count) for i in range(count)] if count else []
+        count = 1 if threads == 1 else pace.parts(blocks, PARTS_PER_THREAD * threads)
+        ends = [lanes * (blocks * i // count) for i in range(count)]
         return [self.part(a, min(b, self.rows)) for a, b in zip(ends, [*ends[1:], self.rows], strict=True)]
 
     def part(self, start: int, end: int) -> BatchData:

@@ -6,15 +6,43 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
+from math import inf
+from time import perf_counter
 from typing import Any, TypeVar
 
 import numpy as np
 
 from symphys.codegen.runtime.library import Memory
 
+MIN_PART = 2e-4
+"""[s] that a part of a call takes at least where it is shared among threads: handing it over takes some 50 us."""
 ALIGNMENT = 64
 """[bytes] Size of the widest vector."""
 T = TypeVar("T")
+
+
+class Pace:
+    """How long a block of lanes takes, by which calls are cut into parts for threads."""
+
+    def __init__(self) -> None:
+        """Know nothing: the first call is cut as finely as may be."""
+        self._block = inf
+
+    def parts(self, blocks: int, most: int) -> int:
+        """Return into how many parts to cut so many blocks, at most ``most``; 1 where sharing does not pay."""
+        worth = min(blocks * self._block / MIN_PART, most) if blocks else 0
+        return min(blocks, max(int(worth), 1))
+
+    def measured(self, task: Callable[[Memory], None], blocks: int) -> Callable[[Memory], None]:
+        """Return the task, which takes note of its time."""
+
+        def run(memory: Memory) -> None:
+            began = perf_counter()
+            task(memory)
+            took = (perf_counter() - began) / max(blocks, 1)
+            self._block = min(took, 1.1 * self._block)  # the shortest of late: others waited for a processor
+
+        return run
 
 
 class MemoryPool:

@@ -17,8 +17,8 @@ from typing import Protocol
 
 from symphys.codegen.errors import KernelUnavailable
 from symphys.codegen.runtime.batch import RolloutBatch
-from symphys.codegen.runtime.library import BatchData, Loaded
-from symphys.codegen.runtime.thread_pool import MemoryPool
+from symphys.codegen.runtime.library import BatchData, Loaded, Memory
+from symphys.codegen.runtime.thread_pool import MemoryPool, Pace
 from symphys.codegen.toolchain.cache import Cache
 from symphys.codegen.toolchain.processes import Background
 from symphys.codegen.toolchain.source_file import SourceFile
@@ -40,11 +40,12 @@ class Libraries(Protocol):
 
 @dataclass(frozen=True)
 class LoadedWidth:
-    """A library, and memories for its blocks."""
+    """A library, memories for its blocks, and how long one takes."""
 
     lanes: int
     loaded: Loaded
     pool: MemoryPool
+    pace: Pace
 
 
 Choice = tuple[LoadedWidth, int]
@@ -146,7 +147,7 @@ class Widths:
     def run(self, batch: RolloutBatch, threads: int) -> None:
         """Compute a batch, its blocks spread over threads."""
         width, missing = self._chosen(batch.rows)
-        self._timed(width, missing, batch.parts(width.lanes, threads), threads)
+        self._timed(width, missing, batch.parts(width.lanes, threads, width.pace), threads)
 
     def run_part(self, part: BatchData) -> None:
         """Compute a part of a batch on this thread."""
@@ -171,7 +172,11 @@ class Widths:
         if self._begin is not None and self._called:
             self.begin()
         self._called, began = True, perf_counter()
-        width.pool.run([partial(width.loaded.evaluate, part) for part in parts], threads)
+        tasks: list[Callable[[Memory], None]] = [partial(width.loaded.evaluate, part) for part in parts]
+        if threads > 1:
+            pairs = zip(tasks, parts, strict=True)
+            tasks = [width.pace.measured(task, -(-part.rows // width.lanes)) for task, part in pairs]
+        width.pool.run(tasks, threads)
         if missing and self._libraries is not None:
             self._spent[missing] = self._spent.get(missing, 0.0) + perf_counter() - began
             if self._spent[missing] >= self.patience and not (self._compiling and self._compiling.running):
@@ -201,5 +206,5 @@ class Widths:
             self._lock.release()
 
     def _add(self, lanes: int, loaded: Loaded) -> None:
-        self._widths = {**self._widths, lanes: LoadedWidth(lanes, loaded, self._pool(lanes, loaded))}
+        self._widths = {**self._widths, lanes: LoadedWidth(lanes, loaded, self._pool(lanes, loaded), Pace())}
         self._choices = {}

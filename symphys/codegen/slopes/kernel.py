@@ -24,7 +24,7 @@ from symphys.codegen.program.collection import uncollected
 from symphys.codegen.program.program import Program
 from symphys.codegen.runtime.kernel import BuildReport
 from symphys.codegen.runtime.library import LinkedCodes
-from symphys.codegen.runtime.thread_pool import MemoryPool
+from symphys.codegen.runtime.thread_pool import MemoryPool, Pace
 from symphys.codegen.slopes.kept import KeptSlopes
 from symphys.codegen.slopes.plan import SlopePlan, slope_plan
 from symphys.codegen.toolchain.build import waits
@@ -153,7 +153,7 @@ class SlopeKernel:
         """Use ``compile_slopes``."""
         self.program, self.output, self.report, self.library = program, output, report, library
         self.threads = processors() if threads is None else threads
-        self._pool = MemoryPool(library.words, report.lanes, np.float64)
+        self._pool, self._pace = MemoryPool(library.words, report.lanes, np.float64), Pace()
         self._compiling: Background | None = None
 
     def compile(self, parts: Sequence[SourceFile], kept: KeptSlopes, cache: Cache) -> None:
@@ -176,22 +176,29 @@ class SlopeKernel:
         """(B, n) and (B, p), or (p,) for all points -> (B, outputs, columns): by the first of z; None: by all."""
         z, given, found = self._arguments(Z, parameters, columns)
         parts = self._parts(len(z), 1 if self.threads == 1 else PARTS_PER_THREAD * self.threads)
-        self._pool.run([partial(self._run, z, given, found, a, b) for a, b in parts], self.threads)
+        self._pool.run(self._tasks(parts, z, given, found), self.threads)
         return found
 
     def jacobians_from_end(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None = None) -> Iterator[Array]:
         """Yield Jacobians in a few runs of points, the last run first; all runs start at once."""
         z, given, found = self._arguments(Z, parameters, columns)
         runs = self._parts(len(z), PARTS_PER_THREAD * self.threads)[::-1]
-        waits = self._pool.begin([partial(self._run, z, given, found, a, b) for a, b in runs], self.threads)
+        waits = self._pool.begin(self._tasks(runs, z, given, found), self.threads)
         return (found[a:b] for (a, b), wait in zip(runs, waits, strict=True) if wait() is None)
 
     def _parts(self, points: int, most: int) -> list[tuple[int, int]]:
         """Return first and last of at most so many parts of whole blocks."""
         lanes = self.report.lanes
         blocks = -(-points // lanes)
-        parts = min(blocks, most)
+        parts = self._pace.parts(blocks, most)
         return [*pairwise(min(lanes * (blocks * i // parts), points) for i in range(parts + 1))] if parts else []
+
+    def _tasks(
+        self, parts: Sequence[tuple[int, int]], z: Array, given: Array, found: Array
+    ) -> list[Callable[[Any], None]]:
+        """Return what computes each part."""
+        lanes = self.report.lanes
+        return [self._pace.measured(partial(self._run, z, given, found, a, b), -(-(b - a) // lanes)) for a, b in parts]
 
     def _arguments(self, Z: ArrayLike, parameters: ArrayLike, columns: int | None) -> tuple[Array, Array, Array]:
         """Check both; return them and the array of the Jacobians."""

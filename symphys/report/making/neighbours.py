@@ -27,7 +27,7 @@ def neighbours(folder: Path, page: str) -> list[tuple[str, str]]:
         return []
     solver, seed = named[1], int(named[2])
     case = folder.parent
-    runs = [(found[1], int(found[2])) for name in inside(case) if (found := RUN.fullmatch(name))]
+    runs = [(each[1], int(each[2])) for each in map(RUN.fullmatch, inside(case)) if each]
     found = [
         (f"seed {each}", Path(f"{solver}-seed{each}"))
         for each in beside(sorted(number for name, number in runs if name == solver), seed)

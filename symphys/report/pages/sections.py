@@ -97,6 +97,7 @@ CHAPTERS = (
     ("gait", "Gait"),
     ("states", "States"),
     ("contacts", "Contacts"),
+    ("time", "Time"),
     ("provenance", "Provenance"),
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from worlds import programs
 
 from symphys.codegen import Cache, Kernel, ProgramError, compile_program, interpret
 from symphys.codegen.emit.plan import plan
+from symphys.codegen.runtime.thread_pool import Pace
 
 
 def draw(kernel: Kernel, rows: int) -> Any:
@@ -177,3 +179,14 @@ def test_the_report_says_how_it_was_built(pendulum: Kernel) -> None:
     assert report.functions > 4
     assert report.seconds > 0
     assert report.note == ""
+
+
+def test_a_call_is_shared_among_threads_where_that_pays() -> None:
+    """The first call is cut as finely as may be, later ones by the time that a block took; none has no part."""
+    pace = Pace()
+    assert pace.parts(100, 8) == 8 and pace.parts(3, 8) == 3 and pace.parts(0, 8) == 0
+    pace.measured(lambda _: time.sleep(0.002), 10)(np.zeros(0))  # 0.2 ms a block
+    assert pace.parts(100, 8) == 8
+    for _ in range(200):
+        pace.measured(lambda _: None, 1000)(np.zeros(0))
+    assert pace.parts(100, 8) == 1
