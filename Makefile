@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --editable
 QUICK := $(addprefix tests/,house model expression findings problem solvers/test_toys.py solvers/test_nothing_lost.py dynamics)
 
-.PHONY: help demo demo-walk test test-quick test-rest test-all test-loaded test-pipelines thorough lint typecheck docs docs-links reference bench bench-list bench-compare gallery clean
+.PHONY: viewer help demo demo-walk test test-quick test-rest test-all test-loaded test-pipelines thorough lint typecheck docs docs-links reference bench bench-list bench-compare gallery clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z -]*\):.*## /make \1\t/p' Makefile
@@ -54,6 +54,12 @@ docs-links: $(VENV)/.documenting  ## ask every external link of the site; needs 
 
 reference: $(VENV)/.installed  ## write docs/problem_reference.md again, after a change of the schema or of solver options
 	$(BIN)/symphys schema --markdown --out docs/problem_reference.md
+
+viewer:  ## bundle the 3D viewer of pages again, after a change in symphys/report/viewer; needs node and npm
+	cd symphys/report/viewer && npm ci --silent && npx esbuild stage.js --bundle --minify --format=iife --legal-comments=none \
+	    --banner:js="/* three $$(node -p "require('./node_modules/three/package.json').version"), MIT, and stage.js $$(cat stage.js package-lock.json | sha256sum | cut -c1-16) */" \
+	    --outfile=../static/viewer.js
+	cp symphys/report/viewer/node_modules/three/LICENSE symphys/report/static/three.LICENSE
 
 bench bench-list: $(BIN)/python  ## list the benchmarks with their questions: make bench-NAME runs one
 	@$(BIN)/python benchmarks/bench.py

@@ -18,6 +18,7 @@ from symphys.shooting import ShootingProblem
 from symphys.solvers.core.checkpoint import Checkpoint, from_plain, to_plain
 from symphys.solvers.core.continuation import Rate, exact_best, stage_result
 from symphys.solvers.core.evaluator import CountingEvaluator, WorkCounter
+from symphys.solvers.core.film import FilmRecorder
 from symphys.solvers.core.interface import Iteration, IterationRecorder, Log, Method, Solver, StageContext, nothing
 from symphys.solvers.core.options import SolverOptions
 from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageResult, Status, StopReason, TraceRow
@@ -230,7 +231,7 @@ class Driver:
             problem, problem.smoothing[0], self._incumbent(problem.smoothing[0]), constraints=request.constraints
         )
         self._start = self._evaluator.clip(np.array(request.start, float))
-        self._trace = SolveTrace()
+        self._trace, self._film = SolveTrace(), FilmRecorder()
         self._last: Array | None = None
         self._stages: tuple[StageResult, ...] = ()
         self._checkpoint: Checkpoint | None = None
@@ -257,6 +258,7 @@ class Driver:
             self._stages,
             self._gains(reason.status, z),
             multipliers,
+            tuple(self._film.points),
         )
 
     def _gains(self, status: Status, z: Array) -> Mapping[str, Array]:
@@ -279,6 +281,7 @@ class Driver:
         outputs = {**dict(zip(names, best.outputs.tolist(), strict=False)), **iteration.outputs}
         row = self._trace.append(counts, (*numbers, evaluator.smoothing), outputs)
         self._last = point.z
+        self._film.add(row.iteration, point.z)
         self._checkpoint = taken = Checkpoint(
             self._stages, iteration.state, best, point.z, counts, len(self._trace), row.seconds
         )

@@ -7,6 +7,7 @@ from dataclasses import astuple, field
 from enum import Enum
 
 from symphys.records import dataclass
+from symphys.solvers.core.film import FilmPoint
 from symphys.types import Array
 
 
@@ -147,6 +148,7 @@ class Outcome:
         gains: feedback about the best point, as named arrays; empty of solvers without, and of interrupted solves.
         multipliers: those of a solve that ended well, by names of the solver's own, from which another may start; empty
             where the solver has none.
+        film: points along the solve of which motions are shown; of a solve that went on, those since then.
     """
 
     status: Status
@@ -158,3 +160,4 @@ class Outcome:
     stages: tuple[StageResult, ...] = ()
     gains: Mapping[str, Array] = field(default_factory=dict)
     multipliers: Mapping[str, Array] = field(default_factory=dict)
+    film: tuple[FilmPoint, ...] = ()

@@ -64,7 +64,15 @@ def wants_figures(pages: str | None, figures: bool) -> bool:
     default=None,
     help="How many processes make pages.  [default: one for each processor]",
 )
-def report(folder: Path, pages: str | None, figures: bool, remake: bool, new: bool, jobs: int | None) -> int:
+@click.option(
+    "--single",
+    metavar="FILE",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the page of the run in DIR to FILE instead: one file that needs no other, to be sent or moved.",
+)
+def report(
+    folder: Path, pages: str | None, figures: bool, remake: bool, new: bool, jobs: int | None, single: Path | None
+) -> int:
     """Make the report of a run folder, or of all runs below a folder, from its files alone.
 
     A page is made where it is missing, or where a file that it shows or what draws it has changed since. Pages of
@@ -72,6 +80,11 @@ def report(folder: Path, pages: str | None, figures: bool, remake: bool, new: bo
     """
     if remake and new:
         raise click.UsageError("--all makes all pages, --new those that are out of date; give one of them")
+    if single is not None:
+        from symphys.report.pages.run import write_single_page
+
+        click.echo(write_single_page(folder, single))
+        return 0
     figures = wants_figures(pages, figures)
     remake = remake or figures
     threads.limit()

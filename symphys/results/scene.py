@@ -6,7 +6,7 @@ What cannot be read, or is too large to draw, is left out of the picture.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import asdict, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from symphys.results.scene_joints import SceneJoint
 from symphys.results.text_files import read_table
 from symphys.types import Array
 
+KINDS = "bodies", "planes", "fixtures", "terrain", "joints", "contacts", "marks"
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -203,6 +204,55 @@ class SceneTerrain:
 
 
 @dataclass(frozen=True)
+class SceneContact:
+    """Two surfaces that may touch.
+
+    Attributes:
+        name: as contacts of a trajectory are called, without the number of the point.
+        body: that the recorded force acts on.
+        solid: which of its solids touches; -1 for any.
+        other: the other body, or the static surface.
+        friction: Coulomb's coefficient, the larger of two; nan where it is not known.
+    """
+
+    name: str
+    body: str
+    solid: int = -1
+    other: str = ""
+    friction: float = np.nan
+
+    def to_json(self) -> dict[str, Any]:
+        """Return an entry of ``contacts``."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> SceneContact | None:
+        """Read a contact; None if it names none."""
+        read = values.record(cls, value, text)
+        return read if read.name and read.body else None
+
+
+@dataclass(frozen=True)
+class SceneMark:
+    """A place that a target asks for: ``at`` (3,) [m], nan along what is free, and its ``tolerance`` [m]."""
+
+    name: str
+    at: Array
+    tolerance: float = 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return an entry of ``marks``."""
+        return {"name": self.name, "at": self.at.tolist(), "tolerance": self.tolerance}
+
+    @classmethod
+    def from_json(cls, value: object, text: Text = values.name) -> SceneMark | None:
+        """Read a mark; None if it has no place that can be drawn."""
+        read = values.record(cls, value, text, at=values.vector(values.table(value).get("at"), np.nan))
+        known = read.at[np.isfinite(read.at)]
+        return read if known.size and small([*known, read.tolerance]) else None
+
+
+@dataclass(frozen=True)
 class Scene:
     """The surroundings of a trajectory, and its bodies; ``gravity`` (3) [m/s^2], empty if it is not known."""
 
@@ -212,6 +262,8 @@ class Scene:
     fixtures: tuple[SceneFixture, ...] = ()
     terrain: tuple[SceneTerrain, ...] = ()
     joints: tuple[SceneJoint, ...] = ()
+    contacts: tuple[SceneContact, ...] = ()
+    marks: tuple[SceneMark, ...] = ()
 
     @property
     def weight_per_mass(self) -> float:
@@ -224,7 +276,7 @@ class Scene:
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of scene.json."""
-        kinds = {key: getattr(self, key) for key in ("bodies", "planes", "fixtures", "terrain", "joints")}
+        kinds = {key: getattr(self, key) for key in KINDS}
         return {
             "gravity": list(self.gravity),
             **{key: [each.to_json() for each in found] for key, found in kinds.items()},

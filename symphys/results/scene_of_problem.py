@@ -10,15 +10,25 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from symphys.errors import SymphysError
 from symphys.model.body import Body
 from symphys.model.joints import AffineMotor, Joint, Motor
 from symphys.model.joints.motor import motor_kind
 from symphys.model.shapes import Fixture, Plane, Scalar, Shape, Terrain
 from symphys.model.world import World
-from symphys.problem import Problem
+from symphys.problem import Problem, Target
 from symphys.problem.world_tables import floats
 from symphys.records import dataclass
-from symphys.results.scene import Scene, SceneBody, SceneFixture, ScenePlane, SceneTerrain, Solid
+from symphys.results.scene import (
+    Scene,
+    SceneBody,
+    SceneContact,
+    SceneFixture,
+    SceneMark,
+    ScenePlane,
+    SceneTerrain,
+    Solid,
+)
 from symphys.results.scene_joints import SceneCoordinate, SceneJoint, SceneJointFrame, SceneMotor
 from symphys.trajectory import Trajectory
 from symphys.types import Array
@@ -51,7 +61,50 @@ def make_scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | No
         ),
         terrain=tuple(sample(each, near) for each in world.statics if isinstance(each, Terrain)),
         joints=tuple(make_joint(joint, names) for joint in world.joints),
+        contacts=make_contacts(world),
+        marks=tuple(mark for mark in map(make_mark, problem.targets) if mark is not None),
     )
+
+
+def make_contacts(world: World) -> tuple[SceneContact, ...]:
+    """Return the surfaces that may touch, each two once."""
+    found = dict[str, SceneContact]()
+    for pair in world.pairs:
+        name, body = pair.name.partition(":")[0], world.bodies[pair.first.body or 0]
+        other = world.statics[pair.second.shape] if pair.second.body is None else world.bodies[pair.second.body]
+        friction = pair.law.friction
+        known = [each for each in (friction if isinstance(friction, tuple) else (friction,)) if is_number(each)]
+        most = max(map(float, known), default=math.nan)
+        found.setdefault(name, SceneContact(name, body.name, pair.first.shape, other.name, most))
+    return tuple(found.values())
+
+
+def is_number(value: Any) -> bool:
+    """Whether a number of the world is known: no phase changes it."""
+    return isinstance(value, int | float) or ca.SX(value).is_constant()
+
+
+def make_mark(target: Target) -> SceneMark | None:
+    """Return the place that a target asks for; None if it asks for more than coordinates of one body or site."""
+    names = list(target.formula.needed)
+    if len(names) != 1 or not names[0].endswith(".position") or target.formula.parts:
+        return None
+    place = ca.SX.sym("place", 3)
+    try:
+        value = target.formula.evaluate({names[0]: place})
+    except SymphysError:
+        return None  # the position of a slider is a number
+    slopes = ca.jacobian(value, place)
+    if not slopes.is_constant():
+        return None
+    matrix, offset = np.array(ca.DM(slopes)), np.array(ca.DM(ca.substitute(value, place, ca.DM.zeros(3)))).ravel()
+    if not (np.count_nonzero(matrix, axis=1) == 1).all():
+        return None
+    at = np.full(3, np.nan)
+    for row, rest in zip(matrix, offset, strict=True):
+        axis = int(np.flatnonzero(row)[0])
+        at[axis] = -rest / row[axis]
+    return SceneMark(target.name, at, float(target.tolerance))
 
 
 def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:

@@ -11,6 +11,8 @@ from functools import partial
 from time import monotonic
 from typing import Any
 
+import numpy as np
+
 from symphys import files
 from symphys import verification as trust
 from symphys.codegen.backends import PRECISIONS, require_kernels
@@ -21,7 +23,8 @@ from symphys.findings.obstacles import obstacles
 from symphys.findings.verdict import holds
 from symphys.findings.writing import capital
 from symphys.problem import Problem
-from symphys.results.file_names import CHECKPOINT, GAINS, GUESS, LOG, MULTIPLIERS, RESULT, SCENE, TRAJECTORY
+from symphys.results.file_names import CHECKPOINT, FILM, GAINS, GUESS, LOG, MULTIPLIERS, RESULT, SCENE, TRAJECTORY
+from symphys.results.film import FilmMotions, film_size
 from symphys.results.result import Result
 from symphys.results.scene_of_problem import make_scene
 from symphys.results.table.journal import Journal
@@ -353,8 +356,22 @@ def write(
         z = transcription.shooting.by_block(outcome.z)
         scene = make_scene(job.problem, z, judgement.trajectory)
         files.write_json(job.folder.path / SCENE, scene.to_json(), at_once)
+        if film := film_of(transcription, outcome):
+            files.write_npz(job.folder.path / FILM, film.arrays(), at_once)
     if outcome.multipliers:
         files.write_npz(job.folder.path / MULTIPLIERS, outcome.multipliers, at_once)
+
+
+def film_of(transcription: Transcription, outcome: Outcome) -> FilmMotions | None:
+    """Return exact motions along a solve, side by side, and that of the result; None without any."""
+    rollout = transcription.rollout
+    count, frames = film_size(len(rollout.world.bodies), len(outcome.film), rollout.steps)
+    if count < 2 or not transcription.quick_motions:
+        return None
+    chosen = [outcome.film[k] for k in np.unique(np.linspace(0, len(outcome.film) - 1, count).round().astype(int))]
+    rows = np.array([*(point.row for point in chosen), len(outcome.trace) - 1])
+    ticks = np.linspace(0, rollout.steps, frames).round().astype(int)
+    return FilmMotions(rows, *transcription.motions(np.array([*(point.z for point in chosen), outcome.z]), ticks))
 
 
 def write_result(job: Job, claim: Claim, result: Result) -> None:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 import numpy as np
 
-from symphys.codegen.backends import Description
+from symphys.codegen.backends import PRECISIONS, Description
 from symphys.codegen.backends.calls import row_by_row
+from symphys.model.state_layout import Layout
 from symphys.problem import Problem
 from symphys.records import dataclass
 from symphys.shooting import ShootingProblem
@@ -25,7 +26,7 @@ from symphys.transcription.objective import Terms
 from symphys.transcription.recorded_parts import RolloutArrays
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.step_evaluator import StepEvaluator
-from symphys.types import Array
+from symphys.types import Array, Ints
 
 if TYPE_CHECKING:
     from symphys.transcription.simulation import Record
@@ -87,6 +88,24 @@ class Transcription:
     def errors(self, Z: Array) -> Array:
         """Return (B, k) error / tolerance of what is asked for in the exact rollouts of Z (B, n), side by side."""
         return self._values_of(Z)[3]
+
+    @property
+    def quick_motions(self) -> bool:
+        """Whether ``motions`` are computed side by side, by machine code."""
+        return self.steps().step.backend in PRECISIONS and not self._cache.by_reports
+
+    def motions(self, Z: Array, ticks: Ints) -> tuple[Array, Array, Array]:
+        """Return times (B, F), positions (B, F, bodies, 3) and orientations (.., 4) at some ``ticks`` (F,) of Z (B, n).
+
+        They are those of exact rollouts, which may be not finite.
+        """
+        rollout, layout = self.rollout, Layout(self.rollout.world)
+        dt = [rollout.parameters.step_length(self.problem.simulation, p) for p in row_by_row(self._start, Z)[2]]
+        x = self.steps().states(np.asarray(Z, float), 0.0)[:, ticks]
+        names = [body.name for body in rollout.world.bodies]
+        fields = ([x[:, :, layout[f"{name}.{of}"]] for name in names] for of in ("position", "orientation"))
+        position, orientation = (np.stack(parts, axis=2) for parts in fields)
+        return np.outer(np.array([float(np.ravel(each)[0]) for each in dt]), ticks), position, orientation
 
     def simulate(self, z: Array, smoothing: float = 0.0) -> Trajectory:
         """Simulate z; NotFinite if a number is not finite."""

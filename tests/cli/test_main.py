@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -257,7 +258,12 @@ def test_the_list_wraps_between_words(run: Run, monkeypatch: pytest.MonkeyPatch)
     _, out, _ = run("list")
     assert max(map(len, out.splitlines())) <= 72
     flat = " ".join(out.split())
-    assert "acrobot An acrobot swings up from rest [ilqr]" in flat and "[chosen for it]" in flat
+    assert re.search(r"acrobot An acrobot swings up from rest \[ilqr, [\d.]+ s\]", flat) and "[chosen for it" in flat
+
+
+def test_the_list_has_times_of_shipped_problems_alone() -> None:
+    known = problems.typical_seconds()
+    assert set(known) <= set(problems.catalogue()) and len(known) > 20 and min(known.values()) > 0
 
 
 def test_list_names_problems_and_solvers(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from tools.browser import BROWSER, visit
 
+import symphys
 from symphys.report import write_batch_report, write_run_report
 
 pytestmark = BROWSER
@@ -76,6 +77,39 @@ links[1].focus();
 const then = says();
 over(document.querySelector("h1"));
 return { first, floats, then, stays: player.classList.contains("peek") };
+"""
+STAGE = """
+const player = document.querySelector(".animation").player, stage = player.stage, canvas = player.canvas;
+if (!stage) return { stage: false, drawn: canvas.getContext("2d") !== null, time: player.output.textContent };
+const where = () => stage.camera.position.toArray().map((x) => x.toFixed(3)).join();
+const turned = { deltaY: -240, clientX: 200, clientY: 200, bubbles: true, cancelable: true };
+const wheel = new window.WheelEvent("wheel", turned);
+const before = where(), still = canvas.dispatchEvent(wheel) === false;
+stage.controls.update();
+const near = where();
+player.views[2].click();
+const top = where();
+player.views[0].click();
+const z = stage.bodies[0].group.position.toArray();
+player.go(0.5 * player.last);
+const moved = stage.bodies[0].group.position.toArray().some((x, k) => x !== z[k]);
+const picture = stage.picture().length;
+stage.camera.position.set(0, -10, -50);
+stage.controls.update();
+return { stage: true, still, zoomed: near !== before, top: top !== near, reset: where() !== near, moved, picture,
+         low: stage.camera.position.z, level: stage.level };
+"""
+FILM = """
+const player = document.querySelector(".animation").player, slider = player.film.querySelector("input");
+const end = () => { player.go(player.last); return player.stage.bodies[0].group.position.toArray(); };
+const result = end(), words = player.film.querySelector("output").textContent;
+slider.value = "0";
+slider.dispatchEvent(new window.Event("input"));
+const guess = end(), label = player.film.querySelector("output").textContent;
+const cursor = document.querySelector("figure[data-name=convergence] .cursor").getAttribute("d") || "";
+slider.value = slider.max;
+slider.dispatchEvent(new window.Event("input"));
+return { result, guess, again: end(), words, label, cursor, max: Number(slider.max) };
 """
 COLOURS = "return window.getComputedStyle(document.body).backgroundColor;"
 THEME = """
@@ -157,3 +191,28 @@ def test_the_pointer_on_a_point_of_a_sweep_shows_its_motion(
         "then": "ball.mass=2, gradient, seed 0",
         "stays": False,
     }
+
+
+def test_the_motion_is_in_three_dimensions(pages: tuple[Path, Path]) -> None:
+    """Wheel, views, time and picture; the camera never goes below the floor. The view comes back by its button."""
+    found = visit(pages[0], STAGE)
+    assert found.console == [], found.console
+    assert found.seen["stage"] and found.seen["still"] and found.seen["zoomed"] and found.seen["top"]
+    assert found.seen["reset"] and found.seen["moved"] and found.seen["picture"] > 2000
+    assert found.seen["low"] > found.seen["level"]
+
+
+def test_without_webgl_there_is_the_flat_picture(pages: tuple[Path, Path]) -> None:
+    found = visit(pages[0], STAGE, flat=True)
+    assert found.seen["stage"] is False and found.seen["drawn"] and found.seen["time"].endswith(" s")
+
+
+def test_the_solve_is_a_film(tmp_path: Path) -> None:
+    """From the guess to the solution, with the place on the way in the convergence."""
+    symphys.solve("ball_throw", "least_squares", folder=tmp_path)
+    found = visit(write_run_report(tmp_path / "ball_throw" / "least_squares-seed0"), FILM)
+    assert found.console == [], found.console
+    seen = found.seen
+    assert seen["max"] >= 3 and seen["label"].startswith("iteration 0") and seen["words"].startswith("the result")
+    assert seen["result"][0] == pytest.approx(10.0, abs=0.02) and abs(seen["guess"][0] - 10) > 1
+    assert seen["again"] == seen["result"] and seen["cursor"].startswith("M")

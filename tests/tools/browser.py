@@ -17,7 +17,9 @@ from tools.waiting import FOREVER
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 BROWSER = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium to open pages (Debian: apt-get install chromium)")
 POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy"[^>]*>')
-FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--enable-logging=stderr", "--v=0")
+GPU = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""WebGL without a graphics processor."""
+FLAGS = ("--headless", "--no-sandbox", *GPU, "--hide-scrollbars", "--enable-logging=stderr", "--v=0")
 ASK = """
 <iframe id="page" style="width:WIDTHpx;height:900px;border:0" srcdoc="PAGE"></iframe>
 <script>
@@ -43,10 +45,12 @@ class Visit:
     console: list[str]
 
 
-def visit(page: Path, script: str, width: int = 1400, dark: bool = False, printed: bool = False) -> Visit:
+def visit(
+    page: Path, script: str, width: int = 1400, dark: bool = False, printed: bool = False, flat: bool = False
+) -> Visit:
     """Open a page in a frame of some width and return what ``script``, the body of a function, gives there.
 
-    ``printed``: as on paper.
+    ``printed``: as on paper; ``flat``: without WebGL.
     """
     text = POLICY.sub("", page.read_text("utf-8"))
     text = text.replace("@media print", "@media all") if printed else text
@@ -54,7 +58,7 @@ def visit(page: Path, script: str, width: int = 1400, dark: bool = False, printe
     wrapper = page.with_name(f"asked-{width}.html")
     wrapper.write_text(f"<!doctype html><html><body>{asking}</body></html>", encoding="utf-8")
     assert CHROMIUM is not None
-    more = ["--force-dark-mode"] * dark
+    more = ["--force-dark-mode"] * dark + ["--disable-3d-apis"] * flat
     call = [CHROMIUM, *FLAGS, *more, "--dump-dom", "--virtual-time-budget=8000", wrapper.resolve().as_uri()]
     done = subprocess.run(call, capture_output=True, text=True, timeout=FOREVER, check=False)
     wrapper.unlink()

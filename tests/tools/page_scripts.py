@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from tools.waiting import FOREVER
 
-from symphys.report.pages.markup import HERE, SCRIPTS, SHARED
+from symphys.report.pages.markup import HERE, SCRIPTS, SHARED, START
 
 NODE = pytest.mark.skipif(shutil.which("node") is None, reason="needs node to run the page's script")
 
@@ -25,11 +25,11 @@ const element = (name) => ({
   textContent: DATA, clientWidth: 800, clientHeight: 400, dataset: { view: name }, getContext: () => pen,
   setAttribute() {}, addEventListener: (kind, f) => { listeners[`${name} ${kind}`] = f; },
 });
-const names = ["canvas", ".play", "input", "output", "select", "script"];
+const names = ["canvas", ".play", ".controls input", ".controls output", "select", "script:not([data-film])"];
 const parts = Object.fromEntries(names.map((name) => [name, element(name)]));
 const views = ["space", "side", "top"].map(element);
 let frames = 0;
-global.window = { devicePixelRatio: 2 };
+global.window = { devicePixelRatio: 2, location: { hash: "" } };
 global.document = {
   querySelectorAll: () => [{ querySelector: (name) => parts[name], querySelectorAll: () => views }],
   addEventListener: (kind, f) => { listeners[`document ${kind}`] = f; },
@@ -76,17 +76,17 @@ def run_script(code: str, *more: str) -> Any:
 def plays_to_the_end(motion: dict[str, Any]) -> None:
     """Look from all sides, go to the middle, then play: time, button and the terminal show that it went well."""
     data = json.dumps(json.dumps(motion))
-    script = "".join((HERE / name).read_text(encoding="utf-8") for name in (*SHARED, *SCRIPTS))
+    script = "".join((HERE / name).read_text(encoding="utf-8") for name in (*SHARED, *SCRIPTS, *START))
     acts = """
     for (const key of ["space click", "side click", "top click"]) listeners[key]();
-    parts.input.value = "500";
-    listeners["input input"]();
-    const half = parts.output.textContent;
+    parts[".controls input"].value = "500";
+    listeners[".controls input input"]();
+    const half = parts[".controls output"].textContent;
     parts.select.value = "1";
     listeners[".play click"]();
     setImmediate(function shown() {
       if (frames < 400 && parts[".play"].textContent !== "▶") return setImmediate(shown);
-      console.log(half, "|", parts.output.textContent, "|", parts[".play"].textContent);
+      console.log(half, "|", parts[".controls output"].textContent, "|", parts[".play"].textContent);
     });
     """
     code = f"const DATA = {data};{STAGE}{script}{acts}"

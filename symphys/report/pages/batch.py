@@ -15,7 +15,7 @@ from symphys.report.pages import comparison
 from symphys.report.pages.answers import answers_card
 from symphys.report.pages.check_figure import MOST_CHECKS, MOST_DOTS, check_figure, ratios
 from symphys.report.pages.comparison import page_links, run_card, study_card
-from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag
+from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag, write_viewer
 from symphys.report.pages.run import read_motions
 from symphys.report.pages.sweep import sweep_of, sweep_parts
 from symphys.report.scene.animation import LEAST_FRAMES, NUMBERS, animation, other_motion
@@ -71,7 +71,7 @@ def write_batch_report(batch_dir: Path, unmade: Mapping[Path, str] | None = None
         provenance(runs),
         tag("footer", "Made by symphys from the run folders alone; make it again with “symphys report”."),
     ]
-    files.write_text(batch_dir / PAGE, page(title, join(parts), digest))
+    files.write_text(batch_dir / PAGE, page(title, join(parts), digest, write_viewer(batch_dir)))
     return batch_dir / PAGE
 
 

@@ -14,14 +14,17 @@ from pathlib import Path
 
 from markdown_it import MarkdownIt
 
+from symphys import files
 from symphys.report.charts import palette
 from symphys.report.charts.chart import Chart
 
 VOID = frozenset({"br", "img", "input", "link", "meta"})
 HERE = Path(__file__).parents[1] / "static"
 SCRIPTS = ("geometry.js", "solids.js", "terrain.js", "painter.js", "joints.js", "animation.js")
-SHARED, CHARTS, ROWS = ("numbers.js",), ("charts.js",), ("rows.js",)
-UNPACK = "unpack.js"
+SHARED, START, CHARTS, ROWS = ("numbers.js",), ("start.js",), ("charts.js",), ("rows.js",)
+UNPACK, VIEWER = "unpack.js", "viewer.js"
+ASSETS = "assets"
+"""Folder of a batch for what its pages share."""
 PACKED = "packed"
 """Class of what ``unpack.js`` unpacks."""
 ICONS = {"good": "✓", "fair": "!", "bad": "✕", "unknown": "?"}
@@ -151,26 +154,55 @@ UNPACKED = tag(
     class_="note unpacked",
     hidden="",
 )
+LOST = tag(
+    "p",
+    "The motion is played by a file in the folder “assets” of the batch, which is not there: “symphys report --single” "
+    "of the run's folder writes a page that holds all.",
+    class_="note lost",
+    hidden="",
+)
 SCRIPTLESS = tag("noscript", tag("p", "Curves, motions and long tables need JavaScript.", class_="note"))
 
 
-def page(title: str, body: Part, digest: str = "") -> str:
+def page(title: str, body: Part, digest: str = "", viewer: str = "") -> str:
     """Return the whole document: no part of it is loaded from elsewhere, and no script but our own may run.
 
-    The scripts are those that the body needs. ``digest``: the checksum of what the page was made from.
+    The scripts are those that the body needs.
+
+    Args:
+        title: of the document.
+        body: of it.
+        digest: the checksum of what the page was made from.
+        viewer: address of the script that plays motions, beside the page; empty to hold it in the page.
     """
-    first, then, packed = packed_scripts("<canvas" in body, 'class="chart"' in body, 'class="rows"' in body)
+    animated = "<canvas" in body
+    first, then, packed = packed_scripts(animated, not viewer, 'class="chart"' in body, 'class="rows"' in body)
     if not then:
         return document(title, body, Html(""), (), digest)
-    held = tag("script", Html(packed), type="text/plain", class_=PACKED, id="scripts")
-    scripts = join([held, tag("script", Html(first))])
-    return document(title, join([UNPACKED, SCRIPTLESS, body]), scripts, (first, then), digest)
+    scripts, allowed = [tag("script", Html(packed), type="text/plain", class_=PACKED, id="scripts")], [first, then]
+    if animated and viewer:
+        body = join([LOST, body])
+        scripts.append(tag("script", src=viewer))
+    elif animated:
+        scripts.append(tag("script", Html(packed_viewer()), type="text/plain", class_=PACKED, id="viewer"))
+        allowed.append(read_static(VIEWER))
+    scripts.append(tag("script", Html(first)))
+    return document(title, join([UNPACKED, SCRIPTLESS, body]), join(scripts), allowed, digest, bool(viewer))
 
 
 @cache
-def packed_scripts(animated: bool, charts: bool, rows: bool) -> tuple[str, str, str]:
-    """Return the script that unpacks, the script that it unpacks, and the latter compressed."""
-    parts = (SHARED, animated or charts or rows), (SCRIPTS, animated), (CHARTS, charts), (ROWS, rows)
+def packed_scripts(animated: bool, whole: bool, charts: bool, rows: bool) -> tuple[str, str, str]:
+    """Return the script that unpacks, the script that it unpacks, and the latter compressed.
+
+    ``whole``: what plays motions is part of it, and does not lie beside the page.
+    """
+    parts = (
+        (SHARED, animated or charts or rows),
+        (SCRIPTS, animated and whole),
+        (START, animated),
+        (CHARTS, charts),
+        (ROWS, rows),
+    )
     then = squeezed(read_static(*(name for names, wanted in parts if wanted for name in names)))
     return read_static(UNPACK), then, pack(then)
 
@@ -181,16 +213,34 @@ def squeezed(script: str) -> str:
 
 
 @cache
+def packed_viewer() -> str:
+    """Return the script that draws motions, compressed."""
+    return pack(read_static(VIEWER))
+
+
+def write_viewer(root: Path) -> str:
+    """Write the script that plays motions into a folder, once for all of its pages; return its place in there."""
+    text = f"{read_static(VIEWER)}\n{squeezed(read_static(*SCRIPTS))}\n"
+    digest = hashlib.sha256(text.encode()).hexdigest()[:12]
+    place = f"{ASSETS}/viewer-{digest}.js"
+    if not (root / place).is_file():
+        (root / ASSETS).mkdir(parents=True, exist_ok=True)
+        files.write_text(root / place, text)
+    return place
+
+
+@cache
 def read_static(*names: str) -> str:
     """Files of the page, one after the other."""
     return "".join((HERE / name).read_text(encoding="utf-8") for name in names)
 
 
-def document(title: str, body: Part, scripts: Html, allowed: Collection[str], digest: str) -> str:
-    """Return head and body; ``allowed``: the texts of the scripts that may run."""
+def document(title: str, body: Part, scripts: Html, allowed: Collection[str], digest: str, beside: bool = False) -> str:
+    """Return head and body; ``allowed``: the texts of the scripts that may run, and ``beside``: files beside it."""
     hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii") for script in allowed]
     sources = " ".join(f"'sha256-{each}'" for each in hashes) or "'none'"
-    policy = f"default-src 'none'; style-src 'unsafe-inline'; script-src {sources}"
+    more = " 'self' file:" if beside else ""
+    policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {sources}{more}"
     head = tag(
         "head",
         tag("meta", charset="utf-8"),

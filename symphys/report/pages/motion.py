@@ -20,7 +20,7 @@ from symphys.report.pages.markup import Html, Part, card, figures, join, named_f
 from symphys.report.robots.gait import LOADED_SHARE, stances, weight
 from symphys.report.robots.joint_charts import shown
 from symphys.report.robots.joint_use import Channel, channels, separation
-from symphys.report.scene.animation import animation
+from symphys.report.scene.animation import Film, animation
 from symphys.results.scene import Scene, read_scene
 from symphys.results.scene_joints import SceneMotor
 from symphys.results.trajectories import read_trajectory
@@ -75,11 +75,19 @@ def write_motion_page(trajectory: Trajectory, scene: Scene, out: Path, title: st
 
 
 def motion_card(
-    trajectory: Trajectory | None, scene: Scene, guess: Trajectory | None = None, faults: Sequence[str] = ()
+    trajectory: Trajectory | None,
+    scene: Scene,
+    guess: Trajectory | None = None,
+    faults: Sequence[str] = (),
+    film: Film | None = None,
 ) -> Html:
-    """Show the motion played, with the path of its guess, or say why there is none."""
+    """Show the motion played, with the path of its guess and motions along the solve, or say why there is none."""
     notes = tag("p", "Not read: " + "; ".join(faults) + ".", class_="note") if faults else Html("")
-    played = tag("p", "This run recorded no motion.") if trajectory is None else animation(trajectory, scene, guess)
+    played = (
+        tag("p", "This run recorded no motion.")
+        if trajectory is None
+        else animation(trajectory, scene, guess, film=film)
+    )
     return card("The motion", played, notes, anchor="motion")
 
 

@@ -6,20 +6,25 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from symphys import files
 from symphys.findings import writing
+from symphys.findings.writing import show
 from symphys.records import dataclass
 from symphys.report.charts.chart import Chart
 from symphys.report.charts.motion import motion_charts
 from symphys.report.charts.run import run_charts
-from symphys.report.making.stamps import RUN_PAGE, folder_digest
+from symphys.report.making.stamps import BATCH_PAGE, RUN_PAGE, batch_page, folder_digest
 from symphys.report.pages import sections
-from symphys.report.pages.markup import Html, card, join, page, tag
+from symphys.report.pages.markup import Html, card, join, page, tag, write_viewer
 from symphys.report.pages.motion import motion_card, motion_cards
+from symphys.report.scene.animation import Film
 from symphys.results import text_files as tables
 from symphys.results.discovery import is_run_folder
 from symphys.results.drawable import OVERSIZED, drawable, oversized
-from symphys.results.file_names import CONFIG, GUESS, LOG, PROBLEM, SCENE, TRAJECTORY
+from symphys.results.file_names import CONFIG, FILM, GUESS, LOG, PROBLEM, SCENE, TRAJECTORY
+from symphys.results.film import read_film
 from symphys.results.run import Run, read_run
 from symphys.results.scene import Scene, read_scene
 from symphys.results.text_files import ReportError
@@ -27,6 +32,8 @@ from symphys.results.trajectories import POSES, read_trajectory
 from symphys.trajectory import Trajectory
 
 PAGE = RUN_PAGE
+SWEPT_MOTIONS, SWEPT_FRAMES = 6, 30
+"""Size of a film on the page of a run of a sweep, at most."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +61,31 @@ def write_run_report(run_dir: Path) -> Path:
         ReportError: there is no such folder, it is no run folder, or it cannot be written to.
     """
     digest = folder_digest(run_dir)  # before files are read: what changes meanwhile is seen next time
+    files.write_text(run_dir / PAGE, run_page(run_dir, digest, shared_viewer(run_dir)))
+    return run_dir / PAGE
+
+
+def write_single_page(run_dir: Path, out: Path) -> Path:
+    """Write the page of a run as one file that needs no other, without links to other pages; errors as above."""
+    files.write_text(out, run_page(run_dir, alone=True))
+    return out
+
+
+def run_page(run_dir: Path, digest: str = "", viewer: str = "", alone: bool = False) -> str:
+    """Return the page of a run; ``alone``: without links to other pages."""
     run, recording = read_recorded(run_dir)
     charts = {chart.name: chart for chart in every_chart(run, recording)}
-    body = join([build(run, recording, charts), sections.FOOTER])
-    files.write_text(run_dir / PAGE, page(f"{run.title}: {run.solver}, seed {run.seed}", body, digest))
-    return run_dir / PAGE
+    body = join([build(run, recording, charts, alone), sections.FOOTER])
+    return page(f"{run.title}: {run.solver}, seed {run.seed}", body, digest, viewer)
+
+
+def shared_viewer(run_dir: Path) -> str:
+    """Return the address of the script that draws motions, beside the page of all runs; empty where there is none."""
+    above = batch_page(run_dir)
+    if not above:
+        return ""
+    up = above.removesuffix(BATCH_PAGE)
+    return up + write_viewer(run_dir / up)
 
 
 def every_chart(run: Run, recording: RecordedMotion) -> list[Chart]:
@@ -116,10 +143,11 @@ def read_or_note(path: Path, faults: list[str], only: Sequence[str] = ()) -> Tra
         return None
 
 
-def build(run: Run, recording: RecordedMotion, charts: Mapping[str, Chart]) -> Html:
-    """Make the page, from the verdict to the sources."""
+def build(run: Run, recording: RecordedMotion, charts: Mapping[str, Chart], alone: bool = False) -> Html:
+    """Make the page, from the verdict to the sources; ``alone``: without links to other pages."""
     motion, scene = recording.trajectory, recording.scene
-    played = motion_card(motion, scene, recording.guess, recording.faults)
+    film = None if motion is None else film_of(run, motion)
+    played = motion_card(motion, scene, recording.guess, recording.faults, film)
     cards = [
         sections.found(run, charts),
         sections.checks(run),
@@ -132,7 +160,19 @@ def build(run: Run, recording: RecordedMotion, charts: Mapping[str, Chart]) -> H
         sources(run),
     ]
     note = [tag("p", OVERSIZED, class_="note")] if oversized(run) else []
-    return join([sections.header(run, cards), *note, sections.key_numbers(run), *cards])
+    return join([sections.header(run, cards, alone), *note, sections.key_numbers(run), *cards])
+
+
+def film_of(run: Run, motion: Trajectory) -> Film | None:
+    """Return the motions along the solve, with what each is worth; None where there are none, or of other bodies."""
+    found, trace = read_film(run.folder / FILM), run.trace
+    if found is None or found.position.shape[2] != len(motion.body_names) or found.rows.max() >= trace.rows:
+        return None
+    if run.settings:  # one of many: its page is to stay small
+        found = found.thinned(SWEPT_MOTIONS, SWEPT_FRAMES)
+    labels = [f"iteration {row}: objective {show(trace['objective'][row], 3)}" for row in found.rows[:-1].tolist()]
+    work = np.nan_to_num(trace["equivalents"][found.rows])
+    return Film(found, (*labels, f"the result: objective {show(run.objective, 3)}"), work)
 
 
 def sources(run: Run) -> Html:

@@ -102,15 +102,16 @@ CHAPTERS = (
 )
 
 
-def header(run: Run, cards: Sequence[Html]) -> Html:
-    """Title, description, verdict, and links to those cards that there are."""
+def header(run: Run, cards: Sequence[Html], alone: bool = False) -> Html:
+    """Title, description, verdict, and links to those cards that there are; unless ``alone`` to other pages too."""
     there = [(anchor, title) for anchor, title in CHAPTERS if any(f'id="{anchor}"' in card[:80] for card in cards)]
     links = [tag("a", title, href=f"#{anchor}") for anchor, title in there]
     unread = () if run.readable else run.faults
     why, guess = (values.name(run.provenance.get(key)) for key in ("chosen", "guess"))
-    above = batch_page(run.folder)
+    above = "" if alone else batch_page(run.folder)
     every = join([" · ", tag("a", "all runs", href=above)]) if above else ""
-    beside = [tag("a", title, href=at) for title, at in neighbours(run.folder, RUN_PAGE)]
+    near = [] if alone else neighbours(run.folder, RUN_PAGE)
+    beside = [tag("a", title, href=at) for title, at in near]
     kicker = tag("p", f"Run report · {run.problem} · {run.solver} · seed {run.seed}", every, class_="kicker")
     return join(
         [

@@ -6,20 +6,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from symphys.records import dataclass
 from symphys.report.charts import palette
 from symphys.report.pages.markup import Html, dot, join, packed_json, tag
 from symphys.report.robots.branches import colours, keys, linked, traced
 from symphys.report.robots.joint_positions import axes_of, drawable
 from symphys.report.scene.ghosts import MEASURED
 from symphys.report.scene.views import SIDE_YZ, TOP, choose_views, reach, solids_of
+from symphys.results.film import FilmMotions
 from symphys.results.polytope import Polytope
-from symphys.results.scene import Scene, SceneTerrain, Solid
+from symphys.results.scene import Scene, SceneMark, SceneTerrain, Solid
 from symphys.trajectory import Trajectory
 from symphys.types import Array
 
 NUMBERS = 10_000
 """How many numbers a page carries at most for one motion; the player goes evenly from one pose to the next."""
 LEAST_FRAMES, MOST_FRAMES = 40, 600
+QUANTA = 4000
+"""Steps from the least to the largest number of a film."""
 GUESS_POINTS = 120
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
 LEAST_PLAY = 3.0
@@ -32,10 +36,17 @@ def animation(
     guess: Trajectory | None = None,
     numbers: int = NUMBERS,
     others: Sequence[Html] = (),
+    film: Film | None = None,
 ) -> Html:
-    """Return a canvas with play, time and view controls, and its data of at most ``numbers`` numbers.
+    """Return a canvas with play, time and view controls, and its data.
 
-    ``others`` are motions that links of the page show; see ``other_motion``.
+    Args:
+        trajectory: that is played.
+        scene: around it.
+        guess: whose paths are drawn.
+        numbers: that the motion takes at most.
+        others: motions that links of the page show; see ``other_motion``.
+        film: motions along the solve.
     """
     legend = [join([dot(colour), palette.short(name, 24)]) for name, colour in keys(trajectory, scene)]
     return tag(
@@ -43,10 +54,46 @@ def animation(
         tag("canvas", tabindex="0", role="img", aria_label="The motion, played; drag to turn"),
         tag("div", *(tag("span", part) for part in legend), class_="legend") if legend else "",
         controls(float(trajectory.time[-1] - trajectory.time[0]), follow_data(trajectory, scene) is not None),
+        film_controls(film) if film else "",
+        tag("p", STAGED, class_="caption", data_stage="", hidden="") if trajectory.contact_names or scene.marks else "",
         packed_json(motion_data(trajectory, scene, guess, numbers)),
         *([tag("p", "", class_="caption shown", aria_live="polite"), *others] if others else []),
         class_="animation",
     )
+
+
+@dataclass(frozen=True)
+class Film:
+    """Motions along a solve, with the ``labels`` (K,) and the ``work`` [rollouts] (K,) of each."""
+
+    motions: FilmMotions
+    labels: tuple[str, ...]
+    work: Array
+
+
+def film_controls(film: Film) -> Html:
+    """Return a slider from the guess to the solution, with its motions."""
+    last = str(len(film.labels) - 1)
+    slider = tag("input", type="range", min="0", max=last, value=last, step="1", aria_label="Iteration of the solve")
+    play = tag("button", "▶ solve", type="button", aria_label="Play the solve")
+    motions = film.motions
+    data = {
+        "labels": list(film.labels),
+        "work": rounded(film.work, 1e-6),
+        "time": [rounded(row, 1e-4) for row in motions.time],
+        "frames": motions.time.shape[1],
+        **quantised("position", motions.position),
+        **quantised("orientation", motions.orientation),
+    }
+    return tag("div", play, slider, tag("output", ""), packed_json(data, data_film=""), class_="controls film")
+
+
+def quantised(name: str, values: Array) -> dict[str, object]:
+    """Return numbers (K, F, B, c) as whole multiples of a unit, in differences from frame to frame."""
+    unit = float(np.ptp(values)) / QUANTA or 1.0
+    whole = np.round(values / unit).astype(np.int64)
+    whole[:, 1:] = np.diff(whole, axis=1)
+    return {name: [row.ravel().tolist() for row in whole], f"{name}_unit": unit}
 
 
 def other_motion(trajectory: Trajectory, scene: Scene, numbers: int, link: str, title: str) -> Html:
@@ -68,10 +115,15 @@ def controls(duration: float, follows: bool) -> Html:
         tag("select", *speeds, aria_label="Speed"),
         tag("span", *views, class_="views"),
         tag("span", tag("button", "Follow", **FOLLOW), class_="views") if follows else "",
+        tag("span", tag("button", "Picture", type="button", data_picture=""), class_="views", data_stage="", hidden=""),
         class_="controls",
     )
 
 
+STAGED = (
+    "Arrows: contact forces, green where surfaces hold, orange where they slip, with the cone "
+    "that friction allows. Pink: what a target asks for. Drag to turn, wheel or pinch to zoom, right button to shift."
+)
 FOLLOW = {"type": "button", "data_follow": "", "aria_pressed": "true"}
 VIEW_TITLES = (("space", "3D"), ("side", "Side"), ("top", "Top"))
 
@@ -96,7 +148,69 @@ def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, 
         "axes": list(palette.AXES),
         "joints": joint_data(trajectory, scene),
         "follow": follow_data(trajectory, scene),
+        "marks": [mark_data(mark) for mark in scene.marks],
+        "forces": force_data(trajectory, scene, chosen),
     }
+
+
+def mark_data(mark: SceneMark) -> dict[str, object]:
+    """Return a place that is asked for; null for coordinates that are free."""
+    at = [None if np.isnan(x) else x for x in mark.at.tolist()]
+    return {"name": mark.name, "at": at, "tolerance": mark.tolerance}
+
+
+def force_data(trajectory: Trajectory, scene: Scene, chosen: Array) -> dict[str, object] | None:
+    """Return the forces of contacts that ever act at the chosen frames, the largest until the next; None without any.
+
+    ``values`` are flat, frame after frame, contact after contact. ``largest``: what all but the highest peaks stay
+    below.
+    """
+    known, index = (
+        {contact.name: contact for contact in scene.contacts},
+        {n: k for k, n in enumerate(trajectory.body_names)},
+    )
+    of: dict[str, list[int]] = {}
+    for column, name in enumerate(trajectory.contact_names):
+        of.setdefault(name.partition(":")[0], []).append(column)
+    pairs, columns = [], []
+    for name, own in of.items():
+        force = trajectory.contact_force[:, own].sum(axis=1)
+        if (
+            name in known
+            and known[name].body in index
+            and np.abs(force).max(initial=0.0) > 0
+            and np.isfinite(force).all()
+        ):
+            pairs.append(known[name])
+            columns.append(largest_between(force, chosen))
+    if not pairs:
+        return None
+    values = np.stack(columns, axis=1)
+    sizes = np.linalg.norm(values, axis=2)
+    planes = {plane.name: plane for plane in scene.planes}
+    return {
+        "pairs": [
+            {
+                "body": index[pair.body],
+                "solid": pair.solid if pair.solid >= 0 else None,
+                "normal": rounded(planes[pair.other].normal, 1e-9) if pair.other in planes else None,
+                "friction": None if np.isnan(pair.friction) else pair.friction,
+            }
+            for pair in pairs
+        ],
+        "values": rounded(values, 1e-4),
+        "largest": float(np.quantile(sizes[sizes > 0], ORDINARY)) if (sizes > 0).any() else 1.0,
+    }
+
+
+def largest_between(force: Array, chosen: Array) -> Array:
+    """Return, of forces (N, 3) in steps, the largest from each frame until the next one (F, 3)."""
+    sizes, found = np.linalg.norm(force, axis=1), np.zeros((len(chosen), 3))
+    ends = [*chosen[1:].tolist(), len(force)]
+    for k, (start, end) in enumerate(zip(chosen.tolist(), ends, strict=True)):
+        if start < min(end, len(force)):
+            found[k] = force[start + int(sizes[start:end].argmax())]
+    return found
 
 
 def body_data(trajectory: Trajectory, scene: Scene) -> list[dict[str, object]]:
@@ -162,6 +276,8 @@ def rounded(values: Array, share: float) -> list[float]:
     return [entry + 0.0 for entry in np.round(values.ravel(), max(decimals, 0)).tolist()]
 
 
+ORDINARY = 0.9
+"""Share of contact forces that are drawn to scale; higher ones are impacts."""
 FOLLOW_DISTANCE = 2.5
 """The camera follows where bodies connected by joints travel farther than so many times their size."""
 

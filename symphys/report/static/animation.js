@@ -1,29 +1,35 @@
 // Plays a recorded motion on a canvas: parallel projection, drag to turn. Comes after painter.js and joints.js.
 
+const ends = (list) => [list[0], list[list.length - 1]];
 const STILL = { p: [0, 0, 0], q: [1, 0, 0, 0] };
 const LOW = 0.12; // below this elevation hills would hide what moves between them, so they stay behind it
 
 class Player {
   constructor(root) {
     this.root = root;
+    root.player = this; // for those who look at it from outside
     this.canvas = root.querySelector("canvas");
     this.button = root.querySelector(".play");
-    this.slider = root.querySelector("input");
-    this.output = root.querySelector("output");
+    [this.slider, this.output] = ["input", "output"].map((name) => root.querySelector(`.controls ${name}`));
     this.speed = root.querySelector("select");
     this.views = [...root.querySelectorAll("[data-view]")];
     this.follow = root.querySelector("[data-follow]");
+    this.stage = window.stageOf ? window.stageOf(this.canvas) : null; // three dimensions, where there is WebGL
     this.others = new Map([...root.querySelectorAll("script[data-of]")].map((s) => [s.dataset.of, s]));
     this.playing = false;
-    this.load(root.querySelector("script"));
-    this.time = this.first;
+    this.film = root.querySelector(".film");
+    this.load(root.querySelector("script:not([data-film])"));
+    const asked = Number(/[#&]t=([\d.]+)/.exec(window.location.hash)?.[1]); // an address may name a moment: #t=0.4
+    this.time = Math.min(Math.max(asked || this.first, this.first), this.last);
     this.listen();
+    if (this.film) this.watch();
     this.look(this.data.flat ? "top" : "space");
   }
 
   load(script) { // the motion that it plays
     this.data = JSON.parse(script.textContent);
-    this.painter = new Painter(this.canvas, this.data.axes);
+    this.motion = this.data; // times, positions and orientations
+    this.painter = this.stage ? null : new Painter(this.canvas, this.data.axes);
     this.following = Boolean(this.data.follow);
     this.fixtures = this.data.fixtures.map((solid) => place(solid, STILL, FIXED, true));
     this.cells = this.data.terrain.flatMap((terrain) => mesh(terrain, this.data.planes));
@@ -32,9 +38,42 @@ class Player {
     this.patches = this.visible(this.data.planes);
     this.paths = this.data.bodies.map((_, b) => this.path(b));
     this.guesses = this.data.guess.map((flat) => triples(flat));
-    this.seen = mustSee(this.data, this.patches, this.box, [...corners, ...edges]);
-    this.first = this.data.time[0];
-    this.last = this.data.time[this.data.time.length - 1];
+    this.seen = mustSee(this.data, this.stage ? [] : this.patches, this.box, [...corners, ...edges]);
+    [this.first, this.last] = ends(this.motion.time);
+    this.stage?.load(this.data, this.box);
+  }
+
+  watch() { // the solve, from the guess to the solution
+    const film = JSON.parse(this.film.querySelector("script").textContent), count = film.labels.length;
+    const [play, slider, output] = ["button", "input", "output"].map((name) => this.film.querySelector(name));
+    const whole = (k, name, size) => { // numbers of a motion, from their differences
+      const found = film[name][k].map((x) => x), stride = size * this.data.bodies.length;
+      for (let i = stride; i < found.length; i++) found[i] += found[i - stride];
+      return found.map((x) => x * film[`${name}_unit`]);
+    };
+    const show = (k) => {
+      const last = k === count - 1, share = (this.time - this.first) / (this.last - this.first || 1);
+      this.motion = last ? this.data : { time: film.time[k], position: whole(k, "position", 3), orientation: whole(k, "orientation", 4) };
+      [this.first, this.last] = ends(this.motion.time);
+      this.time = this.first + share * (this.last - this.first);
+      this.paths = this.data.bodies.map((_, b) => this.path(b));
+      this.stage?.show(this.motion.position, last);
+      output.textContent = film.labels[k];
+      slider.value = String(k);
+      this.draw();
+      document.dispatchEvent(new CustomEvent("worked", { detail: last ? null : film.work[k] }));
+    };
+    let timer = null;
+    const stop = () => { clearInterval(timer); timer = null; play.textContent = "▶ solve"; };
+    slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
+    play.addEventListener("click", () => {
+      if (timer) { stop(); return; }
+      let k = Number(slider.value) === count - 1 ? 0 : Number(slider.value);
+      play.textContent = "❚❚ solve";
+      show(k);
+      timer = setInterval(() => { k += 1; show(Math.min(k, count - 1)); if (k >= count - 1) stop(); }, Math.max(80, 4000 / count));
+    });
+    output.textContent = film.labels[count - 1];
   }
 
   peek(target) { // the motion of the run whose page a link below the pointer leads to; beside it where it is out of sight
@@ -70,23 +109,51 @@ class Player {
     this.follow?.addEventListener("click", () => {
       this.following = !this.following;
       this.follow.setAttribute("aria-pressed", String(this.following));
-      this.draw();
+      if (this.stage) this.look(this.view); else this.draw();
     });
     this.canvas.addEventListener("keydown", (e) => {
       if (e.key === " ") { e.preventDefault(); this.toggle(); }
       const step = { ArrowLeft: -1, ArrowRight: 1 }[e.key];
       if (step) { e.preventDefault(); this.pause(); this.go(this.time + step * (this.last - this.first) / 100); }
     });
+    if (this.stage) this.listenOnStage(); else this.listenOnCanvas();
+    new ResizeObserver(() => { this.stage?.resize(); this.draw(); }).observe(this.canvas);
+  }
+
+  listenOnCanvas() {
     this.canvas.addEventListener("pointerdown", (e) => {
       this.grip = [e.clientX, e.clientY];
       this.canvas.setPointerCapture(e.pointerId);
     });
     this.canvas.addEventListener("pointerup", () => { this.grip = null; });
     this.canvas.addEventListener("pointermove", (e) => this.drag(e));
-    new ResizeObserver(() => this.draw()).observe(this.canvas);
+  }
+
+  listenOnStage() {
+    this.canvas.classList.add("stage");
+    this.root.querySelectorAll("[data-stage]").forEach((each) => { each.hidden = false; });
+    this.root.querySelector("[data-picture]").addEventListener("click", () => {
+      const link = document.createElement("a");
+      Object.assign(link, { href: this.stage.picture(), download: "motion.png" });
+      link.click();
+    });
+    this.canvas.addEventListener("turned", () => this.mark(""));
+    const again = () => { this.stage.load(this.data, this.box); this.draw(); }; // in other colours
+    document.querySelectorAll(".theme input").forEach((input) => input.addEventListener("change", again));
+    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", again);
+    const still = document.createElement("img"); // on paper
+    window.addEventListener("beforeprint", () => { still.src = this.stage.picture(); this.canvas.after(still); this.canvas.hidden = true; });
+    window.addEventListener("afterprint", () => { still.remove(); this.canvas.hidden = false; });
   }
 
   look(name) {
+    this.view = name;
+    if (this.stage) {
+      this.mark(name);
+      this.draw();
+      this.stage.look(name, this.following ? alongside(this.data.follow, this.poses) : this.seen);
+      return;
+    }
     const side = this.data.along === "y" ? 0 : -Math.PI / 2;
     const angles = { space: [side - 0.5, this.data.flat ? 0.9 : 0.38], side: [side, 0], top: [side, Math.PI / 2] };
     [this.azimuth, this.elevation] = angles[name];
@@ -137,26 +204,33 @@ class Player {
   }
 
   frame() { // index of the frame before the time, and the share of the way to the next
-    const t = this.data.time;
+    const t = this.motion.time;
     let a = 0, b = t.length - 1;
     while (b - a > 1) { const m = (a + b) >> 1; if (t[m] <= this.time) a = m; else b = m; }
     return [a, b > a && t[b] > t[a] ? Math.min(1, (this.time - t[a]) / (t[b] - t[a])) : 0];
   }
 
   pose(body, index, share) {
-    const count = this.data.bodies.length, frames = this.data.time.length;
+    const count = this.data.bodies.length, frames = this.motion.time.length;
     const read = (list, size, i) => list.slice((i * count + body) * size, (i * count + body + 1) * size);
     const next = Math.min(index + 1, frames - 1);
-    const p = read(this.data.position, 3, index), p1 = read(this.data.position, 3, next);
-    const q = read(this.data.orientation, 4, index), q1 = read(this.data.orientation, 4, next);
+    const p = read(this.motion.position, 3, index), p1 = read(this.motion.position, 3, next);
+    const q = read(this.motion.orientation, 4, index), q1 = read(this.motion.orientation, 4, next);
     const s = q.reduce((a, x, k) => a + x * q1[k], 0) < 0 ? -1 : 1;
     const mid = q.map((x, k) => x + share * (s * q1[k] - x)), size = Math.hypot(...mid) || 1;
     return { p: sum(p, sum(p1, p, -1), share), q: mid.map((x) => x / size) };
   }
 
   draw() {
-    const painter = this.painter, [index, share] = this.frame(), data = this.data;
-    const poses = data.bodies.map((_, b) => this.pose(b, index, share)), solids = this.solids(poses);
+    const [index, share] = this.frame(), poses = this.data.bodies.map((_, b) => this.pose(b, index, share));
+    this.poses = poses;
+    if (this.stage) this.stage.draw(poses, index, share, this.following); else this.paint(poses, index);
+    this.output.textContent = `${this.time.toFixed(2)} / ${this.last.toFixed(2)} s`;
+    this.slider.value = String(Math.round(1000 * (this.time - this.first) / (this.last - this.first || 1)));
+  }
+
+  paint(poses, index) {
+    const painter = this.painter, data = this.data, solids = this.solids(poses);
     painter.fit(this.following ? alongside(data.follow, poses) : this.seen, this.azimuth, this.elevation);
     this.patches.forEach((p) => painter.drawPlane(p));
     const cells = this.inDepth();
@@ -169,13 +243,11 @@ class Player {
     this.drawSolids(inOrder([...this.fixtures, ...solids], painter.eye), cells);
     drawPivots(painter, data, poses);
     painter.drawTriad();
-    this.output.textContent = `${this.time.toFixed(2)} / ${this.last.toFixed(2)} s`;
-    this.slider.value = String(Math.round(1000 * (this.time - this.first) / (this.last - this.first || 1)));
   }
 
   path(body) {
     const count = this.data.bodies.length;
-    return triples(this.data.position).filter((_, i) => i % count === body);
+    return triples(this.motion.position).filter((_, i) => i % count === body);
   }
 
   solids(poses) {
@@ -218,5 +290,3 @@ class Player {
     if (over.length) this.painter.within(solid, () => over.forEach(({ cell }) => this.painter.drawCell(cell)));
   }
 }
-
-document.querySelectorAll(".animation").forEach((root) => new Player(root));

@@ -1,6 +1,7 @@
 // Draws the curves of a page as SVG, from the numbers that it holds; shows those below the pointer. Comes after numbers.js.
 
 const WIDTH = 1000, NARROW = 400, TOP = 26, BOTTOM = 34, LEFT = 58, GAP = 14, INCH = 97, BAR = 20, LETTER = 7;
+const WORK = "work [rollouts]"; // title of the axes that follow the film of a solve
 const TIME = "time [s]"; // title of the axes that share a moment
 
 function numbers(packed) { // differences in steps of one size, or numbers as they are
@@ -214,12 +215,17 @@ class Figure { // draws a chart in its place, shows the numbers below the pointe
     const { html, panels } = drawChart(JSON.parse(root.querySelector("script").textContent), width);
     place.innerHTML = html;
     [this.svg, this.output, this.panels, this.width] = [place.querySelector("svg"), place.querySelector("output"), panels, width];
+    this.worked = panels.filter((panel) => panel.data.along === WORK);
     this.timed = panels.filter((panel) => panel.data.along === TIME);
     this.cursor = this.svg.appendChild(document.createElementNS(this.svg.namespaceURI, "path"));
     this.cursor.setAttribute("class", "cursor");
     this.svg.addEventListener("pointermove", (event) => this.point(event));
     this.svg.addEventListener("pointerleave", () => moment(null, this));
     document.addEventListener("moment", (event) => this.show(event.detail));
+    if (this.worked.length) document.addEventListener("worked", ({ detail }) => {
+      const at = (panel) => Math.max(panel.x(detail), panel.left) || panel.left; // the guess took nothing
+      this.lines(detail === null ? [] : this.worked, at);
+    });
   }
 
   point(event) {
@@ -233,6 +239,7 @@ class Figure { // draws a chart in its place, shows the numbers below the pointe
   }
 
   show({ time, from }) {
+    if (!this.timed.length) return;
     if (time === null) return this.lines([], null);
     this.lines(this.timed, (panel) => panel.x(time));
     if (from !== this) this.output.textContent = (this.timed.length && this.timed[0].at(this.timed[0].x(time))) || "";

@@ -8,9 +8,11 @@ async function unpack(text) {
 async function start() {
   const blocks = [...document.querySelectorAll("script.packed")];
   await Promise.all(blocks.map(async (block) => { block.textContent = await unpack(block.textContent); }));
-  const script = document.createElement("script");
-  script.textContent = document.getElementById("scripts").textContent;
-  document.body.append(script);
+  for (const id of ["viewer", "scripts"]) {
+    const held = document.getElementById(id), script = document.createElement("script");
+    script.textContent = held?.textContent || "";
+    if (held) document.body.append(script);
+  }
 }
 
 start().catch(() => document.querySelectorAll(".unpacked").forEach((note) => { note.hidden = false; }));

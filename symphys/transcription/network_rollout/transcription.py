@@ -56,6 +56,11 @@ class LargeTranscription(Transcription):
         """Implement ``Transcription.errors``."""
         return np.array([[check.ratio for check in self.judge(z).checks] for z in Z])
 
+    @property
+    def quick_motions(self) -> bool:
+        """Implement ``Transcription.quick_motions``."""
+        return False
+
     def record(self, z: Array, smoothing: float = 0.0) -> Record:
         """Implement ``Transcription.record``."""
         motion = self._plain.forward_pass(z, smoothing)
