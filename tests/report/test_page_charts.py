@@ -14,7 +14,7 @@ from tools.page_scripts import NODE, charts, held, run_script, unpack
 
 from symphys.report import write_light_report, write_run_report
 from symphys.report.charts.chart import MARKS, RESOLUTION, Chart, Panel, differences, lines
-from symphys.report.pages.markup import pack, packed_viewer
+from symphys.report.pages.markup import SCRIPTS, pack, packed_viewer, read_static, squeezed
 from symphys.results.trajectories import read_trajectory
 
 LARGEST = 60_000

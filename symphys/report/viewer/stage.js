@@ -69,6 +69,7 @@ class Stage {
     this.scene = new Scene();
     this.light();
     this.size = box.size;
+    this.unit = usualSize(data, box);
     this.level = data.planes.some((p) => p.normal[2] > 0.7) ? Math.min(...data.planes.filter((p) => p.normal[2] > 0.7).map((p) => p.offset / p.normal[2])) : null;
     this.controls.maxPolarAngle = this.level === null && !data.terrain.length ? Math.PI : Math.PI / 2 - 0.01;
     this.bodies = data.bodies.map((body) => this.body(body));
@@ -168,10 +169,10 @@ class Stage {
   }
 
   joints() { // pivots, and bars from bodies without a surface there
-    const thin = 0.006 * this.jointSize();
+    const thin = 0.006 * this.unit;
     this.pivots = this.data.joints.map((joint) => {
       const ball = new Mesh(joint.square ? new CylinderGeometry(2 * thin, 2 * thin, 4 * thin, 4) : new SphereGeometry(2.2 * thin, 12, 8), new MeshLambertMaterial({ color: "#f4f7f9" }));
-      const pins = joint.axes.map(([side, axis]) => ({ side, axis: vector(axis), mesh: new Mesh(new CylinderGeometry(0.9 * thin, 0.9 * thin, 14 * thin, 8), new MeshLambertMaterial({ color: "#3b4a58" })) }));
+      const pins = joint.axes.map(([side, axis]) => ({ side, axis: vector(axis), mesh: new Mesh(new CylinderGeometry(0.8 * thin, 0.8 * thin, 9 * thin, 8), new MeshLambertMaterial({ color: "#3b4a58" })) }));
       const bones = joint.sides.filter((side) => side.body >= 0).flatMap((side) => {
         const { colour, solids } = this.data.bodies[side.body];
         const beside = solids.filter((s) => Math.hypot(...s.centre) > s.radius).map((s) => s.centre);
@@ -181,8 +182,6 @@ class Stage {
       return { joint, ball, pins, bones };
     });
   }
-
-  jointSize() { return this.data.follow ? 2 * this.data.follow.radius : this.size; }
 
   forces() { // arrows of contact forces, with the cone that friction allows
     this.arrows = (this.data.forces?.pairs || []).map((pair) => {
@@ -294,7 +293,7 @@ class Stage {
   placeForces(poses, index, share) { // from where the body reaches farthest against the force
     const { forces } = this.data;
     if (!forces) return;
-    const count = forces.pairs.length, longest = 0.3 * this.jointSize();
+    const count = forces.pairs.length, longest = 0.6 * this.unit;
     this.arrows.forEach(({ pair, group, long, tip, cone }, c) => {
       const at = (k) => forces.values.slice(3 * (k * count + c), 3 * (k * count + c) + 3);
       const last = Math.max(0, forces.values.length / 3 / count - 1), now = at(Math.min(index + (share > 0.5 ? 1 : 0), last));
@@ -302,7 +301,7 @@ class Stage {
       group.visible = this.forced && size > 0.004 * forces.largest;
       if (!group.visible) return;
       const n = pair.normal ? vector(pair.normal) : force.clone().normalize(), length = longest * Math.sqrt(size / forces.largest);
-      const thick = 0.022 * longest + 0.03 * length, way = force.clone().normalize();
+      const thick = 0.012 * longest + 0.012 * length, way = force.clone().normalize();
       group.position.copy(this.reach(pair, poses, n));
       group.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), way);
       const head = Math.min(4 * thick, 0.45 * length);
@@ -348,6 +347,14 @@ class Stage {
     this.render();
     return this.canvas.toDataURL("image/png");
   }
+}
+
+function usualSize(data, box) { // [m] of a robot, or of what else moves: by which marks and arrows are drawn
+  const count = data.bodies.length, places = triples(data.position).slice(0, count);
+  const reach = data.bodies.map((body) => Math.max(0, ...body.solids.map((s) => s.radius + Math.hypot(...s.centre) + Math.max(0, ...triples(s.corners || []).map((c) => Math.hypot(...c))))));
+  const known = reach.filter((r) => r > 0).sort((a, b) => a - b), middle = known[Math.floor(known.length / 2)] || Infinity;
+  const sides = [0, 1, 2].map((k) => Math.max(...places.map((p, b) => p[k] + reach[b])) - Math.min(...places.map((p, b) => p[k] - reach[b])));
+  return Math.min(Math.hypot(...sides) || Infinity, 6 * middle, box.size) || box.size;
 }
 
 function isDark(element) { // whether the page is dark where the element is
