@@ -391,7 +391,9 @@ class Driver:
             before,
         )
         saved = to_plain(request.solver, checkpoint, rows)
-        return Outcome(reason.status, reason.advice, best.z, rows, checkpoint.counts, saved, (*before, halfway))
+        film = tuple(point for point in self._film.points if point.row < len(rows))
+        stages = (*before, halfway)
+        return Outcome(reason.status, reason.advice, best.z, rows, checkpoint.counts, saved, stages, film=film)
 
 
 def ignore_log(line: str) -> None:

@@ -32,6 +32,7 @@ from symphys.shooting import Measure, ShootingProblem, Values
 from symphys.solvers.core.checkpoint import damaged, plain, revive, revived_rows
 from symphys.solvers.core.driver import INTERRUPTED, counts_of, ignore_log
 from symphys.solvers.core.evaluator import CountingEvaluator
+from symphys.solvers.core.film import FilmPoint
 from symphys.solvers.core.interface import Log, Solver
 from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageResult, Status, StopReason, TraceRow
@@ -257,6 +258,7 @@ class Race:
         self.cma = cma(keep=True)
         self.parts: list[RacePart] = []
         self.rows: list[TraceRow] = []
+        self.film: list[FilmPoint] = []
         self.stages: dict[float, StageResult] = {}
         self.searching: dict[str, Any] = {}
         self.running: dict[str, Any] = {}
@@ -493,6 +495,8 @@ class Race:
         """Add a part that is over, or paused."""
         shift = self._shift(kind)
         rows = [shift.moved(row) for row in outcome.trace[shift.skip :]]
+        shown = [point for point in outcome.film if shift.skip <= point.row < len(outcome.trace)]
+        self.film += [replace(point, row=shift.moved(outcome.trace[point.row]).iteration) for point in shown]
         seconds = rows[-1].seconds - self._seconds() if rows else 0.0
         (point,) = self.evaluator.rate([outcome.z])
         counts = outcome.counts + shift.counts - self._counts() + Counts(rollouts=1)
@@ -560,6 +564,7 @@ class Race:
             stages=tuple(stages),
             gains=known.gains if known else {},
             multipliers=known.multipliers if known else {},
+            film=tuple(self.film),
         )
 
     def _stages(self) -> list[StageResult]:

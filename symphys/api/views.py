@@ -6,7 +6,6 @@ matplotlib is imported when a figure is drawn; pandas and xarray need not be ins
 from __future__ import annotations
 
 import html as markup
-import io
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -16,10 +15,9 @@ import numpy as np
 
 from symphys.errors import SymphysError
 from symphys.findings.writing import show, with_unit
-from symphys.results.file_names import GUESS, SCENE, TRAJECTORY
+from symphys.results.file_names import GUESS, SCENE
 from symphys.results.result import CheckRecord
 from symphys.results.run import Run
-from symphys.results.text_files import ReportError
 from symphys.results.trace import Trace
 from symphys.results.trajectories import read_trajectory
 from symphys.suggest import hint, quote
@@ -31,6 +29,8 @@ if TYPE_CHECKING:
 
 TRACE = "trace."
 """Prefix of the names of columns of the trace."""
+FRAME_HEIGHT = 640
+"""[px] Of the motion in a notebook."""
 MOST_ROWS = 24
 """Rows of what was found, at most."""
 COMPONENTS = {3: ("x", "y", "z"), 4: ("w", "x", "y", "z")}
@@ -181,7 +181,7 @@ def html(run: Run) -> str:
         lines.append(table(("", "name", "error", "tolerance", ""), cells, "ttnnt"))
     if not run.solved and run.advice:
         lines.append(f"<p>{markup.escape(run.advice)}</p>")
-    return "\n".join([*lines, picture(run.folder)])
+    return "\n".join([*lines, player(run.folder)])
 
 
 def met(check: CheckRecord) -> str:
@@ -196,13 +196,17 @@ def html_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def picture(folder: Path) -> str:
-    """Draw the motion of a run folder as SVG; empty where there is no motion."""
-    try:
-        figure = draw_run(folder, read_trajectory(folder / TRAJECTORY))
-    except ReportError:
+def player(folder: Path) -> str:
+    """Return a frame that plays the motion of a run folder in three dimensions; empty where there is no motion."""
+    from symphys.report.pages.markup import page
+    from symphys.report.pages.run import film_of, read_recorded
+    from symphys.report.scene.animation import animation
+
+    run, recording = read_recorded(folder)
+    motion = recording.trajectory
+    if motion is None:
         return ""
-    buffer = io.StringIO()
-    figure.savefig(buffer, format="svg")
-    _, start, drawing = buffer.getvalue().partition("<svg")
-    return f'{start} style="max-width: 100%; height: auto"{drawing}'
+    shown = animation(motion, recording.scene, recording.guess, film=film_of(run, motion))
+    whole = markup.escape(page(run.title, shown))
+    style = f"width: 100%; height: {FRAME_HEIGHT}px; border: 0"
+    return f'<iframe srcdoc="{whole}" style="{style}" title="The motion"></iframe>'

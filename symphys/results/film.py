@@ -14,7 +14,7 @@ from symphys.types import Array, Ints
 NUMBERS = 60_000
 """Numbers that the motions of a film have together, at most about."""
 LEAST_FRAMES, MOST_FRAMES = 12, 120
-LEAST_MOTIONS = 8
+LEAST_MOTIONS, MOST_MOTIONS = 8, 60
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class FilmMotions:
 
 def film_size(bodies: int, motions: int, steps: int) -> tuple[int, int]:
     """Return how many motions of how many frames a film has."""
-    count = min(motions, max(NUMBERS // (LEAST_FRAMES * 7 * bodies), LEAST_MOTIONS))
+    count = min(motions, MOST_MOTIONS, max(NUMBERS // (LEAST_FRAMES * 7 * bodies), LEAST_MOTIONS))
     frames = int(np.clip(NUMBERS // (7 * bodies * max(count, 1)), LEAST_FRAMES, MOST_FRAMES))
     return count, min(frames, steps + 1)
 

@@ -234,15 +234,23 @@ class SceneContact:
 
 @dataclass(frozen=True)
 class SceneMark:
-    """A place that a target asks for: ``at`` (3,) [m], nan along what is free, and its ``tolerance`` [m]."""
+    """A place that a target asks for, or a plane that a constraint keeps something from.
+
+    Attributes:
+        name: of the target or constraint.
+        at: (3,) [m], nan along what is free.
+        tolerance: [m].
+        limit: whether it is a constraint's.
+    """
 
     name: str
     at: Array
     tolerance: float = 0.0
+    limit: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """Return an entry of ``marks``."""
-        return {"name": self.name, "at": self.at.tolist(), "tolerance": self.tolerance}
+        return {"name": self.name, "at": self.at.tolist(), "tolerance": self.tolerance, "limit": self.limit}
 
     @classmethod
     def from_json(cls, value: object, text: Text = values.name) -> SceneMark | None:

@@ -16,7 +16,7 @@ from symphys.model.joints import AffineMotor, Joint, Motor
 from symphys.model.joints.motor import motor_kind
 from symphys.model.shapes import Fixture, Plane, Scalar, Shape, Terrain
 from symphys.model.world import World
-from symphys.problem import Problem, Target
+from symphys.problem import Constraint, Problem, Target
 from symphys.problem.world_tables import floats
 from symphys.records import dataclass
 from symphys.results.scene import (
@@ -62,7 +62,7 @@ def make_scene(problem: Problem, z: Mapping[str, Array], motion: Trajectory | No
         terrain=tuple(sample(each, near) for each in world.statics if isinstance(each, Terrain)),
         joints=tuple(make_joint(joint, names) for joint in world.joints),
         contacts=make_contacts(world),
-        marks=tuple(mark for mark in map(make_mark, problem.targets) if mark is not None),
+        marks=(*(mark for mark in map(make_mark, problem.targets) if mark is not None), *limits(problem)),
     )
 
 
@@ -86,12 +86,41 @@ def is_number(value: Any) -> bool:
 
 def make_mark(target: Target) -> SceneMark | None:
     """Return the place that a target asks for; None if it asks for more than coordinates of one body or site."""
-    names = list(target.formula.needed)
-    if len(names) != 1 or not names[0].endswith(".position") or target.formula.parts:
+    found = coordinates(target)
+    if found is None:
+        return None
+    at = np.full(3, np.nan)
+    for axis, slope, rest in found:
+        at[axis] = -rest / slope
+    return SceneMark(target.name, at, float(target.tolerance))
+
+
+def limits(problem: Problem) -> list[SceneMark]:
+    """Return the planes that constraints keep coordinates of a body or a site from."""
+    marks = []
+    for each in problem.constraints:
+        for k, (axis, slope, rest) in enumerate(coordinates(each) or ()):
+            for end in (each.lower, each.upper):
+                bound = float(np.ravel(end)[min(k, np.size(end) - 1)])
+                if math.isfinite(bound):
+                    at = np.full(3, np.nan)
+                    at[axis] = (bound - rest) / slope
+                    marks.append(SceneMark(each.name, at, limit=True))
+    return marks
+
+
+def coordinates(table: Target | Constraint) -> list[tuple[int, float, float]] | None:
+    """Return (axis, slope, rest) of each component of a formula, which is a coordinate of one place times slope, plus rest.
+
+    None where a component is something else.
+    """
+    formula = table.formula
+    names = list(formula.needed)
+    if len(names) != 1 or not names[0].endswith(".position") or formula.parts:
         return None
     place = ca.SX.sym("place", 3)
     try:
-        value = target.formula.evaluate({names[0]: place})
+        value = formula.evaluate({names[0]: place})
     except SymphysError:
         return None  # the position of a slider is a number
     slopes = ca.jacobian(value, place)
@@ -100,11 +129,8 @@ def make_mark(target: Target) -> SceneMark | None:
     matrix, offset = np.array(ca.DM(slopes)), np.array(ca.DM(ca.substitute(value, place, ca.DM.zeros(3)))).ravel()
     if not (np.count_nonzero(matrix, axis=1) == 1).all():
         return None
-    at = np.full(3, np.nan)
-    for row, rest in zip(matrix, offset, strict=True):
-        axis = int(np.flatnonzero(row)[0])
-        at[axis] = -rest / row[axis]
-    return SceneMark(target.name, at, float(target.tolerance))
+    axes = [int(np.flatnonzero(row)[0]) for row in matrix]
+    return [(axis, float(row[axis]), float(rest)) for axis, row, rest in zip(axes, matrix, offset, strict=True)]
 
 
 def parameters(problem: Problem, z: Mapping[str, Array]) -> dict[str, Any]:

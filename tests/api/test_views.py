@@ -130,7 +130,7 @@ def test_figures(solution: symphys.Solution) -> None:
 
 def test_a_notebook_shows_verdict_checks_and_motion(solution: symphys.Solution) -> None:
     shown = solution._repr_html_()
-    assert "solved" in shown and "there" in shown and shown.count("<svg") == 1
+    assert "solved" in shown and "there" in shown and "<iframe" in shown
     assert "<b>throw.x</b>" in shown and "m/s</td>" in shown
     assert repr(solution).startswith("<Solution of problem by least_squares: solved")
 

@@ -111,6 +111,20 @@ slider.value = slider.max;
 slider.dispatchEvent(new window.Event("input"));
 return { result, guess, again: end(), words, label, cursor, max: Number(slider.max) };
 """
+BRUSH = """
+const svg = document.querySelector("figure.chart[data-name=states] svg"), box = svg.getBoundingClientRect();
+const at = (share) => ({ clientX: box.left + share * box.width, clientY: box.top + 60 });
+const draw = (a, b) => {
+  svg.dispatchEvent(new window.PointerEvent("pointerdown", at(a)));
+  svg.dispatchEvent(new window.PointerEvent("pointerup", at(b)));
+};
+const player = document.querySelector(".animation").player;
+const bands = () => [...document.querySelectorAll(".chart path.band")].filter((b) => b.getAttribute("d")).length;
+draw(0.2, 0.12);
+const drawn = { stretch: player.stretch, time: player.time, bands: bands() };
+draw(0.15, 0.15);
+return { ...drawn, then: player.stretch, left: bands() };
+"""
 COLOURS = "return window.getComputedStyle(document.body).backgroundColor;"
 THEME = """
 document.getElementById("theme-dark").click();
@@ -216,3 +230,22 @@ def test_the_solve_is_a_film(tmp_path: Path) -> None:
     assert seen["max"] >= 3 and seen["label"].startswith("iteration 0") and seen["words"].startswith("the result")
     assert seen["result"][0] == pytest.approx(10.0, abs=0.02) and abs(seen["guess"][0] - 10) > 1
     assert seen["again"] == seen["result"] and seen["cursor"].startswith("M")
+
+
+def test_a_stretch_of_time_is_drawn_out(pages: tuple[Path, Path]) -> None:
+    """It is played over and over, from its start; a click ends it."""
+    found = visit(pages[0], BRUSH)
+    assert found.console == [], found.console
+    first, last = found.seen["stretch"]
+    assert 0 < first < last < 5 and found.seen["time"] == pytest.approx(first) and found.seen["bands"] >= 2
+    assert found.seen["then"] is None and found.seen["left"] == 0
+
+
+def test_solvers_stand_side_by_side(made: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(made, tmp_path / "batch"))
+    for path in (folder / "two_balls", *folder.glob("ball_throw/ipopt-*"), *folder.glob("ball_throw/nelder_mead-*")):
+        shutil.rmtree(path)
+    solvers = {(path.parent.name, path.name.partition("-seed")[0]) for path in folder.glob("*/*-seed*")}
+    text = write_batch_report(folder).read_text("utf-8")
+    assert len(solvers) > 2 and text.count("<canvas") == len(solvers)
+    assert "One moment is shown in all of them" in text

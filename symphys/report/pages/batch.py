@@ -16,12 +16,13 @@ from symphys.report.pages.answers import answers_card
 from symphys.report.pages.check_figure import MOST_CHECKS, MOST_DOTS, check_figure, ratios
 from symphys.report.pages.comparison import page_links, run_card, study_card
 from symphys.report.pages.markup import Html, card, facts, figures, join, page, slug, table, tag, write_viewer
-from symphys.report.pages.run import read_motions
+from symphys.report.pages.run import film_of, read_motions
 from symphys.report.pages.sweep import sweep_of, sweep_parts
 from symphys.report.scene.animation import LEAST_FRAMES, NUMBERS, animation, other_motion
 from symphys.results.config import settings_words
 from symphys.results.discovery import Entry, Study, read_all, sample, studies
 from symphys.results.drawable import OVERSIZED, drawable, oversized
+from symphys.results.file_names import TRAJECTORY
 from symphys.results.run import BriefReader, Run, with_trace
 from symphys.results.text_files import ReportError
 
@@ -31,6 +32,8 @@ UNMADE = "0" * 64
 CLOSEST = "run that came closest"
 MOST_NUMBERS = 60_000
 """Numbers that the motions on a page have together, at most about."""
+MOST_SIDE_BY_SIDE = 4
+SIDE_BY_SIDE = "The best run of each solver. One moment is shown in all of them."
 MOST_MOTIONS = 60
 """Motions of a sweep that a page can play, at most."""
 MOST_STUDIES = 20
@@ -171,7 +174,7 @@ def build_study(study: Study, numbers: int, anchor: str, curves: int, every: Htm
         answers_card(study),
         card("Solvers", comparison.solver_table(study), note=comparison.table_note(study)),
         card("Convergence", figures([converged] if converged else [], comparison.convergence_note(study, curves))),
-        card("The motion", best_motion(study.best, numbers), note=best_note(study.best)),
+        motions(study, numbers),
         targets(study),
         every or "",
         class_="study" if titled else None,
@@ -207,6 +210,19 @@ def write_batch_figures(batch_dir: Path, folder: Path) -> list[Path]:
     return paths
 
 
+def motions(study: Study, numbers: int) -> Html:
+    """Play the motion of the best run of each solver side by side, or of the best of all where there are many."""
+    best = [Study(study.problem, study.place, (entry,)).best for entry in study.entries]
+    moving = [run for run in best if (run.folder / TRAJECTORY).is_file()]
+    if not 1 < len(moving) <= MOST_SIDE_BY_SIDE:
+        return card("The motion", best_motion(study.best, numbers), note=best_note(study.best))
+    parts = []
+    for run in moving:
+        words = f"{run.solver}, seed {run.seed}" if len(study.runs) > len(moving) else run.solver
+        parts.append(tag("div", tag("h3", words), best_motion(run, numbers // len(moving))))
+    return card("The motions", tag("div", *parts, class_="side-by-side"), note=SIDE_BY_SIDE)
+
+
 def other_motions(runs: Sequence[Run], links: Mapping[str, str]) -> list[Html]:
     """Return the motions of runs that have a page; of an even choice of them where they are many or large."""
     linked = [run for run in runs if links.get(run.place)]
@@ -232,7 +248,8 @@ def best_motion(run: Run, numbers: int, others: Sequence[Html] = ()) -> Html:
         recording = read_motions(run.folder)
         if recording.trajectory is None:
             return tag("p", f"There is no motion to draw: {recording.faults[0]}.")
-        return animation(recording.trajectory, recording.scene, recording.guess, numbers, others)
+        film = None if run.settings else film_of(with_trace(run), recording.trajectory)
+        return animation(recording.trajectory, recording.scene, recording.guess, numbers, others, film)
     except Exception as error:  # what one run has recorded must not take the page of all with it
         return tag("p", f"The motion could not be drawn: {type(error).__name__}: {error}.")
 

@@ -156,7 +156,7 @@ def motion_data(trajectory: Trajectory, scene: Scene, guess: Trajectory | None, 
 def mark_data(mark: SceneMark) -> dict[str, object]:
     """Return a place that is asked for; null for coordinates that are free."""
     at = [None if np.isnan(x) else x for x in mark.at.tolist()]
-    return {"name": mark.name, "at": at, "tolerance": mark.tolerance}
+    return {"name": palette.short(mark.name, 28), "at": at, "tolerance": mark.tolerance, "limit": mark.limit}
 
 
 def force_data(trajectory: Trajectory, scene: Scene, chosen: Array) -> dict[str, object] | None:

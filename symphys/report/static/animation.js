@@ -38,7 +38,8 @@ class Player {
     this.patches = this.visible(this.data.planes);
     this.paths = this.data.bodies.map((_, b) => this.path(b));
     this.guesses = this.data.guess.map((flat) => triples(flat));
-    this.seen = mustSee(this.data, this.stage ? [] : this.patches, this.box, [...corners, ...edges]);
+    this.around = [...corners, ...edges];
+    this.seen = mustSee(this.data, this.patches, this.box, this.around);
     [this.first, this.last] = ends(this.motion.time);
     this.stage?.load(this.data, this.box);
   }
@@ -105,6 +106,10 @@ class Player {
       this.draw();
     });
     if (this.others.size) ["pointerover", "focusin"].forEach((kind) => document.addEventListener(kind, (e) => this.peek(e.target)));
+    document.addEventListener("stretch", ({ detail }) => { // of time that is played over and over; null for all
+      this.stretch = detail;
+      if (detail) this.go(detail[0]);
+    });
     this.views.forEach((b) => b.addEventListener("click", () => this.look(b.dataset.view)));
     this.follow?.addEventListener("click", () => {
       this.following = !this.following;
@@ -151,7 +156,7 @@ class Player {
     if (this.stage) {
       this.mark(name);
       this.draw();
-      this.stage.look(name, this.following ? alongside(this.data.follow, this.poses) : this.seen);
+      this.stage.look(name, this.surfaces());
       return;
     }
     const side = this.data.along === "y" ? 0 : -Math.PI / 2;
@@ -159,6 +164,28 @@ class Player {
     [this.azimuth, this.elevation] = angles[name];
     this.mark(name);
     this.draw();
+  }
+
+  surfaces() { // corners of all solids along the motion, each with its radius; of what the camera follows as seen from there
+    const { data, motion } = this, frames = motion.time.length, every = Math.max(1, Math.floor(frames / 60)), points = [];
+    const middle = (poses) => [0, 1].map((k) => data.follow.bodies.reduce((s, b) => s + poses[b].p[k], 0) / data.follow.bodies.length);
+    const here = this.following ? middle(this.poses) : null;
+    for (let i = 0; i < frames; i += every) {
+      const poses = data.bodies.map((_, b) => this.pose(b, i, 0)), at = here && middle(poses);
+      const shift = here ? [here[0] - at[0], here[1] - at[1], 0] : [0, 0, 0];
+      data.bodies.forEach((body, b) => {
+        if (here && !data.follow.bodies.includes(b)) return;
+        points.push({ point: sum(poses[b].p, shift, 1), radius: 0 });
+        for (const solid of body.solids) {
+          const { centre, corners, radius } = place(solid, poses[b], body.colour, false);
+          for (const corner of corners) points.push({ point: sum(sum(centre, corner, 1), shift, 1), radius });
+        }
+      });
+    }
+    if (here) return points;
+    const sunk = data.marks.filter((m) => !m.limit && m.at.every((x) => x !== null)).map((m) => ({ point: m.at, radius: m.tolerance }));
+    const limited = this.around.map((p) => p.map((x, k) => Math.min(this.box.high[k], Math.max(this.box.low[k], x))));
+    return [...points, ...sunk, ...limited.map((point) => ({ point, radius: 0 }))];
   }
 
   mark(name) { this.views.forEach((b) => b.setAttribute("aria-pressed", String(b.dataset.view === name))); }
@@ -187,7 +214,8 @@ class Player {
   }
 
   play() {
-    if (this.time >= this.last) this.time = this.first;
+    const [from, to] = this.stretch || [this.first, this.last];
+    if (this.time >= to || this.time < from) this.time = from;
     this.playing = true;
     this.button.textContent = "❚❚";
     this.clock = performance.now();
@@ -198,7 +226,8 @@ class Player {
     if (!this.playing) return;
     this.time += Math.max(now - this.clock, 0) / 1000 * Number(this.speed.value);
     this.clock = now;
-    if (this.time >= this.last) this.pause();
+    if (this.stretch && this.time >= Math.min(this.stretch[1], this.last)) this.time = this.stretch[0];
+    else if (this.time >= this.last) this.pause();
     this.go(this.time);
     if (this.playing) requestAnimationFrame((next) => this.advance(next));
   }

@@ -221,6 +221,11 @@ class Figure { // draws a chart in its place, shows the numbers below the pointe
     this.cursor.setAttribute("class", "cursor");
     this.svg.addEventListener("pointermove", (event) => this.point(event));
     this.svg.addEventListener("pointerleave", () => moment(null, this));
+    this.band = this.svg.insertBefore(document.createElementNS(this.svg.namespaceURI, "path"), this.svg.firstChild);
+    this.band.setAttribute("class", "band");
+    this.svg.addEventListener("pointerdown", (event) => { this.from = this.timeAt(event); });
+    this.svg.addEventListener("pointerup", (event) => this.brush(this.timeAt(event)));
+    document.addEventListener("stretch", ({ detail }) => this.mark(detail));
     document.addEventListener("moment", (event) => this.show(event.detail));
     if (this.worked.length) document.addEventListener("worked", ({ detail }) => {
       const at = (panel) => Math.max(panel.x(detail), panel.left) || panel.left; // the guess took nothing
@@ -228,10 +233,35 @@ class Figure { // draws a chart in its place, shows the numbers below the pointe
     });
   }
 
-  point(event) {
+  below(event) { // the panel below the pointer, and the place of the pointer in the picture
     const box = this.svg.getBoundingClientRect(), scale = this.width / box.width;
     const [x, y] = [(event.clientX - box.left) * scale, (event.clientY - box.top) * scale];
     const panel = this.panels.find((p) => y >= p.top - TOP && y <= p.top + p.height + BOTTOM && x >= p.left && x <= p.left + p.width);
+    return [panel, x];
+  }
+
+  timeAt(event) {
+    const [panel, x] = this.below(event);
+    return panel && panel.data.along === TIME ? panel.value(x) : null;
+  }
+
+  brush(to) { // a stretch of time that was drawn out; a mere click ends it
+    if (this.from === null || this.from === undefined || to === null) return;
+    const ends = [Math.min(this.from, to), Math.max(this.from, to)], [panel] = this.timed;
+    const detail = panel.x(ends[1]) - panel.x(ends[0]) > 6 ? ends : null;
+    document.dispatchEvent(new CustomEvent("stretch", { detail }));
+  }
+
+  mark(ends) {
+    const parts = ends ? this.timed.map((p) => {
+      const [a, b] = ends.map((t) => Math.min(Math.max(p.x(t), p.left), p.left + p.width).toFixed(1));
+      return `M${a} ${p.top}H${b}v${p.height}H${a}Z`;
+    }) : [];
+    this.band.setAttribute("d", parts.join(""));
+  }
+
+  point(event) {
+    const [panel, x] = this.below(event);
     if (!panel) return moment(null, this);
     if (panel.data.along === TIME) moment(panel.value(x), this);
     else this.lines([panel], () => x);

@@ -2,10 +2,10 @@
 // The page's player says which instant is shown; this draws it. World axes: z is up, lengths in metres.
 
 import {
-  BufferAttribute, BufferGeometry, CapsuleGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide,
+  BufferAttribute, BufferGeometry, CanvasTexture, CapsuleGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide,
   EdgesGeometry, FrontSide, Group, HemisphereLight, Line, LineBasicMaterial, LineDashedMaterial, LineLoop, LineSegments, Matrix4, Mesh,
   MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, PlaneGeometry, Quaternion, Scene, ShaderMaterial,
-  SphereGeometry, TorusGeometry, Vector3, WebGLRenderer,
+  SphereGeometry, Sprite, SpriteMaterial, SRGBColorSpace, TorusGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
@@ -13,14 +13,14 @@ const UP = new Vector3(0, 0, 1), FIELD = 28; // degrees of the camera's height o
 const SLOW = /swiftshader|llvmpipe|softpipe|software|basic render/i; // renderers without a graphics processor
 const LIGHT = new Vector3(-0.45, -0.35, 0.82); // towards where light comes from
 const PLANES = { light: { ground: "#eef2f5", line: "#c3ccd4", shade: "#cfd6dc" }, dark: { ground: "#1d2630", line: "#3d4a57", shade: "#141b22" } };
-const FORCE = { stick: "#009e73", slip: "#d55e00" }, MARK = "#cc79a7", FIXED = "#b7c2cc", GUESS = "#8d99a5";
+const FORCE = { stick: "#009e73", slip: "#d55e00" }, MARK = "#cc79a7", LIMIT = "#d55e00", FIXED = "#b7c2cc", GUESS = "#8d99a5";
 
 const GRID = { // lines at every step and bolder ones at every fifth, which fade away from the middle
   vertexShader: `
     varying vec2 at;
     void main() { at = position.xy; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }`,
   fragmentShader: `
-    uniform vec3 ground; uniform vec3 line; uniform float cell; uniform float far; uniform vec2 shift;
+    uniform vec3 ground; uniform vec3 line; uniform float cell; uniform float far; uniform float most; uniform vec2 shift;
     varying vec2 at;
     float lines(vec2 p) {
       vec2 w = fwidth(p), d = abs(fract(p - 0.5) - 0.5) / max(w, 1e-6);
@@ -30,7 +30,7 @@ const GRID = { // lines at every step and bolder ones at every fifth, which fade
       vec2 p = (at + shift) / cell;
       float on = max(0.55 * lines(p), lines(p / 5.0));
       float fade = 1.0 - smoothstep(0.35 * far, far, length(at));
-      gl_FragColor = vec4(mix(ground, line, on), fade);
+      gl_FragColor = vec4(mix(ground, line, on), most * fade);
       #include <colorspace_fragment>
     }`,
 };
@@ -65,7 +65,7 @@ class Stage {
   load(data, box) { // box: what the motion takes up, {low, high, size}
     this.data = data;
     this.box = box;
-    this.scene?.traverse((each) => { each.geometry?.dispose(); each.material?.dispose(); });
+    this.scene?.traverse((each) => { each.geometry?.dispose(); each.material?.map?.dispose(); each.material?.dispose(); });
     this.scene = new Scene();
     this.light();
     this.size = box.size;
@@ -95,7 +95,8 @@ class Stage {
   }
 
   body({ colour, solids, ghost }) {
-    const group = new Group(), shapes = solids.map((solid) => solidMesh(solid, colour, ghost));
+    const least = 0.015 * this.unit; // of a body without a surface
+    const group = new Group(), shapes = solids.map((solid) => solidMesh(solid.radius || solid.corners ? solid : { ...solid, radius: least }, colour, ghost));
     group.add(...shapes);
     return { group, shapes };
   }
@@ -103,16 +104,18 @@ class Stage {
   ground() { // planes that bear something: an endless grid on level ones, a part of the others
     const { ground, line } = this.theme, step = niceStep(this.size / 12), far = 9 * this.size;
     const middle = vector(this.box.low).add(vector(this.box.high)).multiplyScalar(0.5);
-    for (const { normal, offset } of this.data.planes) {
+    const { planes, terrain, fixtures } = this.data, nothing = !planes.length && !terrain.length && !fixtures.length;
+    const below = { normal: [0, 0, 1], offset: this.box.low[2] - 0.04 * this.size, most: 0.45 }; // so that nothing hangs in a void
+    for (const { normal, offset, most } of nothing ? [below] : planes) {
       const n = vector(normal), flat = n.z > 0.7, width = flat ? 2 * far : 1.6 * this.size;
       const foot = middle.clone().addScaledVector(n, offset - middle.dot(n));
-      const uniforms = { ground: { value: new Color(ground) }, line: { value: new Color(line) }, cell: { value: step }, far: { value: flat ? far : 0.8 * this.size }, shift: { value: { x: foot.x, y: foot.y } } };
-      const material = new ShaderMaterial({ ...GRID, uniforms, transparent: true, side: DoubleSide, depthWrite: flat, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 });
+      const uniforms = { ground: { value: new Color(ground) }, line: { value: new Color(line) }, cell: { value: step }, far: { value: flat ? far : 0.8 * this.size }, shift: { value: { x: foot.x, y: foot.y } }, most: { value: most ?? (flat ? 1 : 0.6) } };
+      const material = new ShaderMaterial({ ...GRID, uniforms, transparent: true, side: FrontSide, depthWrite: flat, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 });
       const mesh = new Mesh(new PlaneGeometry(width, width), material);
       mesh.position.copy(foot);
       mesh.quaternion.setFromUnitVectors(UP, n);
       mesh.renderOrder = flat ? -2 : 1;
-      if (!flat) { uniforms.shift.value = { x: 0, y: 0 }; material.opacity = 0.5; }
+      if (!flat) uniforms.shift.value = { x: 0, y: 0 };
       this.scene.add(mesh);
     }
   }
@@ -196,10 +199,11 @@ class Stage {
   }
 
   marks() { // what is aimed at: a point, a line or a plane where coordinates are free
-    for (const { at, tolerance } of this.data.marks || []) {
+    for (const { name, at, tolerance, limit } of this.data.marks || []) {
+      const colour = limit ? LIMIT : MARK;
       const free = at.map((x) => x === null), known = free.filter((x) => !x).length;
       const middle = at.map((x, k) => (x === null ? (this.box.low[k] + this.box.high[k]) / 2 : x));
-      const material = new MeshBasicMaterial({ color: MARK, transparent: true, opacity: 0.55, depthWrite: false });
+      const material = new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.55, depthWrite: false });
       const size = Math.max(tolerance, 0.008 * this.size);
       let mesh;
       if (known === 3) mesh = new Mesh(new TorusGeometry(2.2 * size, 0.35 * size, 8, 40), material);
@@ -215,12 +219,14 @@ class Stage {
         [sizes[a], sizes[b], sizes[k]] = [wide(a), wide(b), 0];
         mesh = new Group();
         const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([s, t]) => { const p = [0, 0, 0]; p[a] = s * sizes[a] / 2; p[b] = t * sizes[b] / 2; return p; });
-        const loop = new LineLoop(new BufferGeometry().setFromPoints(corners.map(vector)), new LineBasicMaterial({ color: MARK }));
-        const pane = new Mesh(facesGeometry(corners, [[0, 1, 2, 3]]), new MeshBasicMaterial({ color: MARK, transparent: true, opacity: 0.12, side: DoubleSide, depthWrite: false }));
+        const loop = new LineLoop(new BufferGeometry().setFromPoints(corners.map(vector)), new LineBasicMaterial({ color: colour }));
+        const pane = new Mesh(facesGeometry(corners, [[0, 1, 2, 3]]), new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.12, side: DoubleSide, depthWrite: false }));
         mesh.add(loop, pane);
       }
       mesh.position.copy(vector(middle));
-      this.scene.add(mesh);
+      const label = textSprite(name, colour, 0.03);
+      label.position.copy(mesh.position).add(new Vector3(0, 0, [0, 0, at[2] === null ? (this.box.high[2] - this.box.low[2]) / 2 : 0, 3 * size][known] + 0.03 * this.size));
+      this.scene.add(mesh, label);
     }
   }
 
@@ -236,14 +242,11 @@ class Stage {
     const right = UP.clone().cross(this.toward).normalize(), up = this.toward.clone().cross(right);
     const tall = Math.tan(FIELD * Math.PI / 360) * 0.9, wide = tall * this.camera.aspect;
     const low = new Vector3(Infinity, Infinity, Infinity), high = low.clone().negate();
-    for (const { point, radius } of seen) {
-      const p = vector(point), at = new Vector3(p.dot(right), p.dot(up), p.dot(this.toward));
-      low.min(at.clone().subScalar(radius));
-      high.max(at.addScalar(radius));
-    }
-    const middle = low.clone().add(high).multiplyScalar(0.5);
+    const places = seen.map(({ point, radius }) => { const p = vector(point); return { at: new Vector3(p.dot(right), p.dot(up), p.dot(this.toward)), radius }; });
+    places.forEach(({ at, radius }) => { low.min(at.clone().subScalar(radius)); high.max(at.clone().addScalar(radius)); });
+    const middle = low.add(high).multiplyScalar(0.5);
     this.target = right.multiplyScalar(middle.x).addScaledVector(up, middle.y).addScaledVector(this.toward, middle.z);
-    const away = Math.max((high.x - low.x) / 2 / wide, (high.y - low.y) / 2 / tall) + (high.z - low.z) / 2;
+    const away = Math.max(...places.map(({ at, radius }) => at.z - middle.z + Math.max((Math.abs(at.x - middle.x) + radius) / wide, (Math.abs(at.y - middle.y) + radius) / tall)));
     this.camera.near = away / 200;
     this.camera.far = away * 60;
     this.camera.updateProjectionMatrix();
@@ -364,6 +367,20 @@ function isDark(element) { // whether the page is dark where the element is
   const found = getComputedStyle(probe).color === "rgb(0, 0, 0)";
   probe.remove();
   return found;
+}
+
+function textSprite(text, colour, height) { // that faces the camera
+  const canvas = document.createElement("canvas"), pen = canvas.getContext("2d"), font = "600 40px system-ui, sans-serif";
+  pen.font = font;
+  canvas.width = Math.ceil(pen.measureText(text).width) + 24;
+  canvas.height = 56;
+  Object.assign(pen, { font, fillStyle: colour, textBaseline: "middle", lineWidth: 8, strokeStyle: "rgba(255,255,255,0.75)", lineJoin: "round" });
+  pen.strokeText(text, 12, 28);
+  pen.fillText(text, 12, 28);
+  const sprite = new Sprite(new SpriteMaterial({ map: new CanvasTexture(canvas), depthWrite: false, depthTest: false, sizeAttenuation: false }));
+  sprite.material.map.colorSpace = SRGBColorSpace;
+  sprite.scale.set(height * canvas.width / canvas.height, height, 1);
+  return sprite;
 }
 
 function niceStep(length) {
