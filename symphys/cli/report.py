@@ -70,8 +70,23 @@ def wants_figures(pages: str | None, figures: bool) -> bool:
     type=click.Path(path_type=Path, dir_okay=False),
     help="Write the page of the run in DIR to FILE instead: one file that needs no other, to be sent or moved.",
 )
+@click.option(
+    "--video",
+    metavar="FILE",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Write the motion of the run in DIR to FILE instead: .webp, .gif or .png that moves. Needs Chromium.",
+)
+@click.option("--film", is_flag=True, help="With --video: begin with the solve, from the guess to the result.")
 def report(
-    folder: Path, pages: str | None, figures: bool, remake: bool, new: bool, jobs: int | None, single: Path | None
+    folder: Path,
+    pages: str | None,
+    figures: bool,
+    remake: bool,
+    new: bool,
+    jobs: int | None,
+    single: Path | None,
+    video: Path | None,
+    film: bool,
 ) -> int:
     """Make the report of a run folder, or of all runs below a folder, from its files alone.
 
@@ -84,6 +99,11 @@ def report(
         from symphys.report.pages.run import write_single_page
 
         click.echo(write_single_page(folder, single))
+    if video is not None:
+        from symphys.report.making.video import write_video
+
+        click.echo(write_video(folder, video, film))
+    if single is not None or video is not None:
         return 0
     figures = wants_figures(pages, figures)
     remake = remake or figures

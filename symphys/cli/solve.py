@@ -138,6 +138,7 @@ def read_time(_context: click.Context | None, option: click.Parameter, text: str
 )
 @click.option("--dry-run", is_flag=True, help="Say what would be done, and why, and do nothing.")
 @click.option("--json", is_flag=True, help="Write what happens to stdout, a JSON object a line.")
+@click.option("--live", is_flag=True, help="Show objectives and errors in a browser on this machine while it solves.")
 @click.option("--quiet", is_flag=True, help="Show nothing but failures.")
 @click.option(
     "--on",
@@ -175,6 +176,7 @@ def solve(
     quiet: bool,
     on: str | None,
     scheduler: str | None,
+    live: bool,
 ) -> int:
     """Solve problems, and write a report.
 
@@ -189,7 +191,8 @@ def solve(
     if on and multi_start:
         raise UsageFault(f"--multi-start solves seeds side by side in one process: leave it or --on {on} out")
     from symphys.batches import BatchLimits, run_batch, run_on
-    from symphys.cli.watching import watch, working
+    from symphys.cli.watching import LivePage, watch, working
+    from symphys.report.making.stamps import BATCH_PAGE
     from symphys.runs import make_jobs, read_guess_run
     from symphys.transcription import transcribe
 
@@ -209,17 +212,25 @@ def solve(
     made = partial(transcribe, backend=backend, threads=1 if jobs > 1 or on else None)
     limits = BatchLimits(retries, timeout, budget)
     with watch(len(asked), quiet, json) as observer:
+        page = LivePage(observer, out) if live else None
+        watching = page or observer
+        if page:
+            observer.note(f"live: {page.address}")
         if on:
-            batch = run_on(on, scheduler or "", asked, jobs, observer, made, out, limits, rerun or "")
+            batch = run_on(on, scheduler or "", asked, jobs, watching, made, out, limits, rerun or "")
         else:
-            batch = run_batch(asked, jobs, observer, made, multi_start, limits, rerun or "")
+            batch = run_batch(asked, jobs, watching, made, multi_start, limits, rerun or "")
     silent, over = json or quiet, batch.interrupted or not any(batch.results)
     limit = max(timeout, MIN_PAGE_TIMEOUT)
     write = None if no_report or over else partial(write_reports, asked, out, figures, jobs, silent, limit)
-    if silent:
-        return conclude_silently(batch, observer, write)
     parts = observer.notes.seconds if jobs == 1 and not (multi_start or on) else {}
-    return conclude(asked, batch, out, began, parts, write)
+    try:
+        if silent:
+            return conclude_silently(batch, observer, write)
+        return conclude(asked, batch, out, began, parts, write)
+    finally:
+        if page:
+            page.close(out / BATCH_PAGE if write and (out / BATCH_PAGE).is_file() else None)
 
 
 def print_notes(problems: list[Problem], solvers: tuple[str, ...] | None, jobs: list[Job], silent: bool) -> None:

@@ -110,7 +110,7 @@ def limits(problem: Problem) -> list[SceneMark]:
 
 
 def coordinates(table: Target | Constraint) -> list[tuple[int, float, float]] | None:
-    """Return (axis, slope, rest) of each component of a formula, which is a coordinate of one place times slope, plus rest.
+    """Return (axis, slope, rest) of each component of a formula: a coordinate of one place, times slope, plus rest.
 
     None where a component is something else.
     """

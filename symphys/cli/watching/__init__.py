@@ -4,6 +4,7 @@ The share done and the time left come from the budget of a run, the finished run
 """
 
 from symphys.cli.watching.heartbeat import working
+from symphys.cli.watching.live_page import LivePage
 from symphys.cli.watching.observers import watch
 
-__all__ = ["watch", "working"]
+__all__ = ["LivePage", "watch", "working"]

@@ -235,12 +235,31 @@ def read_static(*names: str) -> str:
     return "".join((HERE / name).read_text(encoding="utf-8") for name in names)
 
 
-def document(title: str, body: Part, scripts: Html, allowed: Collection[str], digest: str, beside: bool = False) -> str:
-    """Return head and body; ``allowed``: the texts of the scripts that may run, and ``beside``: files beside it."""
+def document(
+    title: str,
+    body: Part,
+    scripts: Html,
+    allowed: Collection[str],
+    digest: str,
+    beside: bool = False,
+    asks: bool = False,
+) -> str:
+    """Return head and body.
+
+    Args:
+        title: of the document.
+        body: of it.
+        scripts: at its end.
+        allowed: the texts of the scripts that may run.
+        digest: the checksum of what the page was made from.
+        beside: whether scripts beside the page may run too.
+        asks: whether scripts may ask the server of the page.
+    """
     hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii") for script in allowed]
     sources = " ".join(f"'sha256-{each}'" for each in hashes) or "'none'"
     more = " 'self' file:" if beside else ""
     policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {sources}{more}"
+    policy += "; connect-src 'self'" * asks
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
