@@ -86,7 +86,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
     ),
     "report": (
         "files findings interrupts json_values results trajectory",
-        "markdown_it matplotlib numpy",
+        "markdown_it matplotlib numpy PIL",
         "pages and figures, made from run folders alone",
     ),
     "mpc": (
