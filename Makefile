@@ -89,6 +89,8 @@ gallery: $(VENV)/.installed  ## make the figures of the README again
 	$(BIN)/symphys solve quadruped_walk --unexamined --out build/walk
 	$(BIN)/symphys report build/walk --figures
 	cp build/walk/figures/quadruped_walk-strip.svg reports/gallery/
+	$(BIN)/symphys report build/gallery/ball_throw/gradient-seed0 --video reports/gallery/ball_throw.webp --film
+	$(BIN)/symphys report build/walk/quadruped_walk/stochastic-seed0 --video reports/gallery/quadruped_walk.webp --film
 
 clean:  ## remove what the other targets made, reports aside
 	rm -rf $(VENV) build dist *.egg-info
