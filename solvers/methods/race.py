@@ -64,6 +64,8 @@ NEARER = 0.8
 """Share of the ``distance`` of a point of the finisher below which it starts again from one near it."""
 FIRST_ROUNDS = 4
 """Rounds of the search for controls over time before the finisher starts, whose slopes are compiled meanwhile."""
+STALE, NEARLY = 6, 0.95
+"""Rounds after which a search ends that has not come below this share of its ``distance``: another one begins."""
 PATIENCE = 10
 """Iterations without progress after which the finisher gives up a start; with something missed, after which it lowers
 the costs of what is met no further."""
@@ -372,6 +374,10 @@ class Race:
                 polished = yield POLISH, found.z
                 if found.confirmed or self._over(polished):
                     return True
+                continue
+            near = found.status is Status.BUDGET and found.max_violation <= PROMISING
+            if near and (yield from self._finishing(found.z, FINISH)):
+                return True
         return False
 
     def _finishing(self, start: Array, first: str) -> Generator[tuple[str, Array], RacePart, bool]:
@@ -385,7 +391,9 @@ class Race:
                 return True
             if found.met or not asks:
                 polished = yield POLISH, found.z
-                return found.confirmed or self._over(polished)
+                if found.confirmed or self._over(polished):
+                    return True
+                return asks and (yield from self._holding(found.z))
             if found.status is Status.BUDGET and found.distance < BETTER * before:
                 kind, start, before = FINISH, found.z, found.distance
                 continue
@@ -401,6 +409,13 @@ class Race:
                 return False
             else:
                 kind, start, relaxed = RELAX, min(found, near, key=lambda part: part.rank).z, True
+
+    def _holding(self, met: Array) -> Generator[tuple[str, Array], RacePart, bool]:
+        """Say how a point is sought near one (n,) that meets everything and does not hold; return as ``_finishing``."""
+        near = yield NEAR, met
+        if near.confirmed:
+            yield POLISH, near.z
+        return near.confirmed or self._over(near)
 
     def _over(self, part: RacePart) -> bool:
         """Whether a part ends the race."""
@@ -464,8 +479,21 @@ class Race:
         if kind != OWN and self.finisher is ILQR and self.problem.asking is not None:
             staged = self.problem.asking(start)
             meeting = replace(meeting, staged=lambda: staged, measure=self.compared.measure)
-        iterations = TRY_ITERATIONS if kind in TRIES else options.finisher_iterations
+        iterations = TRY_ITERATIONS if kind in TRIES else options.finisher_iterations * self._growth
         return self.finisher, meeting, self.finisher.Options(iterations=iterations, **patience)
+
+    @property
+    def _growth(self) -> int:
+        """Return the factor on the iterations of a finisher that goes on where its last ones were used up.
+
+        A start anew forgets the multipliers of constraints, so many short ones come to nothing.
+        """
+        ended = 0
+        for part in reversed(self.parts):
+            if part.kind in SEARCHES or part.status is not Status.BUDGET:
+                break
+            ended += 1
+        return min(int(GROWTH**ended), MOST)
 
     def _measure(self, objectives: Array, errors: Array) -> Array:
         """Return ``distance`` in units of the first objective that is evaluated: that of the guess."""
@@ -508,6 +536,8 @@ class Race:
         goes_on = self.pausing and confirmed >= point.met  # not towards what is met and does not hold
         if kind == SEARCH and self.pausing and not goes_on:
             outcome = replace(outcome, status=Status.MET, advice="")
+        if kind == SEARCH and goes_on and self._is_stale(point.merit):
+            goes_on, outcome = False, replace(outcome, status=Status.STALLED, advice="")
         if kind == POLISH and self.pausing and self.spent is None:
             outcome = replace(outcome, status=Status.STALLED, advice=ASTRAY)
         numbers = point.objective, point.merit, point.max_violation, point.met, confirmed
@@ -522,6 +552,15 @@ class Race:
         if kind == SEARCH:
             self.searching = outcome.checkpoint if goes_on else {}
         self.log(f"{kind}: {outcome.status.value}, objective {point.objective:g}, worst {point.max_violation:g}")
+
+    def _is_stale(self, distance: float) -> bool:
+        """Whether the search that goes on has come hardly nearer in some rounds, so that another one begins."""
+        rounds = list[float]()
+        for part in reversed(self.parts):
+            if part.kind == SEARCH and part.status is not Status.INTERRUPTED:
+                break
+            rounds += [part.distance] * (part.kind == SEARCH)
+        return len(rounds) >= STALE and distance > NEARLY * rounds[STALE - 1]
 
     def _add_stages(self, part: RacePart, stages: tuple[StageResult, ...]) -> None:
         """Add the stages of a part to those of the race; what is left of its work is that of the exact stage."""

@@ -20,7 +20,7 @@ from symphys.errors import SymphysError, Unavailable
 from symphys.findings.examination import Examination
 from symphys.findings.numerics import WORST_LIMITS
 from symphys.findings.obstacles import obstacles
-from symphys.findings.verdict import holds
+from symphys.findings.verdict import doubts, holds
 from symphys.findings.writing import capital
 from symphys.problem import Problem
 from symphys.results.file_names import CHECKPOINT, FILM, GAINS, GUESS, LOG, MULTIPLIERS, RESULT, SCENE, TRAJECTORY
@@ -294,10 +294,20 @@ def spent_before(found: RunInspection) -> float:
 
 
 def confirmed(transcription: Transcription, z: Array) -> bool:
-    """Whether z solves the problem, and with finer time steps and more sweeps still does."""
+    """Whether z solves the problem by a motion that can be relied on.
+
+    With finer time steps and more sweeps it still does, and neither energy nor contacts speak against it.
+    """
     verdict = transcription.judge(z)
-    rows = ({"refined": [row]} for row in trust.finer_values(transcription, z))
-    return verdict.solved and all(holds(Examination.from_json(files.strict(row)), judged(verdict)) for row in rows)
+    if not verdict.solved:
+        return False
+    rows = list[dict[str, Any]]()
+    for row in trust.finer_values(transcription, z):
+        rows.append(row)
+        if not holds(Examination.from_json(files.strict({"refined": [row]})), judged(verdict)):
+            return False
+    found = {**trust.survey(transcription, transcription.record(z)), "refined": rows}
+    return not doubts(Examination.from_json(files.strict(found)), judged(verdict))
 
 
 def finer_shares(transcription: Transcription, Z: Array) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from symphys.codegen.backends.calls import row_by_row
 from symphys.dynamics.motion import momentum
 from symphys.maths import rotation
-from symphys.model.state_layout import Layout
+from symphys.model.state_layout import Layout, force_names
 from symphys.trajectory import Trajectory
 from symphys.transcription import Record, Rollout, plain
 from symphys.types import Array
@@ -197,15 +197,22 @@ def jumps(rollout: Rollout, record: Record) -> dict[str, Any]:
         and "size" [m] or [rad].
     """
     motion, dt, sizes = record.motion, rollout.dt, bodies(rollout, record).size
+    by_joint, by_body = quick_moves(rollout, record)
     moving = [
-        (name, np.linalg.norm(np.diff(motion.position[:, b], axis=0), axis=1), motion.velocity[:, b], float(sizes[b]))
+        (
+            name,
+            np.linalg.norm(np.diff(motion.position[:, b], axis=0), axis=1) - by_body[:, b],
+            motion.velocity[:, b],
+            float(sizes[b]),
+        )
         for b, name in enumerate(motion.body_names)
         if np.isfinite(sizes[b])
     ]
     for joint, value, rate in coordinates(rollout, record):
         for i, coordinate in enumerate(joint.kind.coordinates):
             size = 1.0 if coordinate.turns else float(sizes.min())
-            moving.append((joint.name, np.abs(np.diff(value[:, i])), rate[:, [i]], size))
+            step = np.abs(np.diff(value[:, i])) - by_joint[joint.name][:, i]
+            moving.append((joint.name, step, rate[:, [i]], size))
     found: dict[str, Any] = {"jump": 0.0, "jump_at": None}
     for name, step, velocity, size in moving:
         speed = np.linalg.norm(velocity, axis=1)
@@ -215,3 +222,38 @@ def jumps(rollout: Rollout, record: Record) -> dict[str, Any]:
             at = {"name": name, "time": float(motion.time[k]), "size": float(step[k])}
             found = {"jump": float(beyond[k] / size), "jump_at": at}
     return found
+
+
+def quick_moves(rollout: Rollout, record: Record) -> tuple[dict[str, Array], Array]:
+    """Return how far motors, springs and contacts may take joints and bodies within a step, from rest to rest.
+
+    A light finger that a strong motor drives goes from one stop to the other in a step, and no velocity at the ends of
+    the step tells of it.
+
+    Returns:
+        By joint (N, k) [m] or [rad], and for the bodies of these joints (N, B) [m].
+    """
+    known, world, layout, x = bodies(rollout, record), rollout.world, Layout(rollout.world), record.arrays.x
+    lag = layout["lag"]
+    by_joint = {joint.name: np.zeros((rollout.steps, len(joint.kind.coordinates))) for joint in world.joints}
+    by_body, start = np.zeros((rollout.steps, len(world.bodies))), 0
+    owners = {joint.name: joint for joint in world.joints}
+    for name, count in force_names(world):
+        joint = owners[name.rpartition(".")[0]]
+        ahead = np.abs(x[:, lag] * x[:, layout[name]])
+        impulse, start = np.abs(record.along[:, start : start + count]) + ahead[1:] + ahead[:-1], start + count
+        sides = [b for b in joint.bodies if not world.bodies[b].massless]
+        for i, coordinate in enumerate(joint.kind.coordinates):
+            for b in sides:
+                arm = float(known.size[b]) if coordinate.turns else 1.0
+                moved = rollout.dt * impulse[:, i] / (float(known.mass[b]) * arm)
+                by_joint[joint.name][:, i] += moved / arm
+                by_body[:, b] += moved
+    for c, b, _ in contact_sides(rollout):
+        if not world.bodies[b].massless:
+            by_body[:, b] += rollout.dt**2 * np.linalg.norm(record.motion.contact_force[:, c], axis=1) / known.mass[b]
+    for joint in world.joints:
+        for i, coordinate in enumerate(joint.kind.coordinates):
+            pushed = [by_body[:, b] / (known.size[b] if coordinate.turns else 1.0) for b in joint.bodies]
+            by_joint[joint.name][:, i] = np.maximum(by_joint[joint.name][:, i], np.max(pushed, axis=0))
+    return by_joint, by_body

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from symphys.model.state_layout import Layout
 from symphys.transcription import Record, Transcription
-from symphys.verification.balance import balance
+from symphys.verification.balance import balance, quick_moves
 
 Make = Callable[..., Transcription]
 
@@ -250,3 +252,49 @@ def test_split_steps_record_all_that_a_motor_gives(make: Make, text: str) -> Non
     given = 0.0825 * np.diff(rate) / 0.01 + 0.05 * (rate[1:] + rate[:-1]) / 2
     print(told["drift"], max(told["energy"]["kinetic"]), np.std(motion.joint_torque[:, 0, 0] - given), np.std(given))
     assert np.std(motion.joint_torque[:, 0, 0] - given) < 0.1 * np.std(given)
+
+
+FINGER = """
+[simulation]
+duration = 0.4
+dt = 0.02
+
+[[body]]
+name = "finger"
+mass = 0.2
+inertia = 0.001
+
+[[joint]]
+name = "grip"
+between = ["world", "finger"]
+slider = { axis = [0, 1, 0] }
+motor = { affine = { gain = 1, kv = 5, command_range = [-20, 20] } }
+limits = [0, 0.03]
+
+[[variable]]
+name = "press"
+sets = "grip.command"
+knots = 20
+interpolation = "constant"
+guess = [-20, -20, -20, -20, -20, 20, 20, 20, 20, 20, -20, -20, -20, -20, -20, 20, 20, 20, 20, 20]
+
+[[target]]
+name = "t"
+value = "grip.position"
+tolerance = 0.1
+"""
+
+
+def test_a_light_finger_goes_from_stop_to_stop_in_a_step(make: Make) -> None:
+    """What a motor moves from rest within a step is allowed for, without it nothing is."""
+    made = make(FINGER)
+    record = made.record(made.shooting.start(0))
+    moved = np.abs(np.diff(record.motion.joint_value[:, 0, 0]))
+    by_joint, by_body = quick_moves(made.rollout, record)
+    assert moved.max() > 0.029 and np.all(moved <= by_joint["grip"][:, 0] + 1e-12)
+    assert by_body[:, 0] == pytest.approx(by_joint["grip"][:, 0])
+    assert 0.04 <= by_joint["grip"].max() < 0.085  # F dt^2 / m, and as much again for a command that turns
+    still = record.arrays.x.copy()
+    still[:, Layout(made.rollout.world)["grip.motor"]] = 0.0
+    left = replace(record, along=np.zeros_like(record.along), arrays=replace(record.arrays, x=still))
+    assert not quick_moves(made.rollout, left)[1].any()
