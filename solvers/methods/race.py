@@ -5,8 +5,9 @@ target. A search among few numbers sees further, and finishes nothing. So CMA-ES
 among splines of few knots about the guess. If it is far then, ilqr has two tries from the guess: for what is asked for
 alone, and with the problem's own costs. A finisher goes on from what was found: exactly first, since a search leaves
 little to do, then through all stages of smoothing. Where that misses, a search has a round near the best point, or the
-first one goes on. Whenever one has found something better, the finisher starts again. The race ends with the first
-point that meets everything, from which it goes on to a stationary point where the problem asks for one.
+first one goes on, or another one begins where that stands still. Whenever one has found something better, the
+finisher starts again. The race ends with the first point that meets everything by a motion that can be relied on, from
+which it goes on to a stationary point where the problem asks for one.
 
 Until then costs hold nobody back from what is asked for. The search compares points by ``distance``, and ilqr takes
 targets and constraints in units of their tolerances, beside which costs count little. (A car that should be quick

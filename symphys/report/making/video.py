@@ -46,7 +46,9 @@ FILM_SECONDS = 3.0
 """[s] that the film of a solve takes before the motion."""
 TIMEOUT = 300.0
 """[s] that a browser may take."""
-QUALITY = 62
+WAYS = (62, 1, 1.0), (45, 1, 0.75), (40, 2, 0.75), (30, 2, 0.6)
+"""Quality, which frames, and share of the size: the first that gives at most ``MOST_BYTES``."""
+MOST_BYTES = 400_000
 POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy"[^>]*>')
 RECORD = """
 <script>
@@ -129,7 +131,7 @@ def drawn(text: str, film: int, frames: int) -> list[bytes]:
 
 
 def joined(pictures: Sequence[bytes], kind: str) -> bytes:
-    """Return a moving picture of some pictures."""
+    """Return a moving picture of some pictures: the best of ``WAYS`` that is not too large, or the last of them."""
     from PIL import Image
 
     frames: list[Any] = []
@@ -138,7 +140,14 @@ def joined(pictures: Sequence[bytes], kind: str) -> bytes:
         drawing = Image.open(io.BytesIO(each)).convert("RGBA").resize(SIZE)
         whole.paste(drawing, mask=drawing)
         frames.append(whole)
-    found, options = io.BytesIO(), {"quality": QUALITY, "method": 4} if kind == "WEBP" else {}
-    first, *others = frames
-    first.save(found, kind, save_all=True, append_images=others, duration=round(1000 / RATE), loop=0, **options)
-    return found.getvalue()
+    content = b""
+    for quality, every, share in WAYS:
+        size = round(share * SIZE[0]), round(share * SIZE[1])
+        first, *others = [frame.resize(size) for frame in frames[::every]]
+        found, options = io.BytesIO(), {"quality": quality, "method": 4} if kind == "WEBP" else {}
+        lasting = round(1000 * every / RATE)
+        first.save(found, kind, save_all=True, append_images=others, duration=lasting, loop=0, **options)
+        content = found.getvalue()
+        if len(content) <= MOST_BYTES:
+            break
+    return content

@@ -102,7 +102,7 @@ class Stage {
   }
 
   ground() { // planes that bear something: an endless grid on level ones, a part of the others
-    const { ground, line } = this.theme, step = niceStep(this.size / 12), far = 9 * this.size;
+    const { ground, line } = this.theme, step = niceStep(this.data.follow ? 0.8 * this.unit : this.size / 12), far = 9 * this.size;
     const middle = vector(this.box.low).add(vector(this.box.high)).multiplyScalar(0.5);
     const { planes, terrain, fixtures } = this.data, nothing = !planes.length && !terrain.length && !fixtures.length;
     const below = { normal: [0, 0, 1], offset: this.box.low[2] - 0.04 * this.size, most: 0.45 }; // so that nothing hangs in a void
