@@ -45,7 +45,8 @@ class FilmMotions:
     def arrays(self) -> dict[str, Array]:
         """Return what is stored, in single precision."""
         whole = {"time": self.time, "position": self.position, "orientation": self.orientation}
-        return {"rows": self.rows.astype(float), **{name: each.astype(np.float32) for name, each in whole.items()}}
+        with np.errstate(over="ignore", invalid="ignore"):  # a motion that blows up is left out when it is read
+            return {"rows": self.rows.astype(float), **{name: each.astype(np.float32) for name, each in whole.items()}}
 
 
 def film_size(bodies: int, motions: int, steps: int) -> tuple[int, int]:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import http.client
 import json
+import re
+import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from tools.browser import BROWSER, CHROMIUM, FLAGS
+from tools.waiting import FOREVER
 
 from symphys.batches import Observer
 from symphys.cli.watching import live_page
@@ -55,6 +59,20 @@ def test_it_shows_the_iterations_so_far(page: LivePage) -> None:
     assert run["objective"] == [1.0, 0.5, pytest.approx(1 / 3)] and len(run["seconds"]) == len(run["worst"]) == 3
     status, content = ask("/")
     assert status == 200 and b"connect-src &#x27;self&#x27;" in content and b"ask();" in content
+
+
+@BROWSER
+def test_a_browser_draws_the_curves(page: LivePage) -> None:
+    """Without a complaint of the browser; the page asks the server, which its policy allows."""
+    page.started(JOB, False)
+    for k in range(40):
+        page.advanced(JOB, row(k))
+    assert CHROMIUM is not None
+    call = [CHROMIUM, *FLAGS, "--dump-dom", "--virtual-time-budget=3000", page.address]
+    done = subprocess.run(call, capture_output=True, text=True, timeout=FOREVER, check=False)
+    assert [line for line in done.stderr.splitlines() if "CONSOLE" in line] == []
+    assert len(re.findall(r'<svg viewBox="0 0 \d+ ', done.stdout)) == 1 and f'<h1 id="title">{JOB.name}' in done.stdout
+    assert "iteration 39, objective 0.025" in done.stdout and "Largest error / tolerance" in done.stdout
 
 
 def test_many_iterations_are_thinned(page: LivePage) -> None:

@@ -49,6 +49,9 @@ def test_a_damaged_film_is_none(tmp_path: Path) -> None:
     arrays = good.arrays()
     np.savez(tmp_path / "film.npz", **arrays)
     assert read_film(tmp_path / "film.npz") is not None
+    far = FilmMotions(good.rows, good.time, np.full((2, 3, 1, 3), 1e300), good.orientation).arrays()
+    np.savez(tmp_path / "film.npz", **far)
+    assert read_film(tmp_path / "film.npz") is None
     arrays["position"] = np.full((2, 3, 1, 3), np.nan)
     np.savez(tmp_path / "film.npz", **arrays)
     assert read_film(tmp_path / "film.npz") is None

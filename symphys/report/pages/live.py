@@ -21,7 +21,7 @@ def live_page() -> str:
             tag("h1", "…", id="title"),
             tag("p", "", class_="lead", id="note"),
             tag("section", tag("h2", "Runs"), tag("ul", id="runs", class_="keys"), class_="card"),
-            tag("section", tag("h2", "Convergence"), tag("figure", id="curves", class_="chart"), class_="card"),
+            tag("section", tag("h2", "Convergence"), tag("figure", id="curves"), class_="card"),
         ]
     )
     return document("symphys: live", body, tag("script", Html(script)), (script,), "", asks=True)

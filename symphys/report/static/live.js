@@ -33,6 +33,7 @@ function show(state) {
   const data = document.createElement("script");
   data.type = "application/json";
   data.textContent = JSON.stringify(convergence(open));
+  root.className = "chart";
   root.replaceChildren(document.createElement("div"), data);
   new Figure(root);
 }
