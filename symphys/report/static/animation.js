@@ -183,7 +183,9 @@ class Player {
       });
     }
     if (here) return points;
-    const sunk = data.marks.filter((m) => !m.limit && m.at.every((x) => x !== null)).map((m) => ({ point: m.at, radius: m.tolerance }));
+    const middles = [0, 1, 2].map((k) => (this.box.low[k] + this.box.high[k]) / 2);
+    const aims = data.marks.filter((m) => !m.limit && m.at.filter((x) => x === null).length < 2);
+    const sunk = aims.map((m) => ({ point: m.at.map((x, k) => x ?? middles[k]), radius: m.tolerance }));
     const limited = this.around.map((p) => p.map((x, k) => Math.min(this.box.high[k], Math.max(this.box.low[k], x))));
     return [...points, ...sunk, ...limited.map((point) => ({ point, radius: 0 }))];
   }

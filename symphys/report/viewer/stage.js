@@ -296,7 +296,7 @@ class Stage {
   placeForces(poses, index, share) { // from where the body reaches farthest against the force
     const { forces } = this.data;
     if (!forces) return;
-    const count = forces.pairs.length, longest = 0.6 * this.unit;
+    const count = forces.pairs.length, longest = 0.42 * this.unit;
     this.arrows.forEach(({ pair, group, long, tip, cone }, c) => {
       const at = (k) => forces.values.slice(3 * (k * count + c), 3 * (k * count + c) + 3);
       const last = Math.max(0, forces.values.length / 3 / count - 1), now = at(Math.min(index + (share > 0.5 ? 1 : 0), last));
@@ -323,17 +323,18 @@ class Stage {
     });
   }
 
-  reach(pair, poses, n) { // the point of a body that is farthest against n
-    const { p, q } = poses[pair.body], turn = quaternion(q), found = { height: Infinity, point: vector(p) };
-    const solids = this.data.bodies[pair.body].solids;
+  reach(pair, poses, n) { // the middle of what of a body is farthest against n
+    const { p, q } = poses[pair.body], turn = quaternion(q), solids = this.data.bodies[pair.body].solids, points = [];
     for (const solid of pair.solid === null || !solids[pair.solid] ? solids : [solids[pair.solid]]) {
       for (const corner of triples(solid.corners || [0, 0, 0])) {
         const own = vector(corner).applyQuaternion(solid.q ? quaternion(solid.q) : new Quaternion()).add(vector(solid.centre));
-        const point = own.applyQuaternion(turn).add(vector(p)).addScaledVector(n, -solid.radius), height = point.dot(n);
-        if (height < found.height) Object.assign(found, { height, point });
+        points.push(own.applyQuaternion(turn).add(vector(p)).addScaledVector(n, -solid.radius));
       }
     }
-    return found.point;
+    if (!points.length) return vector(p);
+    const heights = points.map((point) => point.dot(n)), least = Math.min(...heights), near = 0.02 * (Math.max(...heights) - least) + 1e-9;
+    const lowest = points.filter((_, k) => heights[k] <= least + near);
+    return lowest.reduce((sum, point) => sum.add(point), new Vector3()).divideScalar(lowest.length);
   }
 
   resize() {
@@ -450,7 +451,9 @@ function terrainMesh({ x, y, z }) {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(new Float32Array(places), 3));
   geometry.computeVertexNormals();
-  return new Mesh(geometry, new MeshLambertMaterial({ color: "#c9d3da", flatShading: true, side: DoubleSide }));
+  const surface = new Mesh(geometry, new MeshLambertMaterial({ color: "#c9d3da", flatShading: true, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 }));
+  surface.add(new Mesh(geometry, new MeshBasicMaterial({ color: "#5c6b78", wireframe: true, transparent: true, opacity: 0.12 })));
+  return surface;
 }
 
 window.stageOf = (canvas) => { // null where there is no WebGL
