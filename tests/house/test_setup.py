@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+LEFT_OUT = {"__pycache__", "node_modules"}
 MAPPED = {"solvers": "symphys.solvers", "problems": "symphys.problems"}
 
 
@@ -78,7 +79,7 @@ def project_files() -> list[Path]:
     """What the build reads."""
     tops = ["setup.cfg", "pyproject.toml", "README.md", "LICENSE"]
     folders = [path for top in ("symphys", *MAPPED) for path in (ROOT / top).rglob("*")]
-    files = [path.relative_to(ROOT) for path in folders if path.is_file() and "__pycache__" not in path.parts]
+    files = [path.relative_to(ROOT) for path in folders if path.is_file() and not LEFT_OUT & {*path.parts}]
     return [Path(top) for top in tops] + files
 
 
@@ -87,7 +88,9 @@ def wheel_names() -> set[str]:
     kept = [
         path
         for path in project_files()
-        if path.suffix in {".py", ".toml", ".css", ".js", ".typed", ".c", ".h"} or path.name == "Makefile"
+        if path.suffix in {".py", ".toml", ".css", ".js", ".typed", ".c", ".h"}
+        or path.name in ("Makefile", "times.json", "three.LICENSE")
     ]
-    kept = [path for path in kept if len(path.parts) > 1]
+    sources = Path("symphys/report/viewer")  # of static/viewer.js
+    kept = [path for path in kept if len(path.parts) > 1 and sources not in path.parents]
     return {path.as_posix() if path.parts[0] == "symphys" else f"symphys/{path.as_posix()}" for path in kept}
