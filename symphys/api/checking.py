@@ -16,7 +16,6 @@ from symphys import files
 from symphys.api.solution import Solution, read
 from symphys.api.transcriptions import transcribed
 from symphys.api.values import vector
-from symphys.api.views import html_table
 from symphys.findings import advice
 from symphys.findings.examination import Examination
 from symphys.findings.levels import BAD, FAIR, MARKS, UNKNOWN, Finding, Judged
@@ -102,11 +101,13 @@ class Checked(Examined):
 
     def _repr_html_(self) -> str:
         """Return the HTML that a notebook shows."""
+        from symphys.report.pages.markup import table
+
         head = f"<b>{html.escape(self.problem.title)}</b>"
         rows = [(each.what, each.number, MARKS[each.level], each.meaning) for each in self.findings]
         findings = (["check", "value", "", "interpretation"], rows)
         every = (advice.slopes(self.trust), advice.answers(self.trust, self.judged), findings)
-        tables = [html_table(tuple(header), [tuple(row) for row in rows]) for header, rows in every]
+        tables = [table(header, rows, "t" * len(header)) for header, rows in every]
         return "\n".join([head, *tables, f"<p>{html.escape(self.advice)}</p>"])
 
 

@@ -189,13 +189,6 @@ def met(check: CheckRecord) -> str:
     return "met" if check.met else "missed"
 
 
-def html_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    """Write texts as an HTML table."""
-    head = "".join(f"<th>{markup.escape(text)}</th>" for text in header)
-    body = "".join(f"<tr>{''.join(f'<td>{markup.escape(text)}</td>' for text in row)}</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-
-
 def player(folder: Path) -> str:
     """Return a frame that plays the motion of a run folder in three dimensions; empty where there is no motion."""
     from symphys.report.pages.markup import page

@@ -34,7 +34,7 @@ class Ask:
         self.port = int(page.address.rstrip("/").rpartition(":")[2])
 
     def __call__(self, path: str, host: str = "") -> tuple[int, bytes]:
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=FOREVER)
         connection.request("GET", path, headers={"Host": host or f"127.0.0.1:{self.port}"})
         answer = connection.getresponse()
         return answer.status, answer.read()

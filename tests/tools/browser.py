@@ -14,7 +14,9 @@ from typing import Any
 import pytest
 from tools.waiting import FOREVER
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+from symphys.report.making.video import BROWSERS
+
+CHROMIUM = next(filter(None, map(shutil.which, BROWSERS)), None)
 BROWSER = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium to open pages (Debian: apt-get install chromium)")
 POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy"[^>]*>')
 GPU = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")

@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class Pace:
-    """How long a block of lanes takes, by which calls are cut into parts for threads."""
+    """The measured time of a block of lanes, and into how many parts for threads a call is cut by it."""
 
     def __init__(self) -> None:
         """Know nothing: the first call is cut as finely as may be."""

@@ -280,7 +280,7 @@ def growth_chart(growth: Growth, motion: Trajectory | None) -> Chart | None:
 
 def touches(motion: Trajectory) -> Array:
     """Return the times [s] at which a contact begins to act."""
-    acting = np.abs(np.nan_to_num(motion.contact_force)).sum(axis=2) > 0
+    acting = np.any(np.abs(motion.contact_force) > 0, axis=2)
     begins = acting.copy()
     begins[1:] &= ~acting[:-1]
     return np.asarray(motion.time[:-1][begins.any(axis=1)])

@@ -11,7 +11,7 @@ from symphys.findings import writing
 from symphys.findings.verdict import ACCEPTED
 from symphys.report.charts.convergence import convergence_chart
 from symphys.report.making.stamps import BATCH_PAGE, batch_digest
-from symphys.report.pages import comparison
+from symphys.report.pages import comparison, words
 from symphys.report.pages.answers import answers_card
 from symphys.report.pages.check_figure import MOST_CHECKS, MOST_DOTS, check_figure, ratios
 from symphys.report.pages.comparison import page_links, run_card, study_card
@@ -218,8 +218,8 @@ def motions(study: Study, numbers: int) -> Html:
         return card("The motion", best_motion(study.best, numbers), note=best_note(study.best))
     parts = []
     for run in moving:
-        words = f"{run.solver}, seed {run.seed}" if len(study.runs) > len(moving) else run.solver
-        parts.append(tag("div", tag("h3", words), best_motion(run, numbers // len(moving))))
+        title = f"{run.solver}, seed {run.seed}" if len(study.runs) > len(moving) else run.solver
+        parts.append(tag("div", tag("h3", title), best_motion(run, numbers // len(moving))))
     return card("The motions", tag("div", *parts, class_="side-by-side"), note=SIDE_BY_SIDE)
 
 
@@ -237,7 +237,7 @@ def other_motions(runs: Sequence[Run], links: Mapping[str, str]) -> list[Html]:
         bodies = len(recording.trajectory.body_names)
         count = min(count, max(MOST_NUMBERS // (LEAST_FRAMES * 7 * bodies), 1))
         numbers = min(MOST_NUMBERS // count, NUMBERS)
-        title = f"{settings_words(run.settings)}, {run.solver}, seed {run.seed}"
+        title = words.setting_title(run)
         found.append(other_motion(recording.trajectory, recording.scene, numbers, links[run.place], title))
     return found
 

@@ -279,9 +279,9 @@ def broken_card(broken: Sequence[Run]) -> Html:
 
 PER_PAGE = 25
 MOST_KEYS = 8
+"""Settings that have a column of their own, at most; with more of them all stand in one."""
 MOST_COMPARED, MOST_NUMBERS = 600, 60
 """Runs whose numbers can be compared two by two, and numbers of each, at most."""
-"""Settings that have a column of their own, at most; with more of them all stand in one."""
 DIGITS = 6
 HOW_COMPARED = "Two that are ticked are compared."
 HOW_SHOWN = (

@@ -6,8 +6,6 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from symphys import files
 from symphys.findings import writing
 from symphys.findings.writing import show
@@ -171,8 +169,8 @@ def film_of(run: Run, motion: Trajectory) -> Film | None:
     if run.settings:  # one of many: its page is to stay small
         found = found.thinned(SWEPT_MOTIONS, SWEPT_FRAMES)
     labels = [f"iteration {row}: objective {show(trace['objective'][row], 3)}" for row in found.rows[:-1].tolist()]
-    work = np.nan_to_num(trace["equivalents"][found.rows])
-    return Film(found, (*labels, f"the result: objective {show(run.objective, 3)}"), work)
+    last = f"the result: objective {show(run.objective, 3)}"
+    return Film(found, (*labels, last), trace["equivalents"][found.rows])
 
 
 def sources(run: Run) -> Html:

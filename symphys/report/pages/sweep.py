@@ -22,7 +22,6 @@ from symphys.report.pages.answers import found_numbers
 from symphys.report.pages.comparison import solve_time
 from symphys.report.pages.markup import Html, banner, card, figures, tag
 from symphys.report.pages.parallel import Course, Scale, parallel_coordinates
-from symphys.results.config import settings_words
 from symphys.results.discovery import Study, middle
 from symphys.results.drawable import OVERSIZED, drawable, oversized
 from symphys.results.run import Run
@@ -151,10 +150,10 @@ def courses(sweep: SweptRuns, links: Mapping[str, str]) -> Html:
     scales = [Scale(key, sweep.at[:, k], across(sweep.at[:, k]) < 0) for k, key in enumerate(sweep.keys)]
     scales += [Scale(each.title, each.values, across(each.values) < 0) for each in sweep.measures]
     marks = palette.solver_marks(run.solver for run in sweep.runs)
-    lines = []
-    for run in sweep.runs:
-        title = f"{settings_words(run.settings)}, {run.solver}, seed {run.seed}"
-        lines.append(Course(marks[run.solver][0], links.get(run.place, ""), title, not run.solved))
+    lines = [
+        Course(marks[run.solver][0], links.get(run.place, ""), words.setting_title(run), not run.solved)
+        for run in sweep.runs
+    ]
     return parallel_coordinates(scales[:MOST_AXES], lines, f"All runs over {writing.listed(sweep.keys)}")
 
 

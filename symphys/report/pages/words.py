@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from symphys.findings.numerics import unfelt
 from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, ending, verdict_words
 from symphys.findings.writing import capital, listed, plain, show
+from symphys.results.config import settings_words
 from symphys.results.result import CheckRecord
 from symphys.results.run import Run
 
@@ -70,6 +71,11 @@ def verdict(run: Run) -> str:
     else:
         text = f"{misses(missed, len(run.checks))} {how_it_ended(run)}"
     return f"{text.strip()} {doubted(run)}".strip()
+
+
+def setting_title(run: Run) -> str:
+    """Name a run of a sweep by its settings, solver and seed."""
+    return f"{settings_words(run.settings)}, {run.solver}, seed {run.seed}"
 
 
 def how_it_ended(run: Run) -> str:

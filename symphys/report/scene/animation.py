@@ -64,7 +64,7 @@ def animation(
 
 @dataclass(frozen=True)
 class Film:
-    """Motions along a solve, with the ``labels`` (K,) and the ``work`` [rollouts] (K,) of each."""
+    """Motions along a solve, with the ``labels`` (K,) and the ``work`` [rollouts] (K,) of each, nan where unknown."""
 
     motions: FilmMotions
     labels: tuple[str, ...]
@@ -79,7 +79,7 @@ def film_controls(film: Film) -> Html:
     motions = film.motions
     data = {
         "labels": list(film.labels),
-        "work": rounded(film.work, 1e-6),
+        "work": [None if np.isnan(at) else float(at) for at in film.work],
         "time": [rounded(row, 1e-4) for row in motions.time],
         "frames": motions.time.shape[1],
         **quantised("position", motions.position),

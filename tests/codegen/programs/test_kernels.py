@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from worlds import programs
 
 from symphys.codegen import Cache, Kernel, ProgramError, compile_program, interpret
 from symphys.codegen.emit.plan import plan
+from symphys.codegen.runtime import thread_pool
 from symphys.codegen.runtime.thread_pool import Pace
 
 
@@ -181,12 +182,19 @@ def test_the_report_says_how_it_was_built(pendulum: Kernel) -> None:
     assert report.note == ""
 
 
-def test_a_call_is_shared_among_threads_where_that_pays() -> None:
+def test_a_call_is_shared_among_threads_where_that_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first call is cut as finely as may be, later ones by the time that a block took; none has no part."""
     pace = Pace()
     assert pace.parts(100, 8) == 8 and pace.parts(3, 8) == 3 and pace.parts(0, 8) == 0
-    pace.measured(lambda _: time.sleep(0.002), 10)(np.zeros(0))  # 0.2 ms a block
-    assert pace.parts(100, 8) == 8
-    for _ in range(200):
-        pace.measured(lambda _: None, 1000)(np.zeros(0))
+    clock = [0.0]
+    monkeypatch.setattr(thread_pool, "perf_counter", lambda: clock[0])
+
+    def takes(seconds: float) -> Callable[[Any], None]:
+        return lambda _: clock.append(clock.pop() + seconds)
+
+    pace.measured(takes(0.002), 10)(np.zeros(0))  # 0.2 ms a block
+    assert pace.parts(100, 8) == 8 and pace.parts(3, 8) == 3
+    pace.measured(takes(0.002), 1000)(np.zeros(0))  # 2 us a block
+    assert pace.parts(100, 8) == 1
+    pace.measured(takes(9.0), 1000)(np.zeros(0))  # once it had to wait for a processor
     assert pace.parts(100, 8) == 1
