@@ -4,10 +4,12 @@ Where hands do not touch the box, or feet leave the ground too late, descent end
 target. A search among few numbers sees further, and finishes nothing. So CMA-ES searches for a round of generations
 among splines of few knots about the guess. If it is far then, ilqr has two tries from the guess: for what is asked for
 alone, and with the problem's own costs. A finisher goes on from what was found: exactly first, since a search leaves
-little to do, then through all stages of smoothing. Where that misses, a search has a round near the best point, or the
-first one goes on, or another one begins where that stands still. Whenever one has found something better, the
-finisher starts again. The race ends with the first point that meets everything by a motion that can be relied on, from
-which it goes on to a stationary point where the problem asks for one.
+little to do, then through all stages of smoothing. Where that misses, it hops: points are drawn about the best one, the
+finisher descends from the best of these, and what comes nearer is the next to be hopped from (basin hopping, Wales and
+Doye, J. Phys. Chem. A 101, 1997). Between hops the search goes on, and another one begins where that stands still;
+whenever it has found something better, the finisher starts again. The race ends with the first point that meets
+everything by a motion that can be relied on. From there it goes on to a stationary point where the problem asks for
+one.
 
 Until then costs hold nobody back from what is asked for. The search compares points by ``distance``, and ilqr takes
 targets and constraints in units of their tolerances, beside which costs count little. (A car that should be quick
@@ -38,6 +40,7 @@ from symphys.solvers.core.interface import Log, Solver
 from symphys.solvers.core.options import SolverOptions, at_least, require
 from symphys.solvers.core.outcome import Counts, Keep, Monitor, Outcome, StageResult, Status, StopReason, TraceRow
 from symphys.solvers.core.point import Incumbent
+from symphys.solvers.core.subspace import search_space
 from symphys.solvers.methods.cma_es import CmaOptions, cma, load
 from symphys.solvers.methods.gradient import GRADIENT
 from symphys.solvers.methods.ilqr import ILQR
@@ -53,16 +56,14 @@ COST_WEIGHT = 0.5
 """What costs count for at most in the logarithm of ``distance``: enough to lead where nothing else moves."""
 MARGIN = 0.5
 """[tolerances] What misses by less is not improved: finer time steps change it by that much and it is still met."""
-CHECKED = 4
-"""Points of an evaluation that meet everything, at most, which are tried with finer time steps."""
+CLOSE, CHECKED = 2.0, 8
+"""[tolerances] Points that miss by no more are tried with finer time steps, so many of an evaluation at most."""
 UNCHECKED = 1.001
-"""[tolerances] The least error of others that meet everything."""
+"""[tolerances] The least error of others."""
 FAR = 1e100
 """[tolerances] Errors are compared up to here."""
 BETTER = 0.6
 """Share of the distance of the last start of the finisher below which it starts again."""
-NEARER = 0.8
-"""Share of the ``distance`` of a point of the finisher below which it starts again from one near it."""
 FIRST_ROUNDS = 4
 """Rounds of the search for controls over time before the finisher starts, whose slopes are compiled meanwhile."""
 STALE, NEARLY = 6, 0.95
@@ -76,9 +77,16 @@ SEEDS = 100_000
 """Between the seeds of searches that begin anew."""
 LOWEST = "everything is met, and from there no step lowers what it costs: good enough, or at a kink"
 ASTRAY = "what costs less misses what is asked for"
+GIVEN_UP = "hops about it come no nearer: another guess, or stages of smoothing"
 USED_UP = "the finisher's iterations are used up: raise `finisher_iterations`"
-NEAR_SIGMA = 0.3
-"""First standard deviation of a search near what the finisher has found, in units of that of the first search."""
+HOP_SIGMAS, HOP_KNOTS = (0.05, 0.1, 0.2), (3, 4, 6, 2)
+"""Of one hop after another: standard deviation in units of that of the search, and knots of splines."""
+DRAWN = 64
+"""Points that are drawn for a hop, of which the best is taken."""
+HOP_PATIENCE, HOP_SHARE = 4, 0.97
+"""A finisher gives up a hop where so many iterations have not brought the largest miss below this share of itself."""
+HOPS_AHEAD, HOPS_BESIDE, FAR_HOP = 8, 2, 4
+"""Hops between two rounds of the search: where they have come nearer than it, and where not; every fourth is far."""
 TRY_ITERATIONS = 100
 """Iterations of ilqr from the guess, in each stage of smoothing."""
 PROMISING = 5.0
@@ -86,9 +94,9 @@ PROMISING = 5.0
 is finished first."""
 HALF = 0.5
 """Share of what the search misses with which a try for what is asked for goes on, too."""
-NAME, SEARCH, NEAR, FINISH, RELAX, POLISH = "race", "search", "near", "finish", "relax", "polish"
-ASKED, OWN = "asked", "own"
-SEARCHES, TRIES = (SEARCH, NEAR), (ASKED, OWN)
+NAME, SEARCH, HOP, LEAP = "race", "search", "hop", "leap"
+FINISH, RELAX, POLISH, ASKED, OWN = "finish", "relax", "polish", "asked", "own"
+HOPS, TRIES = (HOP, LEAP), (ASKED, OWN)
 
 
 @dataclass(frozen=True)
@@ -126,9 +134,10 @@ class RacePart:
     """A solve that is part of a race, and is over or paused.
 
     Attributes:
-        kind: SEARCH; NEAR, a search about what the finisher has found; FINISH, exactly, until everything is met; RELAX
-            likewise through all stages of smoothing; ASKED and OWN, as FINISH and RELAX from the guess, OWN with the
-            problem's own costs; POLISH, exactly, until the objective is stationary.
+        kind: SEARCH; FINISH, exactly, until everything is met; HOP and LEAP, as FINISH from the best of some points
+            that are drawn about the start; RELAX, as FINISH through all stages of smoothing; ASKED and OWN, as FINISH
+            and RELAX from the guess, OWN with the problem's own costs; POLISH, exactly, until the objective is
+            stationary.
         status, advice: how it ended; INTERRUPTED: a search that goes on.
         z: (n,) its best point.
         objective, max_violation, met: of that point, exactly; see ``Point``.
@@ -189,7 +198,8 @@ def distance(objectives: Array, errors: Array, scale: float) -> Array:
     if not errors.shape[1]:
         return objectives
     beyond = np.minimum(np.maximum(errors - MARGIN, 0), FAR)
-    share = objectives / np.maximum(np.abs(objectives) + scale, np.finfo(float).tiny)
+    size = np.minimum(np.abs(objectives), FAR)
+    share = np.copysign(size, objectives) / np.maximum(size + scale, np.finfo(float).tiny)
     return np.asarray((1 + np.sum(beyond**2, axis=1)) * np.exp(COST_WEIGHT * share))
 
 
@@ -206,15 +216,15 @@ class WithFinerSteps:
     def value(self, Z: Array, smoothing: float) -> Values:
         """Implement ``Evaluator.value``."""
         values = self.problem.evaluator.value(Z, smoothing)
-        met = np.array([row for row, errors in enumerate(values.errors) if self.problem.met(errors)], np.int64)
-        if smoothing or not len(met):
+        close = np.flatnonzero((values.errors <= CLOSE).all(axis=1))
+        if smoothing or not len(close):
             return values
         errors = values.errors.copy()
-        first = met[np.argsort(self.measure(values.objective[met], errors[met]), kind="stable")]
-        checked = first[:CHECKED]
+        first = close[np.argsort(self.measure(values.objective[close], errors[close]), kind="stable")]
+        checked, others = first[:CHECKED], first[CHECKED:]
         found = self.finer(Z[checked])
         errors[checked] = np.maximum(errors[checked], np.where(np.isnan(found), FAR, found))
-        errors[first[CHECKED:]] = np.maximum(errors[first[CHECKED:]], UNCHECKED)
+        errors[others] = np.maximum(errors[others], UNCHECKED)
         return replace(values, errors=errors)
 
     def __getattr__(self, name: str) -> Any:
@@ -302,7 +312,7 @@ class Race:
         last = self._shift(kind).moved(rows[-1]) if rows else self.rows[-1] if self.rows else None
         self.spent = self.options.spent(last) if last else None
         given_up = bool(rows) and self._gives_up(kind, rows)
-        self.pausing = given_up or (kind in SEARCHES and last is not None and last.iteration >= self._round_ends)
+        self.pausing = given_up or (kind == SEARCH and last is not None and last.iteration >= self._round_ends)
         if not rows or not (self.spent or self.pausing):
             return False
         z, counts = np.array(self.running["best"]["z"], float), Counts(*map(int, self.running["counts"]))
@@ -318,6 +328,8 @@ class Race:
         row, last = rows[-1], [each.max_violation for each in rows[-PATIENCE:]]
         if kind == POLISH:
             return len(rows) > PATIENCE and all(each > 1 for each in last) and last[-1] >= last[0]
+        if kind in HOPS and len(rows) > HOP_PATIENCE:
+            return min(last[-HOP_PATIENCE:]) > HOP_SHARE * min(each.max_violation for each in rows[:-HOP_PATIENCE])
         if kind not in TRIES or row.iteration != self.options.finisher_iterations:
             return False
         searched = min((part.max_violation for part in self.parts if part.kind == SEARCH), default=0.0)
@@ -344,24 +356,25 @@ class Race:
             if found.confirmed:
                 yield POLISH, found.z
                 return
-            if number + 1 < alone or found.distance >= BETTER * tried:
+            if number + 1 < alone:
                 continue
-            tried = found.distance
             if self.finisher is ILQR and not guessed and found.max_violation > PROMISING:
                 guessed = True
                 if (yield from self._from_guess(guess)):
                     return
-            guessed = guessed or np.array_equal(found.z, guess)
-            if (yield from self._finishing(found.z, FINISH)):
-                return
+            if found.distance < BETTER * tried:
+                tried = found.distance
+                guessed = guessed or np.array_equal(found.z, guess)
+                if (yield from self._finishing(found.z, FINISH)):
+                    return
             if not guessed and (yield from self._from_guess(guess)):
                 return
             guessed = True
+            if (yield from self._hopping(guess)):
+                return
         if not guessed and (yield from self._finishing(guess, RELAX)):
             return
-        best = self._best()
-        assert best is not None, "there was a guess"
-        yield POLISH, best.z
+        yield POLISH, self._nearest.z
 
     def _from_guess(self, guess: Array) -> Generator[tuple[str, Array], RacePart, bool]:
         """Say what is tried from the guess (n,); return whether the race is over."""
@@ -381,42 +394,49 @@ class Race:
                 return True
         return False
 
-    def _finishing(self, start: Array, first: str) -> Generator[tuple[str, Array], RacePart, bool]:
-        """Say how the finisher goes on from ``start`` (n,), as ``first`` does; return whether the race is over."""
-        asks = self._asks
-        kind = first if asks else RELAX
-        before, relaxed = math.inf, len(self.problem.smoothing) == 1 or kind == RELAX
+    def _finishing(
+        self, start: Array, first: str, relaxed: bool = False
+    ) -> Generator[tuple[str, Array], RacePart, bool]:
+        """Say how the finisher goes on from ``start`` (n,), as ``first`` does; return whether the race is over.
+
+        ``relaxed``: whether there is no need to try it with smoothing.
+        """
+        kind, before = first if self._asks else RELAX, math.inf
+        relaxed = relaxed or len(self.problem.smoothing) == 1
         while True:
             found = yield kind, start
             if self._over(found):
                 return True
-            if found.met or not asks:
+            if found.met or not self._asks:
                 polished = yield POLISH, found.z
-                if found.confirmed or self._over(polished):
-                    return True
-                return asks and (yield from self._holding(found.z))
+                return found.confirmed or self._over(polished)
+            relaxed = relaxed or kind == RELAX
             if found.status is Status.BUDGET and found.distance < BETTER * before:
                 kind, start, before = FINISH, found.z, found.distance
-                continue
-            near = yield NEAR, found.z
-            if self._over(near):
-                return True
-            if near.confirmed:
-                yield POLISH, near.z
-                return True
-            if near.distance < NEARER * found.distance:
-                kind, start, before = FINISH, near.z, near.distance
-            elif relaxed:
+            elif relaxed or (self._asks and found.max_violation > PROMISING):
                 return False
             else:
-                kind, start, relaxed = RELAX, min(found, near, key=lambda part: part.rank).z, True
+                kind, start = RELAX, found.z
 
-    def _holding(self, met: Array) -> Generator[tuple[str, Array], RacePart, bool]:
-        """Say how a point is sought near one (n,) that meets everything and does not hold; return as ``_finishing``."""
-        near = yield NEAR, met
-        if near.confirmed:
-            yield POLISH, near.z
-        return near.confirmed or self._over(near)
+    def _hopping(self, guess: Array) -> Generator[tuple[str, Array], RacePart, bool]:
+        """Say how some hops go; return whether the race is over."""
+        most = (HOPS_BESIDE if self._nearest.kind == SEARCH else HOPS_AHEAD) if self._asks else 0
+        for _ in range(most):
+            best, done = self._nearest, sum(part.kind in HOPS for part in self.parts)
+            found = yield (LEAP, guess) if done % FAR_HOP == FAR_HOP - 1 else (HOP, best.z)
+            if self._over(found):
+                return True
+            better = found.rank < best.rank and (found.met or found.distance < BETTER * best.distance)
+            if better and (yield from self._finishing(found.z, FINISH, relaxed=True)):
+                return True
+        return False
+
+    @property
+    def _nearest(self) -> RacePart:
+        """Return the best part."""
+        best = self._best()
+        assert best is not None, "there was a guess"
+        return best
 
     def _over(self, part: RacePart) -> bool:
         """Whether a part ends the race."""
@@ -435,7 +455,7 @@ class Race:
             moved = shift.moved(row)
             rows.append(row)
             self.spent = self.options.spent(moved)
-            round_ends = kind in SEARCHES and moved.iteration >= last
+            round_ends = kind == SEARCH and moved.iteration >= last
             self.pausing = self.spent is not None or round_ends or self._gives_up(kind, rows)
             try:
                 if self.monitor:
@@ -453,35 +473,46 @@ class Race:
         searches = sum(part.kind == SEARCH and part.status is not Status.INTERRUPTED for part in self.parts)
         chosen, problem, options = self._part(kind, start, searches)
         running = self.running or (self.searching if kind == SEARCH else {})
-        seed = self.seed + SEEDS * searches + (len(self.parts) if kind == NEAR else 0)
+        seed = self.seed + SEEDS * searches
+        if kind in HOPS and not running:
+            start = self._drawn(kind, start)
         self.log(f"{kind}, part {len(self.parts) + 1} of the race")
         return chosen.solve(problem, start, options, seed, see, running or None, self.log, offer)
 
     def _part(self, kind: str, start: Array, searches: int) -> tuple[Solver[Any], ShootingProblem, SolverOptions]:
         """Return solver, problem and options of a part from ``start`` (n,); ``searches``: how many are over."""
         options, last = self.options, self.problem.smoothing[-1:]
-        if kind in SEARCHES:
-            wide = kind == SEARCH
+        if kind == SEARCH:
             sought = CmaOptions(
-                sigma=options.sigma * (1.0 if wide else NEAR_SIGMA),
+                sigma=options.sigma,
                 knots=options.knots,
-                population=options.population * (min(GROWTH**searches, MOST) if wide else 1),
+                population=options.population * min(GROWTH**searches, MOST),
                 evaluations=NO_LIMIT,
                 validation=0,
             )
-            return self.cma if wide else cma(), replace(self.compared, smoothing=last), sought
+            return self.cma, replace(self.compared, smoothing=last), sought
         patience = {"patience": PATIENCE} if self.finisher is ILQR else {}
         if kind == POLISH:
             own = self.finisher.Options(iterations=options.finisher_iterations, **patience)
             return self.finisher, replace(self.problem, smoothing=last), own
         meeting = replace(self.problem, stop_when_met=True)
-        if kind in (FINISH, ASKED):
+        if kind in (FINISH, ASKED, *HOPS):
             meeting = replace(meeting, smoothing=last)
         if kind != OWN and self.finisher is ILQR and self.problem.asking is not None:
             staged = self.problem.asking(start)
             meeting = replace(meeting, staged=lambda: staged, measure=self.compared.measure)
         iterations = TRY_ITERATIONS if kind in TRIES else options.finisher_iterations * self._growth
         return self.finisher, meeting, self.finisher.Options(iterations=iterations, **patience)
+
+    def _drawn(self, kind: str, start: Array) -> Array:
+        """Return the best of some points that are drawn about ``start`` (n,) for a hop."""
+        hops = sum(part.kind == kind for part in self.parts)
+        sigma = self.options.sigma * (HOP_SIGMAS[hops % len(HOP_SIGMAS)] if kind == HOP else 1.0)
+        knots = HOP_KNOTS[hops % len(HOP_KNOTS)]
+        space, stream = search_space(self.problem, start, knots), np.random.default_rng([self.seed, len(self.parts)])
+        drawn = sigma * stream.standard_normal((DRAWN, len(space.origin)))
+        points = self.evaluator.rate([self.evaluator.clip(space.z(space.origin + x * space.scale)) for x in drawn])
+        return min(points, key=lambda point: point.rank).z
 
     @property
     def _growth(self) -> int:
@@ -491,7 +522,7 @@ class Race:
         """
         ended = 0
         for part in reversed(self.parts):
-            if part.kind in SEARCHES or part.status is not Status.BUDGET:
+            if part.kind == SEARCH or part.status is not Status.BUDGET:
                 break
             ended += 1
         return min(int(GROWTH**ended), MOST)
@@ -528,7 +559,7 @@ class Race:
         self.film += [replace(point, row=shift.moved(outcome.trace[point.row]).iteration) for point in shown]
         seconds = rows[-1].seconds - self._seconds() if rows else 0.0
         (point,) = self.evaluator.rate([outcome.z])
-        counts = outcome.counts + shift.counts - self._counts() + Counts(rollouts=1)
+        counts = outcome.counts + shift.counts - self._counts() + Counts(rollouts=1 + DRAWN * (kind in HOPS))
         known = next((part for part in reversed(self.parts) if np.array_equal(part.z, point.z)), None)
         if known is not None:
             confirmed = known.confirmed
@@ -539,11 +570,11 @@ class Race:
             outcome = replace(outcome, status=Status.MET, advice="")
         if kind == SEARCH and goes_on and self._is_stale(point.merit):
             goes_on, outcome = False, replace(outcome, status=Status.STALLED, advice="")
-        if kind == POLISH and self.pausing and self.spent is None:
-            outcome = replace(outcome, status=Status.STALLED, advice=ASTRAY)
+        if kind != SEARCH and self.pausing and self.spent is None:
+            outcome = replace(outcome, status=Status.STALLED, advice=ASTRAY if kind == POLISH else GIVEN_UP)
         numbers = point.objective, point.merit, point.max_violation, point.met, confirmed
         part = RacePart(kind, outcome.status, outcome.advice, outcome.z, *numbers, counts, seconds)
-        self._add_stages(part, outcome.stages if kind not in SEARCHES else ())
+        self._add_stages(part, outcome.stages if kind != SEARCH else ())
         best = self._best()
         if best is None or part.rank <= best.rank:
             self.finished = outcome
@@ -580,8 +611,8 @@ class Race:
         if best is None:
             assert reason is not None, "a race has a part"
             return Outcome(reason.status, reason.advice, self.start, tuple(self.rows), self._counts())
-        last = next((part for part in reversed(self.parts) if part.kind not in SEARCHES), self.parts[-1])
-        ended = best if best.kind not in SEARCHES else last
+        last = next((part for part in reversed(self.parts) if part.kind != SEARCH), self.parts[-1])
+        ended = best if best.kind != SEARCH else last
         ended = self.parts[-1] if self.parts[-1].status.fatal else ended
         status, advice = ended.status, ended.advice if ended.status is not Status.BUDGET else USED_UP
         if best.confirmed and status is Status.STALLED:
@@ -697,7 +728,7 @@ def solve(
 
 RACE: Solver[RaceOptions] = Solver(
     NAME,
-    "CMA-ES over splines, alternating with a descent from the best point that it has found",
+    "CMA-ES over splines, descent from the best point that it has found, and hops about that",
     RaceOptions,
     solve,
     prepare=load,

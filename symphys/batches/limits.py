@@ -8,6 +8,9 @@ from time import monotonic
 from symphys.interrupts import Stop
 from symphys.records import dataclass
 
+JUDGING_SHARE, MOST_JUDGING = 0.05, 10.0
+"""Share of a run's time that is kept for judging what it has found, and that in seconds at most."""
+
 
 @dataclass(frozen=True)
 class BatchLimits:
@@ -27,6 +30,11 @@ class BatchLimits:
     def bounded(self) -> bool:
         """Whether a limit may end a run, which needs a process of its own for that."""
         return min(self.timeout, self.budget) < math.inf
+
+    @property
+    def judging(self) -> float:
+        """Return the last part of ``timeout`` [s], in which a run is judged and solves no more."""
+        return min(JUDGING_SHARE * self.timeout, MOST_JUDGING)
 
 
 UNLIMITED = BatchLimits()

@@ -138,12 +138,14 @@ class Pool:
         """Ask runs to stop at a halt or timeout; kill a process that does not stop."""
         now, halt = time.monotonic(), self.halt()
         for slot in self.working:
-            if not slot.stop_requested and (halt or now > slot.deadline):
+            judging = self.limits.judging if slot.phase == SOLVING else 0.0
+            if not slot.stop_requested and (halt or now > slot.deadline - judging):
                 slot.stop_requested, slot.stop_reason = (
                     True,
                     self.halt.reason if halt else timed_out(self.limits.timeout),
                 )
-                slot.deadline = now + GRACE_TIME if slot.stop_reason else math.inf
+                ends = now if halt else max(now, slot.deadline)
+                slot.deadline = ends + GRACE_TIME if slot.stop_reason else math.inf
                 send(slot, Stopping(slot.stop_reason))
             elif slot.stop_requested and now > slot.deadline and slot.process.pid and not slot.ended:
                 slot.ended = True

@@ -68,7 +68,12 @@ ENDINGS = {
     ),
     "not_applicable": Ending("not applicable", "not applicable", headline="Not applicable", usable=False),
     "failed": Ending("failed", "failed", headline="Failed", sentence="The solver failed.", usable=False, faulty=True),
-    "interrupted": Ending("interrupted", "interrupted", headline="Interrupted"),
+    "interrupted": Ending(
+        "interrupted",
+        "interrupted",
+        headline="Interrupted",
+        sentence="The run was interrupted; the same command goes on from where it stopped.",
+    ),
     "unreadable": Ending("no readable result", "unreadable", headline="No result", faulty=True),
 }
 """By the status in result.json; the last one is of folders without a result."""
@@ -95,8 +100,9 @@ class Verdict:
 
 def judge_run(status: str, judged: Judged, trust: Mapping[str, object] | None) -> Verdict:
     """Judge a run that ended with ``status``; ``trust`` as in result.json, None where nothing was measured."""
-    found = doubts(Examination.from_json(dict(trust or {})), judged)
-    return Verdict(verdict_word(status, judged, bool(found)), found)
+    measured = Examination.from_json(dict(trust or {}))
+    found = doubts(measured, judged)
+    return Verdict(verdict_word(status, judged, bool(found), bool(measured.refined)), found)
 
 
 def doubts(trust: Examination, judged: Judged) -> tuple[str, ...]:
@@ -114,15 +120,16 @@ def holds(trust: Examination, judged: Judged) -> bool:
     return bool(trust.refined) and all(refined_finding(row, judged).level in (GOOD, FAIR) for row in trust.refined)
 
 
-def verdict_word(status: str, judged: Judged, doubted: bool) -> str:
-    """Return the word for a run.
+def verdict_word(status: str, judged: Judged, doubted: bool, examined: bool = True) -> str:
+    """Return the word for a run. One that was interrupted is solved if what it had found is.
 
     Args:
         status: how its solver ended.
         judged: the exact rollout of what it found.
         doubted: whether there are any ``doubts``.
+        examined: whether finer simulations were done.
     """
-    if status == INTERRUPTED:
+    if status == INTERRUPTED and not (judged.met and judged.checked and examined):
         return INTERRUPTED
     if not judged.met or not (judged.checked or ending(status).usable):
         return NOT_SOLVED

@@ -326,7 +326,7 @@ def judge(
         taken = transcription.record(outcome.z)  # where steps are compared with the virtual machine's
         verdict = transcription.judge(outcome.z)
         examined: dict[str, Any] | None = None
-        if outcome.status is not Status.INTERRUPTED:
+        if outcome.status is not Status.INTERRUPTED or (verdict.checks and verdict.solved):
             examined = (
                 trust.examine(transcription, taken.z, tell, whole=False, slopes=derived, refuted=WORST_LIMITS[1])
                 if examine

@@ -418,6 +418,71 @@ def flies_from_the_bar(found: Found) -> None:
     assert motion["torso.position"][-1, 2] > motion["legs.position"][-1, 2] + 0.5
 
 
+def quiet_steps(motion: Trajectory) -> Array:
+    """(N,) whether nothing touches anything in a step, nor hits it in the steps beside it."""
+    force = np.abs(motion.contact_force).max(axis=(1, 2), initial=0.0)
+    return np.asarray(np.convolve(force, [1.0, 1.0, 1.0], "same") == 0)
+
+
+def falls_freely(found: Found, centre: Array, least: int) -> None:
+    """A centre of mass (N + 1, 3), where nothing touches anything, in at least so many pairs of steps."""
+    quiet = quiet_steps(found.motion)
+    falls = np.diff(centre, 2, axis=0)[quiet[:-1] & quiet[1:]] / found.made.rollout.dt**2
+    assert len(falls) >= least
+    assert falls == pytest.approx(np.tile([0, 0, -GRAVITY], (len(falls), 1)), abs=0.05)
+
+
+def turns_in_the_air(found: Found) -> None:
+    """Out of the pan the cake falls freely and turns at one rate, by more than a quarter of a turn in all."""
+    motion, quiet = found.motion, quiet_steps(found.motion)
+    falls_freely(found, motion["pancake.position"], 10)
+    rate = motion["pancake.angular_velocity"][:, 1]
+    assert np.abs(np.diff(rate)[quiet]).max() < 1e-6 * np.abs(rate).max()
+    assert abs(rate[1:][quiet].sum()) * found.made.rollout.dt > np.pi / 2
+
+
+def folds_to_turn(found: Found) -> None:
+    """The centre of mass falls, and the angular momentum about it stays; without folding it would be 5.6 rad."""
+    motion = found.motion
+    parts = {"trunk": (35.0, 1.8), "arms": (6.0, 0.3), "legs": (22.0, 1.6)}
+    mass = sum(each for each, _ in parts.values())
+    place, speed = (
+        sum(each * motion[f"{name}.{what}"] for name, (each, _) in parts.items()) / mass
+        for what in ("position", "velocity")
+    )
+    falls_freely(found, place, 100)
+    turning = sum(
+        inertia * motion[f"{name}.angular_velocity"]
+        + each * np.cross(motion[f"{name}.position"] - place, motion[f"{name}.velocity"] - speed)
+        for name, (each, inertia) in parts.items()
+    )[:, 1]
+    assert turning == pytest.approx(np.full_like(turning, turning[0]), rel=5e-3)
+    assert motion["hip.angle"].min() < -0.5
+
+
+def climbs_by_its_motors(found: Found) -> None:
+    """They work at least what lifts 4 kg by 6 cm, and all that the cart gains is theirs."""
+    motion, dt = found.motion, found.made.rollout.dt
+    power = sum(motion[f"{axle}.torque"] * (motion[f"{axle}.rate"][1:] + motion[f"{axle}.rate"][:-1]) / 2
+                for axle in ("axle_r", "axle_f"))  # fmt: skip
+    assert np.sum(power) * dt > 4 * GRAVITY * 0.06
+    assert motion["front.position"][-1, 2] == pytest.approx(0.16, abs=0.01)
+
+
+def tips_over_its_edge(found: Found) -> None:
+    """Its centre rises to half the diagonal of its side, less what its round edge takes, and ends at half its width."""
+    height = found.motion["box.position"][:, 2]
+    assert np.hypot(0.05, 0.1) - 0.005 < height.max() < np.hypot(0.05, 0.1) + 0.003
+    assert height[-1] == pytest.approx(0.05, abs=2e-3)
+
+
+def leaves_the_ground(found: Found) -> None:
+    """Aloft the centre of mass falls freely."""
+    masses = {"trunk": 40.0, "thigh": 16.0, "shank": 8.0, "foot": 2.0}
+    centre = sum(each * found.motion[f"{name}.position"] for name, each in masses.items()) / sum(masses.values())
+    falls_freely(found, np.asarray(centre), 10)
+
+
 def flies_by_newton_and_euler(found: Found) -> None:
     """To second order in the step; the poles are passed half a metre to their sides."""
     wanted = flights.quadrotor(found.z.reshape(4, -1), 4.5)
@@ -594,9 +659,11 @@ TABLE = [
           seeds=2, backend="casadi"),
     *rows("juggle", "least_squares", law=meets_the_ball_with_the_speed_of_the_formula,
           polish=True, backend="casadi"),
+    *rows("kerb", "race", "race", law=climbs_by_its_motors),
     *rows("knock", {"least_squares": 7}, "least_squares", answer=slides.KICK, within=[1e-4, 2e-3, 1e-4], polish=True),
     *rows("knock", {"gradient": 40, "ipopt": 18, "cma": 350}, "gradient ipopt cma", law=goes_along_as_fast, seeds=2),
     *rows("mini_cheetah_ahead", "ilqr", "ilqr", below=2.0, finer=1, law=lifts_every_foot),
+    *rows("pancake", "race", "race", law=turns_in_the_air),
     *rows("parcel", {"least_squares": 6}, "least_squares", answer=[3.6643, 0.5606, 3.7407], within=5e-4,
           law=brings_the_plate(1e-4, 3e-3), polish=True),
     *rows("parcel", {"gradient": 14}, "gradient", law=brings_the_plate(0.01, np.inf), seeds=2),
@@ -617,13 +684,16 @@ TABLE = [
     *rows("sled", {"gradient": 160, "least_squares": 60, "ipopt": 250, "cma": np.inf}, "ipopt", law=goes_in_stages,
           seeds=2),
     *rows("sled", "gradient least_squares", solved=False, smoothing=(0.1,)),
+    *rows("somersault", "race", law=folds_to_turn),
     *rows("spinner", "ilqr", "ilqr", below=2.0, law=turns_the_spinner),
+    *rows("squat_jump", "race", "race", law=leaves_the_ground),
     *rows("stairs", {"least_squares": 7}, answer=flights.STAIRS, within=1e-9, polish=True,
           backend="casadi"),
     *rows("stairs", {"gradient": 12, "ipopt": 12, "cma": 250}, answer=flights.STAIRS, within=2e-3, seeds=2,
           backend="casadi"),
     *rows("table_tennis", "least_squares", law=lands_and_kicks_on, seeds=3),
     *rows("three_hops", "ipopt", "ipopt", finer=1, law=hops_three_times, seeds=3),
+    *rows("tip_over", "race", "race", law=tips_over_its_edge),
     *rows("transport", "ilqr", "ilqr", finer=1, law=slides_within_friction, seeds=3),
     *rows("two_balls", "gradient ipopt", solved=None,
           law=comes_down_to_the_goal(1.3965, 1.3975, 60)),

@@ -250,6 +250,25 @@ def test_an_interrupted_run_with_a_time_goes_on(problem_file: Path, tmp_path: Pa
     assert seen[0] == 2
 
 
+@pytest.mark.slow
+def test_what_an_interrupted_run_has_met_is_judged(problem_file: Path, tmp_path: Path) -> None:
+    """It is solved as far as it got, and the same command goes on to the optimum."""
+    settings: dict[str, object] = {"objective.stop": "converged"}
+    problem = load_problem(problem_file, settings)
+    job = make_jobs([problem], ["gradient"], [0], settings, tmp_path / "out")[0]
+
+    def stop(row: TraceRow) -> None:
+        if row.max_violation < 1:
+            raise KeyboardInterrupt
+
+    stopped = run(job, stop)
+    assert (stopped.status, stopped.verdict) == ("interrupted", "solved")
+    assert stopped.trust["refined"]
+    after = run(job)
+    assert (after.status, after.verdict) == ("converged", "solved")
+    assert after.objective <= stopped.objective
+
+
 def test_an_expected_failure_is_a_result_with_the_message(make_job: MakeJob) -> None:
     job = make_job(does="refuse")
     result = run(job)

@@ -14,6 +14,7 @@ from symphys.runs import Result, read_result
 
 NAN = float("nan")
 GROWN = {"time": [0, 1], "factor": [1e5, 1]}
+FINER = {"what": "dt / 2", "objective": 1.0, "worst": 0.6}
 ENERGY = {name: [0.0, 1.0] for name in ("time", "kinetic", "potential", "applied", "contact")}
 GAIN = {"step": 1, "time": 0.1, "energy": 9.0, "contacts": ["a-b"]}
 
@@ -40,6 +41,10 @@ def test_a_result_survives_its_file(tmp_path: Path) -> None:
         ({"checks": [], "status": "converged"}, "solved"),
         ({"checks": [], "status": "failed"}, "not_solved"),
         ({"status": "interrupted", "solved": False}, "interrupted"),
+        ({"status": "interrupted"}, "interrupted"),
+        ({"status": "interrupted", "trust": {"refined": [FINER]}}, "solved"),
+        ({"status": "interrupted", "trust": {"refined": [FINER], "passed": 1.5}}, "doubted"),
+        ({"status": "interrupted", "trust": {"refined": [FINER]}, "checks": []}, "interrupted"),
         ({"trust": {"deepest": 0.2, "size": 0.1}}, "doubted"),
         ({"trust": {"passed": 1.5}}, "doubted"),
         ({"trust": {"residual": 0.5, "impulse": 1.0}}, "doubted"),

@@ -21,7 +21,7 @@ from symphys.solvers.core.convergence import PLATEAU_ADVICE
 from symphys.solvers.core.subspace import search_space
 from symphys.solvers.methods import race
 from symphys.solvers.methods.race import (
-    CHECKED,
+    CLOSE,
     FAR,
     FINISH,
     PATIENCE,
@@ -140,8 +140,9 @@ def test_what_does_not_hold_with_finer_steps_does_not_end_it() -> None:
     assert never.status is Status.MET
 
 
-def test_a_search_counts_as_met_what_is_met_with_finer_steps_too() -> None:
-    """The best few of those that meet everything are tried; of others nobody knows."""
+def test_a_search_counts_as_met_what_is_met_with_finer_steps_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The best few of those that are close are tried; of others nobody knows."""
+    monkeypatch.setattr(race, "CHECKED", 4)
     problem = toy(1, lambda z, s: z, errors=lambda z, s: ca.fabs(z))
     asked = list[float]()
 
@@ -150,10 +151,13 @@ def test_a_search_counts_as_met_what_is_met_with_finer_steps_too() -> None:
         return np.where(Z < 0.2, 3.0, np.where(Z < 0.3, np.nan, 0.4))
 
     checked = WithFinerSteps(problem, finer, lambda objectives, errors: objectives)
-    Z = np.array([[0.9], [0.1], [2.0], [0.2], [0.5], [0.4]])
+    Z = np.array([[0.9], [0.1], [1.5], [0.2], [0.5], [0.4], [CLOSE + 0.1]])
     errors = checked.value(Z, 0.0).errors[:, 0]
-    assert asked == [0.1, 0.2, 0.4, 0.5][:CHECKED]
-    assert errors.tolist() == [UNCHECKED, 3.0, 2.0, FAR, 0.5, 0.4]
+    assert asked == [0.1, 0.2, 0.4, 0.5]
+    assert errors.tolist() == [UNCHECKED, 3.0, 1.5, FAR, 0.5, 0.4, CLOSE + 0.1]
+    asked.clear()
+    checked.value(Z[2:3], 0.0)
+    assert asked == [1.5]
     assert checked.value(Z, 0.1).errors[:, 0].tolist() == pytest.approx(np.abs(Z[:, 0]))
     found = solve("race", replace(mesa(), finer_errors=lambda Z: np.zeros((len(Z), 1))), options=SMALL)
     same(found, solve("race", mesa(), options=SMALL))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from symphys.findings.numerics import unfelt
-from symphys.findings.verdict import BEST_FOUND, DOUBTED, SOLVED, ending, verdict_words
+from symphys.findings.verdict import BEST_FOUND, DOUBTED, INTERRUPTED, SOLVED, ending, verdict_words
 from symphys.findings.writing import capital, listed, plain, show
 from symphys.results.config import settings_words
 from symphys.results.result import CheckRecord
@@ -57,8 +57,8 @@ def verdict(run: Run) -> str:
     missed = [check for check in run.checks if not check.met]
     if run.status == "not_applicable":
         return f"{run.solver} does not apply to this problem."
-    if run.status == "interrupted":
-        return "The run was interrupted; the same command goes on from where it stopped."
+    if run.verdict == INTERRUPTED:
+        return ending(run.status).sentence
     if not run.checks and ending(run.status).sentence and math.isnan(run.objective):
         return f"{ending(run.status).sentence} There is nothing to judge."
     if not run.checks:
@@ -68,6 +68,7 @@ def verdict(run: Run) -> str:
     elif run.verdict in (SOLVED, DOUBTED):
         total = "The only check is" if len(run.checks) == 1 else f"All {len(run.checks)} checks are"
         text = f"{total} met; the largest error is {show(run.worst_ratio, 2)} of its tolerance{work(run)}."
+        text += f" {ending(run.status).sentence}" if run.status == "interrupted" else ""
     else:
         text = f"{misses(missed, len(run.checks))} {how_it_ended(run)}"
     return f"{text.strip()} {doubted(run)}".strip()
