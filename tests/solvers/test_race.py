@@ -174,6 +174,25 @@ def test_costs_do_not_keep_it_from_what_is_asked_for() -> None:
     assert np.isnan(distance(costs[:1], np.array([[np.nan, 0.0]]), 4.0)).all()
 
 
+def test_hops_leave_points_where_descent_ends() -> None:
+    """A slope with many valleys; an interrupted race goes on to the last bit, also within a hop."""
+
+    def miss(z: Any, s: Any) -> Any:
+        return 1.5 + z[0] + 2 * z[1] ** 2 + 0.8 * ca.sin(9 * z[0]) * ca.cos(7 * z[1])
+
+    problem = toy(2, miss, errors=lambda z, s: ca.fabs(miss(z, s)) / 1e-3, guess=2.0, bounds=(-3.0, 3.0))
+    words = list[str]()
+    options = {"generations": 1, "population": 3, "sigma": 0.2, "rounds": 4}
+    alone = solve("least_squares", problem)
+    assert alone.status is Status.CONVERGED and abs(miss(alone.z, 0.0)) > 1
+    found = solve("race", problem, options=options, log=words.append)
+    assert found.status is Status.MET
+    assert next(word.split(":")[0] for word in words if ": met" in word) in race.HOPS
+    for stop in range(len(found.trace)):
+        part = solve("race", problem, options=options, monitor=stop_at(stop))
+        same(solve("race", problem, options=options, checkpoint=through_json(part.checkpoint)), found)
+
+
 def test_what_keeps_costs_low_and_misses_is_left() -> None:
     """Gauss-Newton ends where costs and target are in balance; the race where the target is met."""
 
