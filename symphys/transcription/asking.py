@@ -9,7 +9,6 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from symphys.problem import Problem
-from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.staged.step_evaluator import StepEvaluator
 from symphys.types import Array
 
@@ -28,8 +27,7 @@ def asking(staged: Callable[[], RolloutStages]) -> Callable[[Array], RolloutStag
     @cache
     def weighted(power: int) -> RolloutStages:
         known = staged()
-        problem = weighted_by_tolerance(known.rollout.problem, 10.0**power)
-        return known.sharing(symbolic_rollout(problem, timed=True))
+        return known.weighted(weighted_by_tolerance(known.rollout.problem, 10.0**power))
 
     def find(z: Array) -> RolloutStages:
         known = staged()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import casadi as ca
 
@@ -28,6 +28,20 @@ def motion_identity(rollout: Rollout, *what: object) -> str | None:
     Numbers that p stacks are no part of it: problems of a sweep share what is made. None where it is not known.
     """
     known = rollout.once(identity_without_numbers, lambda: identity_without_numbers(rollout, rollout.problem.variables))
+    return None if known is None else identity_of(known, *what)
+
+
+def terms_identity(rollout: Rollout, *what: object) -> str | None:
+    """Return a key of what is made of the formulas of terms one by one: as ``motion_identity``, without weights."""
+    problem = rollout.problem
+    same = replace(
+        problem,
+        costs=tuple(replace(each, weight=1.0) for each in problem.costs),
+        targets=tuple(replace(each, weight=1.0, tolerance=1.0) for each in problem.targets),
+        constraints=tuple(replace(each, penalty=1.0, tolerance=1.0) for each in problem.constraints),
+    )
+    plain = replace(rollout, problem=same)
+    known = rollout.once(terms_identity, lambda: identity_without_numbers(plain, problem.variables))
     return None if known is None else identity_of(known, *what)
 
 

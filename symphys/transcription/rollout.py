@@ -397,7 +397,9 @@ class Rollout:
 
     def compiled(self, formula: Formula) -> ca.Function:
         """Return the formula as a casadi function of (x, u, p, time, z), and of its parts in order."""
-        return compile_formula(self.problem, self.world, self.inputs, self.parameters, self.memory, formula)
+        parts = self.problem, self.world, self.inputs, self.parameters, self.memory, formula
+        made: ca.Function = self.once(formula, lambda: compile_formula(*parts))
+        return made
 
     def tick(self, when: str | float) -> int:
         """Return the number of the state at the end, or nearest to a time [s]."""

@@ -11,6 +11,8 @@ from symphys.problem import problem_of_tables
 from symphys.shooting import StagedProblem
 from symphys.transcription import Transcription, transcribe
 from symphys.transcription.asking import COST_SHARE, LASTING
+from symphys.transcription.rollout import symbolic_rollout
+from symphys.transcription.staged.staged_problem import RolloutStages
 
 TABLES: dict[str, Any] = {
     "simulation": {"duration": 0.4, "dt": 0.02},
@@ -67,6 +69,21 @@ def test_its_steps_are_those_of_the_problem(made: Transcription) -> None:
     assert first is second
     expected, found = made.steps().motion(z, 0.0), first.roll_out(z, 0.0)
     assert np.array_equal(found.x[:, : expected.x.shape[1]], expected.x)
+
+
+def test_other_weights_share_functions_and_change_nothing_else(made: Transcription) -> None:
+    """As the steps of the same problem with these weights, which are made anew."""
+    z, staged = made.shooting.start(0), asked(made, made.shooting.start(0))
+    assert isinstance(staged, RolloutStages)
+    own = RolloutStages(symbolic_rollout(staged.rollout.problem, timed=True), backend="casadi")
+    motion, multipliers = own.roll_out(z, 0.0), np.zeros(len(own.penalties))
+    assert np.array_equal(staged.penalties, own.penalties)
+    ours, fresh = (each.expand(motion, multipliers, own.penalties) for each in (staged, own))
+    for field in ("x", "u", "xx", "uu", "ux"):
+        assert np.array_equal(getattr(ours, field), getattr(fresh, field)), field
+    measured = [each.measure(z[None], motion.x[None], motion.u[None]) for each in (staged, own, made.shooting.staged())]
+    assert np.array_equal(measured[0][0], measured[1][0]) and np.array_equal(measured[0][1], measured[1][1])
+    assert measured[0][0] != pytest.approx(measured[2][0]), "the weights must differ"
 
 
 def test_nothing_is_asked_for_where_there_is_only_a_cost() -> None:

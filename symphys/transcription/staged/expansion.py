@@ -16,7 +16,7 @@ import numpy as np
 
 from symphys.codegen.toolchain.warm_start import from_cache
 from symphys.shooting import Expansion
-from symphys.transcription.identities import motion_identity
+from symphys.transcription.identities import terms_identity
 from symphys.transcription.staged.stage_functions import ReadingFunction, StageFunctions, StepRows, reading
 from symphys.transcription.staged.stage_terms import StageSymbols, StageTerm
 from symphys.transcription.staged.term_slopes import Block, Blocks, nonzeros, tangent_slopes
@@ -196,15 +196,20 @@ class SquareStack:
         self._limited = np.flatnonzero((whole >= 0).any(axis=0))
         self._limits = whole[:, self._limited]
         self._lower, self._upper = (np.append(each, 0.0)[self._limits] for each in bounds)
-        made = from_cache(
-            lambda: stack_slopes(symbols, [term.value for term in distinct], at_steps, static),
-            motion_identity(symbols.rollout, "stack", at_steps, static, [term.key for term in distinct]),
-            (StackSlopes, ReadingFunction),
-        )
+        what = "stack", at_steps, static, *(term.key for term in distinct)
+
+        def made_stack() -> tuple[StackSlopes, StageFunctions]:
+            made = from_cache(
+                lambda: stack_slopes(symbols, [term.value for term in distinct], at_steps, static),
+                terms_identity(symbols.rollout, *what),
+                (StackSlopes, ReadingFunction),
+            )
+            return made, StageFunctions([made.function], rows, *evaluated)
+
+        made, self._functions = symbols.rollout.once((what, evaluated), made_stack)
         sizes, self._m = made.sizes, int(symbols.u.shape[0])
         self._cuts = [slice(end - size, end) for size, end in zip(sizes, np.cumsum(sizes).tolist(), strict=True)]
         self._wide, self._shape, self._places = sum(sizes), (rows, *made.shape), made.places
-        self._functions = StageFunctions([made.function], rows, *evaluated)
         unused = (self._weights == 0) & (whole < 0)
         self._unused = (unused, unused[:, self._places[0]]) if unused.any() else None
 
@@ -298,7 +303,7 @@ def square_stacks(
             places[id(term)] = slice(first, first + len(term.steps) * term.size)
             first = places[id(term)].stop
     stacked = [term for term in terms if term.kind in ("squares", "limit")]
-    identity = motion_identity(symbols.rollout, "sides of terms", [term.key for term in stacked])
+    identity = terms_identity(symbols.rollout, "sides of terms", [term.key for term in stacked])
     sides = from_cache(lambda: [_of_both_sides(symbols, term) for term in stacked], identity)
     for term, both in zip(stacked, sides, strict=True):
         (at_steps if both else at_states).append(term)

@@ -124,16 +124,19 @@ class Linearization:
         if not len(self.statics):
             nx, n, _, np_ = self.step.arguments.sizes
             return np.zeros((n, 0)), np.zeros((nx, 0)), np.zeros((np_, 0))
+        key = np.append(motion.z[self.statics], motion.x[0])
+        if self._known_start is not None and np.array_equal(self._known_start[0], key):
+            return self._known_start[1]
         x0, p = motion.x[0], self.start(motion.z)[2]
         first, parameters = (np.array(ca.DM(part)) for part in self._start_slopes(motion.z))
         first = first - self._sparse(self.tangent.shift, x0, p) @ parameters
         start = self._sparse(self.tangent.projection, x0, p) @ first
         left = first - self._sparse(self.tangent.basis, x0, p) @ start
-        return (
-            start,
-            np.where(np.abs(left) > OFF_TANGENT_TOLERANCE * np.abs(first).max(initial=0.0), left, 0.0),
-            parameters,
-        )
+        off = np.where(np.abs(left) > OFF_TANGENT_TOLERANCE * np.abs(first).max(initial=0.0), left, 0.0)
+        self._known_start = key, (start, off, parameters)
+        return self._known_start[1]
+
+    _known_start: tuple[Array, tuple[Array, Array, Array]] | None = None
 
     def _lifts(self, X: Array, p: Array) -> Iterator[Array]:
         """Yield the bases (nx, n) of the tangents at states X (N, nx)."""

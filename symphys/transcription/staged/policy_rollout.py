@@ -30,7 +30,7 @@ from symphys.codegen.backends import PRECISIONS
 from symphys.codegen.toolchain.warm_start import ProgramSource, compile_source
 from symphys.records import dataclass
 from symphys.shooting import AffinePolicy
-from symphys.transcription.identities import program_identity
+from symphys.transcription.identities import program_identity, terms_identity
 from symphys.transcription.program import step_calls
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.linearized_step import LinearizedStep
@@ -76,13 +76,51 @@ def running_costs(symbols: StageSymbols, terms: Sequence[StageTerm]) -> RunningC
     )
 
 
+class RunningSums(NamedTuple):
+    """The sums beside a state, step by step.
+
+    Attributes:
+        function: (state with sums (nx + S,), state after (nx,), inputs, constants, number of the state before, weights
+            (T,)) -> the sums (S,) after the step.
+        weights: (N, T) of the values that are added, in each step.
+        total: their number ``S``.
+        identity: a key of the function; None: not known.
+    """
+
+    function: ca.Function
+    weights: Array
+    total: int
+    identity: str | None
+
+
+def running_sums(symbols: StageSymbols, terms: Sequence[StageTerm]) -> RunningSums | None:
+    """Return the sums among the terms; None without any."""
+    summed = [term for term in terms if term.kind == "sum"]
+    if not summed:
+        return None
+    x, _, u, constants, tick = symbols.arguments
+    nx, weights = symbols.state_size, np.zeros((symbols.rollout.steps, len(summed)))
+    after, weight = ca.SX.sym("after", nx), ca.SX.sym("weight", len(summed))
+    sums = x[nx:]
+    for k, term in enumerate(summed):
+        weights[term.steps, k] = term.weight
+        value = ca.Function("value", [*symbols.arguments], [term.value])
+        state, tick_of = (ca.vertcat(after, x[nx:]), tick + 1) if term.after else (x, tick)
+        sums[term.number] += weight[k] * value(state, x[:nx], u, constants, tick_of)
+    arguments = [x, after, u, constants, tick, weight]
+    function = ca.Function("sums", arguments, [ca.densify(ca.cse(sums))])
+    identity = terms_identity(symbols.rollout, "running sums", [term.key for term in summed])
+    return RunningSums(function, weights, int(sums.shape[0]), identity)
+
+
 class PolicySizes(NamedTuple):
-    """Largest numbers of ``old`` and ``new`` knots in a step, of ``inputs`` and of static entries."""
+    """Largest numbers of ``old`` and ``new`` knots in a step, of ``inputs``, of static entries and of constants."""
 
     old: int
     new: int
     inputs: int
     statics: int = 0
+    constants: int = 0
 
 
 class PolicyMotions(NamedTuple):
@@ -103,12 +141,14 @@ class PolicyRollout:
         sizes: of the policies.
         costs: of the motion; without, it costs 0.
         threads: their number for the step lengths.
+        sums: beside the state; states are then (nx + S,), and tangents (n + S,).
     """
 
     step: LinearizedStep
     sizes: PolicySizes
     costs: RunningCosts | None = None
     threads: int | None = 1
+    sums: RunningSums | None = None
 
     @cached_property
     def kernel(self) -> ProcessorKernel | None:
@@ -123,9 +163,10 @@ class PolicyRollout:
     @property
     def source(self) -> ProgramSource:
         """Return the program; without costs only the number of steps of the problem's horizon is part of it."""
-        make, rollout = partial(policy_program, self.step, self.sizes, self.costs), self.step.rollout
+        make, rollout = partial(policy_program, self.step, self.sizes, self.costs, self.sums), self.step.rollout
+        of_sums = "" if self.sums is None else self.sums.identity
         asked = "" if self.costs is None else program_identity(rollout.problem, self.step.exact)
-        return self.step.source("policy", make, *self.sizes, rollout.steps, asked)
+        return self.step.source("policy", make, *self.sizes, rollout.steps, asked, of_sums)
 
     def __call__(
         self,
@@ -142,7 +183,7 @@ class PolicyRollout:
 
         Args:
             start: (nx,) or (B, nx) first states.
-            p: (np,) or (B, np) parameters.
+            p: (np,) or (B, np) parameters; where there are sums, with the other constants of terms behind them.
             policy: of the motions.
             lengths: (B,).
             smoothing: of the steps.
@@ -151,7 +192,7 @@ class PolicyRollout:
             shares: (B,) of the feedback.
         """
         count, steps, nx = len(lengths), len(policy.new), policy.x.shape[1]
-        sizes = 1, 1, self.sizes.statics, self.step.arguments.sizes[3], nx
+        sizes = 1, 1, self.sizes.statics, self.step.arguments.sizes[3] + self.sizes.constants, nx
         row, parts, first = np.empty((count, sum(sizes))), list[Array](), 0
         for size, each in zip(sizes, (lengths[:, None], np.reshape(shares, (-1, 1)), statics, p, start), strict=True):
             parts.append(row[:, first : first + size])
@@ -159,6 +200,8 @@ class PolicyRollout:
             first += size
         assert self.kernel is not None, "there is a compiler"
         shared = [policy.old[0], *(getattr(policy, name).ravel() for name in POLICY_SERIES), self.step.tangent.nominal]
+        if self.sums is not None:
+            shared.append(self.sums.weights.ravel())
         found = self.kernel.forward(row, np.concatenate([*shared, (clock, smoothing)]))
         x, u, new = (
             found[name].reshape(count, more, -1) if name in found else np.zeros((count, more, 0))
@@ -174,32 +217,38 @@ POLICY_SERIES = ("x", "old", "new", "ahead", "back", "weights", "keep", "lower",
 class PolicyPlaces:
     """The places of a rollout under a policy in a program; see ``Places``.
 
-    What differs from lane to lane is (step length, share of the feedback, change of static entries, p, first state).
-    What all share is the policy, step after step, then the nominal p, the clock and the smoothing; the body reads it
-    where it lies.
+    What differs from lane to lane is (step length, share of the feedback, change of static entries, p with other
+    constants, first state). What all share is the policy, step after step, then the nominal p, weights of sums, the
+    clock and the smoothing; the body reads it where it lies.
     """
 
-    def __init__(self, step: LinearizedStep, sizes: PolicySizes) -> None:
+    def __init__(self, step: LinearizedStep, sizes: PolicySizes, sums: RunningSums | None) -> None:
         """Reserve policies of these sizes."""
         self.rollout: Rollout = step.rollout
         self.layout = layout = MemoryLayout()
         nx, n, m, np_ = step.arguments.sizes
-        old, new, inputs, s = sizes
+        old, new, inputs, s, more = sizes
         steps, acting = self.rollout.steps, old + new
-        self.row = layout.take(2 + s + np_ + nx)
+        summed, added = (0, 0) if sums is None else (sums.total, sums.weights.shape[1])
+        whole, n = nx + summed, n + summed
+        self.row = layout.take(2 + s + np_ + more + whole)
         begun = layout.size
         self.first_held = layout.take(old)
-        counts = (nx, old, new, new, new * (n + old + s), inputs * acting, old * acting, new, new)
+        counts = (whole, old, new, new, new * (n + old + s), inputs * acting, old * acting, new, new)
         self.policy = {name: layout.series(size, steps) for name, size in zip(POLICY_SERIES, counts, strict=True)}
-        self.nominal, self.clock, self.smoothing = layout.take(np_), layout.take(1), layout.take(1)
+        self.nominal, self.weights = layout.take(np_), layout.series(added, steps)
+        self.clock, self.smoothing = layout.take(1), layout.take(1)
         self.shared = Place(begun, layout.size - begun)
-        self.length, self.share, self.statics, self.p = (layout.take(size) for size in (1, 1, s, np_))
+        self.length, self.share, self.statics, self.constants = (layout.take(size) for size in (1, 1, s, np_ + more))
+        self.p = Place(self.constants.offset, np_)
         self.off, self.cost = layout.take(n), layout.take(1)
-        self.x, self.held, self.v = (
-            layout.series(nx, steps + 1),
+        self.whole, self.held, self.v = (
+            layout.series(whole, steps + 1),
             layout.series(old, steps + 1),
             layout.series(new, steps),
         )
+        self.x = Place(self.whole.offset, nx, self.whole.stride)
+        self.sums = Place(self.whole.offset + nx, summed, self.whole.stride)
         self.inputs = layout.series(inputs, steps)
         self.given = Place(self.inputs.offset, m, self.inputs.stride)
         self.u = self.given if self.rollout.feedback is None else layout.take(m)
@@ -208,27 +257,35 @@ class PolicyPlaces:
     def outputs(self) -> dict[str, Place]:
         """Return all steps of each series in order; empty series are left out."""
         steps = self.rollout.steps
-        series = {"x": (self.x, steps + 1), "u": (self.inputs, steps), "new": (self.v, steps)}
+        series = {"x": (self.whole, steps + 1), "u": (self.inputs, steps), "new": (self.v, steps)}
         whole = {name: Place(place.offset, place.size * count) for name, (place, count) in series.items()}
         return {name: place for name, place in (whole | {"cost": self.cost}).items() if place.size}
 
 
-def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts | None) -> Program:
+def policy_program(
+    step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts | None, sums: RunningSums | None = None
+) -> Program:
     """Return the program of a rollout under a policy, with the outputs ``x``, ``u``, ``new`` and ``cost``."""
-    places = PolicyPlaces(step, sizes)
+    places = PolicyPlaces(step, sizes, sums)
     steps, tangent, policy = step.rollout.steps, step.tangent, places.policy
+    about = Place(policy["x"].offset, places.x.size, policy["x"].stride)
+    off = Place(places.off.offset, tangent.size)
     decided = (places.length, places.share, places.statics, places.off, places.held)
     physics = step_calls(places, step.exact)
     # Each step: deviation from the plan, decision of the policy, controllers and physics.
     body = [
-        FunctionCall(tangent.distance, (policy["x"], places.x, places.nominal), (places.off,)),
+        FunctionCall(tangent.distance, (about, places.x, places.nominal), (off,)),
+        *_sums_apart(places, about, off),
         FunctionCall(
-            decide(sizes, tangent.size),
+            decide(sizes, places.off.size),
             (*decided, *(policy[name] for name in POLICY_SERIES[1:])),
             (places.v, places.inputs, places.held.later()),
         ),
         *physics.body,
     ]
+    if sums is not None:
+        seen = (places.whole, places.x.later(), places.given, places.constants, places.tick, places.weights)
+        body.append(FunctionCall(sums.function, seen, (places.sums.later(),)))
     epilogue: tuple[FunctionCall, ...] = ()
     # Costs of the states before and after each step, and of the last state.
     if costs is not None:
@@ -258,11 +315,21 @@ def policy_program(step: LinearizedStep, sizes: PolicySizes, costs: RunningCosts
     )
 
 
+def _sums_apart(places: PolicyPlaces, about: Place, off: Place) -> list[FunctionCall]:
+    """Return the call for the last entries of the deviation from the plan: how far sums are from those of the plan."""
+    if not (count := places.sums.size):
+        return []
+    plan, found = ca.SX.sym("plan", count), ca.SX.sym("found", count)
+    apart = ca.Function("sums_apart", [plan, found], [found - plan])
+    planned = Place(about.offset + about.size, count, about.stride)
+    return [FunctionCall(apart, (planned, places.sums), (Place(off.offset + off.size, count),))]
+
+
 def _prologue(step: LinearizedStep, places: PolicyPlaces) -> tuple[FunctionCall, ...]:
     """Return the calls for the start of a lane and the times and numbers of all states."""
     row, clock, steps = ca.SX.sym("row", places.row.size), ca.SX.sym("clock"), step.rollout.steps
     held, p = ca.SX.sym("held", places.first_held.size), ca.SX.sym("p", places.p.size)
-    taken = (places.length, places.share, places.statics, places.p, places.x.still())
+    taken = (places.length, places.share, places.statics, places.constants, places.whole.still())
     ends = np.cumsum([0, *(each.size for each in taken)]).tolist()
     cut = [row[a:b] for a, b in pairwise(ends)]
     first = ca.Function("first", [row, held], [*cut, held])
@@ -284,7 +351,7 @@ def decide(sizes: PolicySizes, n: int) -> ca.Function:
     Matrices are row by row.
     """
     # Symbols; matrices are given row by row.
-    old, new, inputs, s = sizes
+    old, new, inputs, s, _ = sizes
     acting, beside = old + new, n + old + s
     length, share = ca.SX.sym("length"), ca.SX.sym("share")
     statics, off, held = ca.SX.sym("statics", s), ca.SX.sym("off", n), ca.SX.sym("held", old)

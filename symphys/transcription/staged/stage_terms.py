@@ -28,7 +28,7 @@ from symphys.problem import Constraint, Cost, Problem, Target
 from symphys.records import dataclass
 from symphys.suggest import quote
 from symphys.transcription.formula_names import spans
-from symphys.transcription.identities import motion_identity
+from symphys.transcription.identities import terms_identity
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.tangent import Tangent
 from symphys.transcription.terms import Term, over_time, problem_terms
@@ -335,10 +335,16 @@ def stage_terms(symbols: StageSymbols) -> list[StageTerm]:
 
     The weighted sum of costs and squares is the objective. Limits are in the order of the problem's constraints.
     """
-    found = [*_Terms(symbols).all(), *_sums(symbols)]
-    identity = motion_identity(symbols.rollout, "sizes of terms", [term.key for term in found])
+    found = [*_Terms(symbols, symbols.rollout).all(), *_sums(symbols)]
+    identity = terms_identity(symbols.rollout, "sizes of terms", [term.key for term in found])
     sizes = from_cache(lambda: [int(term.value.shape[0]) for term in found], identity)
     return [_sized(term, size) for term, size in zip(found, sizes, strict=True)]
+
+
+def reweighted(symbols: StageSymbols, terms: Sequence[StageTerm], rollout: Rollout) -> list[StageTerm]:
+    """Return terms of ``stage_terms`` with the weights of another rollout, whose problem differs in weights only."""
+    others = [*_Terms(symbols, rollout).all(), *_sums(symbols)]
+    return [replace(term, weight=other.weight) for term, other in zip(terms, others, strict=True)]
 
 
 def _sized(term: StageTerm, size: int) -> StageTerm:
@@ -349,8 +355,8 @@ def _sized(term: StageTerm, size: int) -> StageTerm:
 class _Terms:
     """Makes the terms of a problem's tables."""
 
-    def __init__(self, symbols: StageSymbols) -> None:
-        self.symbols, self.rollout = symbols, symbols.rollout
+    def __init__(self, symbols: StageSymbols, rollout: Rollout) -> None:
+        self.symbols, self.rollout = symbols, rollout
         self.free = self.rollout.problem.free_duration
 
     def all(self) -> Iterator[StageTerm]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -12,14 +14,14 @@ import numpy as np
 from symphys.codegen.backends import BEST, PRECISIONS, Description
 from symphys.dynamics.observation import SensedState, joint_turn, named_sensors, sensor_readings
 from symphys.model.state_layout import Layout
-from symphys.problem import STEP_LENGTH, GuessedMotion
+from symphys.problem import STEP_LENGTH, GuessedMotion, Problem
 from symphys.problem.guess import ball_joints, guessable, is_orientation, rate_of, turn_between
 from symphys.shooting import AffinePolicy, CompiledRecursion, Expansion, Followed, Linearized, StagedMotion
 from symphys.transcription.objective import bounds
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.expansion import ExpansionSums, SquareStack, square_stacks
 from symphys.transcription.staged.linearization import Linearization, statics_of
-from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes, running_costs
+from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes, running_costs, running_sums
 from symphys.transcription.staged.stage_functions import ByColumns, StepRows
 from symphys.transcription.staged.stage_terms import Kind, StageTerm
 from symphys.transcription.staged.term_slopes import Blocks, TermGroups, TermSlopes
@@ -91,17 +93,24 @@ class RolloutStages:
         self.input_size = self.weights.shape[0] // self.steps
         self.squares = all(term.kind != "cost" for term in self.terms)
         _, self.lower, self.upper = bounds(rollout)
-        limits = [term for term in self.terms if term.kind == "limit"]
-        counts = [len(term.steps) * term.size for term in limits]
-        self.penalties = np.repeat(np.array([term.weight for term in limits], float), counts)
-        always = [each.at == "always" for each in rollout.problem.constraints]
-        self.lasting = np.repeat(np.array(always, bool), counts)
+        self.penalties = self._of_limits([term.weight for term in self.terms if term.kind == "limit"], float)
+        self.lasting = self._of_limits([each.at == "always" for each in rollout.problem.constraints], bool)
 
-    def sharing(self, rollout: Rollout) -> RolloutStages:
-        """Return the stages of a rollout with an equal step, which is not compiled again."""
-        step = self._linearization.step
-        linearization = Linearization(rollout, step=step)
-        return RolloutStages(rollout, step.backend, step.threads, step.exact, self._priced, linearization)
+    def _of_limits(self, values: Sequence[float], kind: type) -> np.ndarray:
+        """Return one value for each number that is limited, from those of the terms."""
+        counts = [len(term.steps) * term.size for term in self.terms if term.kind == "limit"]
+        return np.repeat(np.array(values, kind), counts)
+
+    def weighted(self, problem: Problem) -> RolloutStages:
+        """Return the stages of a problem that differs in weights only; all functions are shared."""
+        assert not self._priced, "merits along the motion have weights in them"
+        found = copy(self)
+        found.rollout = replace(self.rollout, problem=problem)
+        found._groups = self._groups.weighted(found.rollout)
+        found.terms = found._groups.terms
+        found.penalties = found._of_limits([term.weight for term in found.terms if term.kind == "limit"], float)
+        vars(found).pop("_stacks", None)
+        return found
 
     def begin(self, x: Array, time: float) -> None:
         """Let motions begin at a state (nx,) and time [s]; requires a fixed duration and no sums."""
@@ -169,9 +178,12 @@ class RolloutStages:
             return after
         after = np.concatenate([after, X[:, plain.shape[1] :]], axis=1)
         ticks = np.broadcast_to(np.asarray(k), (len(X),))
+        return self._groups.summed(StepRows(X, after, U[:, : self._given], self._constants_of_steps(Z), ticks))
+
+    def _constants_of_steps(self, Z: Array) -> Array:
+        """Return (B, c) the numbers of terms that are constant along each motion."""
         _, p, starts = self._begun(Z)
-        constants = np.concatenate([p, Z[:, self._groups.symbols.named], starts], axis=1)
-        return self._groups.summed(StepRows(X, after, U[:, : self._given], constants, ticks))
+        return np.concatenate([p, Z[:, self._groups.symbols.named], starts], axis=1)
 
     def states(self, Z: Array, smoothing: float) -> Array:
         """Return the states (B, N + 1, nx) of Z (B, len(z)), without sums."""
@@ -197,20 +209,22 @@ class RolloutStages:
         smoothing: float,
         shares: Array | float = 1.0,
     ) -> Followed | None:
-        """Return the motions of step lengths (B,); None with sums, and without a compiler."""
+        """Return the motions of step lengths (B,); None without a compiler."""
+        x, constants, _ = self._distinct(Z)
         if self._sums:
-            return None
-        sizes = PolicySizes(policy.old.shape[1], policy.new.shape[1], self.input_size, len(self.statics))
+            constants = self._constants_of_steps(Z)
+        more = constants.shape[1] - int(self.rollout.p.shape[0])
+        sizes = PolicySizes(policy.old.shape[1], policy.new.shape[1], self.input_size, len(self.statics), more)
         if self._rolled is None or self._rolled.sizes != sizes:
             costs = running_costs(self._groups.symbols, self.terms) if self._priced else None
             threads = 1 if self._priced else self._linearization.step.threads
-            self._rolled = PolicyRollout(self._linearization.step, sizes, costs, threads)
+            sums = running_sums(self._groups.symbols, self.terms)
+            self._rolled = PolicyRollout(self._linearization.step, sizes, costs, threads, sums)
         if self._rolled.kernel is None:
             return None
-        x, p, _ = self._distinct(Z)
         off = Z[:, self.statics] - about[self.statics]
         clock = self._linearization.step.clock
-        motions = self._rolled(x, p, policy, lengths, smoothing, clock, off, shares)
+        motions = self._rolled(x, constants, policy, lengths, smoothing, clock, off, shares)
         return motions.x, motions.u, motions.new, motions.cost if self._rolled.costs else None
 
     _rolled: PolicyRollout | None = None

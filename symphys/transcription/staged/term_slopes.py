@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -12,10 +13,17 @@ import numpy as np
 
 from symphys.codegen.toolchain.warm_start import from_cache
 from symphys.records import dataclass
-from symphys.transcription.identities import motion_identity
+from symphys.transcription.identities import terms_identity
 from symphys.transcription.rollout import Rollout
 from symphys.transcription.staged.stage_functions import ReadingFunction, StageFunctions, StepRows, reading
-from symphys.transcription.staged.stage_terms import Kind, StageSymbols, StageTerm, motion_sums, stage_terms
+from symphys.transcription.staged.stage_terms import (
+    Kind,
+    StageSymbols,
+    StageTerm,
+    motion_sums,
+    reweighted,
+    stage_terms,
+)
 from symphys.transcription.staged.tangent import Tangent
 from symphys.types import Array, Expr, Ints
 
@@ -112,7 +120,7 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
         shared = known[term.key]
         function = ReadingFunction(shared.function.function, shared.function.reads, term.after)
         return TermSlopes(function, shared.slopes, shared.curved, shared.parts, shared.bases, shared.acting)
-    identity = motion_identity(symbols.rollout, "slopes of a term", term.key, term.after)
+    identity = terms_identity(symbols.rollout, "slopes of a term", term.key, term.after)
     kinds = TermSlopes, ReadingFunction, Pattern
     found = known[term.key] = from_cache(lambda: _made_slopes(symbols, term), identity, kinds)
     return found
@@ -246,6 +254,18 @@ class TermGroups:
         for number, term in enumerate(self.terms):
             groups.setdefault((term.steps.tobytes(), term.kind == "sum"), []).append(number)
         self._groups = [_Group(numbers, sums) for (_, sums), numbers in groups.items()]
+        # Functions, made when they are first asked for.
+        self._slopes: dict[int, TermSlopes] = {}
+        self._known: dict[Any, TermSlopes] = {}
+        self._sloped: dict[frozenset[Kind], list[tuple[list[int], StageFunctions]]] = {}
+        self._full_slope_functions: dict[Any, StageFunctions] = {}
+
+    def weighted(self, rollout: Rollout) -> TermGroups:
+        """Return the terms with the weights of a rollout that differs in these only; functions are shared."""
+        _ = self._values
+        found = copy(self)
+        found.terms = reweighted(self.symbols, self.terms, rollout)
+        return found
 
     def values(self, X: Array, U: Array, constants: Array) -> list[tuple[StageTerm, Array]]:
         """Return (B, T, r) of each term but sums, from states (B, N + 1, nx), inputs (B, N, m), constants (B, c)."""
@@ -286,16 +306,12 @@ class TermGroups:
 
     def full_state_slopes(self, term: StageTerm, rows: StepRows) -> Array:
         """Return (r, nx) slopes of a term in step 0 by all numbers of the state before it."""
-        key = id(term)
+        key = term.key, term.after
         if key not in self._full_slope_functions:
             self._full_slope_functions[key] = StageFunctions([raw_slopes(self.symbols, term)], 1, "casadi", 1)
         ((x, first),) = self._full_slope_functions[key](_rows(rows, np.array([0])))
         found = first if term.after else x
         return found.reshape(term.size, -1)[:, : self.symbols.state_size]
-
-    @cached_property
-    def _full_slope_functions(self) -> dict[int, StageFunctions]:
-        return {}
 
     @cached_property
     def _values(self) -> list[StageFunctions]:
@@ -305,7 +321,7 @@ class TermGroups:
             return [known[term.key] for term in self.terms]
 
         made = from_cache(
-            make, motion_identity(self.symbols.rollout, "terms", [term.key for term in self.terms]), (ReadingFunction,)
+            make, terms_identity(self.symbols.rollout, "terms", [term.key for term in self.terms]), (ReadingFunction,)
         )
         pairs = zip(made, self.terms, strict=True)
         functions = [ReadingFunction(each.function, each.reads, term.after) for each, term in pairs]
@@ -313,20 +329,6 @@ class TermGroups:
             self._together([functions[i] for i in group.numbers], group.numbers, MOTIONS_PER_CALL)
             for group in self._groups
         ]
-
-    @cached_property
-    def _slopes(self) -> dict[int, TermSlopes]:
-        """The slopes by the number of a term, computed on demand."""
-        return {}
-
-    @cached_property
-    def _known(self) -> dict[Any, TermSlopes]:
-        return {}
-
-    @cached_property
-    def _sloped(self) -> dict[frozenset[Kind], list[tuple[list[int], StageFunctions]]]:
-        """The functions by kinds of terms, with the numbers of terms at the same steps."""
-        return {}
 
     def _of_kinds(self, kinds: frozenset[Kind]) -> list[tuple[list[int], StageFunctions]]:
         if kinds not in self._sloped:
