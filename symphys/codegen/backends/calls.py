@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -49,22 +51,28 @@ def row_by_row(function: Function, *arguments: ArrayLike) -> list[Array]:
     given = [np.asarray(argument, float) for argument in arguments]
     count = next((len(argument) for argument in given if argument.ndim > 1), 1)
     flat = [each.reshape(count, each.size // max(count, 1)) if each.ndim > 1 else each for each in given]
-    rows = [np.ascontiguousarray(np.broadcast_to(each, (count, each.shape[-1]))) for each in flat]
-    found = [np.zeros((count, function.numel_out(i))) for i in range(function.n_out())]
+    rows = np.concatenate([np.broadcast_to(each, (count, each.shape[-1])) for each in flat], axis=1)
     places = [np.array(function.sparsity_out(i).find(), int) for i in range(function.n_out())]
-    nonzeros = [np.zeros((count, own.size)) for own in places]
+    # One call after the other, from and to rows that stay where they are.
+    row, result = np.zeros(rows.shape[1]), np.zeros(sum(own.size for own in places))
+    nonzeros = np.zeros((count, result.size))
     buffer, evaluate = function.buffer()
-    given_rows, found_rows = [*enumerate(rows)], [*enumerate(nonzeros)]
+    begins = np.cumsum([0, *(each.shape[-1] for each in flat)]).tolist()
+    for i, (begin, end) in enumerate(pairwise(begins)):
+        buffer.set_arg(i, row[begin:end].data)
+    ends = np.cumsum([0, *(own.size for own in places)]).tolist()
+    for i, (begin, end) in enumerate(pairwise(ends)):
+        buffer.set_res(i, result[begin:end].data)
+    failed = buffer.ret
     for k in range(count):
-        for i, argument in given_rows:
-            buffer.set_arg(i, argument[k].data)
-        for i, values in found_rows:
-            buffer.set_res(i, values[k].data)
+        row[:] = rows[k]
         evaluate()
-        if buffer.ret():
+        if failed():
             raise RuntimeError(f"the evaluation of {function.name()} failed")
-    for into, own, values in zip(found, places, nonzeros, strict=True):
-        into[:, own] = values
+        nonzeros[k] = result
+    found = [np.zeros((count, function.numel_out(i))) for i in range(function.n_out())]
+    for into, own, begin in zip(found, places, ends, strict=False):
+        into[:, own] = nonzeros[:, begin : begin + own.size]
     return found
 
 
