@@ -25,6 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, astuple, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -492,15 +493,18 @@ class Race:
             )
             return self.cma, replace(self.compared, smoothing=last), sought
         patience = {"patience": PATIENCE} if self.finisher is ILQR else {}
+        asking = self.problem.asking if self.finisher is ILQR else None
         if kind == POLISH:
             own = self.finisher.Options(iterations=options.finisher_iterations, **patience)
-            return self.finisher, replace(self.problem, smoothing=last), own
+            polished = replace(self.problem, smoothing=last)
+            return self.finisher, polished if asking is None else replace(polished, staged=partial(asking, None)), own
         meeting = replace(self.problem, stop_when_met=True)
         if kind in (FINISH, ASKED, *HOPS):
             meeting = replace(meeting, smoothing=last)
-        if kind != OWN and self.finisher is ILQR and self.problem.asking is not None:
-            staged = self.problem.asking(start)
-            meeting = replace(meeting, staged=lambda: staged, measure=self.compared.measure)
+        if asking is not None and kind == OWN:
+            meeting = replace(meeting, staged=partial(asking, None))
+        elif asking is not None:
+            meeting = replace(meeting, staged=partial(asking, start), measure=self.compared.measure)
         iterations = TRY_ITERATIONS if kind in TRIES else options.finisher_iterations * self._growth
         return self.finisher, meeting, self.finisher.Options(iterations=iterations, **patience)
 
@@ -722,7 +726,8 @@ def solve(
     """Solve as ``interface.Solve`` has it."""
     race = Race(problem, options, seed, monitor, log or ignore_log, keep)
     if race.finisher is ILQR and problem.staged is not None:
-        problem.staged().prepare(slopes=over_time(problem))  # few numbers may be found before any slope is needed
+        staged = problem.asking(None) if problem.asking is not None else problem.staged()
+        staged.prepare(slopes=over_time(problem))  # few numbers may be found before any slope is needed
     return race.run(start, checkpoint)
 
 

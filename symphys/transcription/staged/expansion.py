@@ -196,7 +196,7 @@ class SquareStack:
         self._limited = np.flatnonzero((whole >= 0).any(axis=0))
         self._limits = whole[:, self._limited]
         self._lower, self._upper = (np.append(each, 0.0)[self._limits] for each in bounds)
-        what = "stack", at_steps, static, *(term.key for term in distinct)
+        what = "stack", symbols.tangent.kind, at_steps, static, *(term.key for term in distinct)
 
         def made_stack() -> tuple[StackSlopes, StageFunctions]:
             made = from_cache(

@@ -55,6 +55,14 @@ class Linearization:
         """Return the same with an equal step that may be compiled already."""
         return Linearization(self.rollout, step=step)
 
+    def without_forces(self) -> Linearization:
+        """Return the same motions with tangents without forces; see ``ReducedTangent``."""
+        from symphys.transcription.staged.reduced_tangent import ReducedTangent
+
+        own, tangent = self.step, ReducedTangent(self.rollout)
+        step = LinearizedStep(self.rollout, tangent, own.backend, own.threads, own.exact, wait=own.wait, values=own)
+        return Linearization(self.rollout, step=step)
+
     def motion(self, z: ArrayLike, smoothing: float, start: Array | None = None) -> StagedMotion:
         """Return the motion of z (len(z),), from its own first state or another one (nx,)."""
         given = np.asarray(z, float)

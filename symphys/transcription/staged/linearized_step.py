@@ -58,6 +58,7 @@ class LinearizedStep:
         parameters: whether there are slopes by p; without, those are 0.
         clock: [s] the time at which step 0 begins; of a rollout whose duration does not vary.
         wait: for the compiler; else an interpreter evaluates until it is done.
+        values: an equal step with another tangent, which takes the steps; None: this one does.
     """
 
     rollout: Rollout
@@ -68,6 +69,7 @@ class LinearizedStep:
     parameters: bool = True
     clock: float = 0.0
     wait: bool = False
+    values: LinearizedStep | None = None
     _note: str = field(default="", init=False)
     _step_note: str = field(default="", init=False)
     _seconds: float = field(default=0.0, init=False)
@@ -80,6 +82,8 @@ class LinearizedStep:
 
     def step(self, k: int | NDArray[np.int64], X: ArrayLike, U: ArrayLike, P: ArrayLike, smoothing: float) -> Array:
         """Return states (B, nx) after step ``k``, or steps k (B,), from X (B, nx), U (B, m), P (B, np) or (np,)."""
+        if self.values is not None:
+            return self.values.step(k, X, U, P, smoothing)
         states = np.asarray(X, float)
         if isinstance(self._step, _ByKernel) and self._step.lends(len(states)):
             return self._step.lend(len(states), lambda batch: self._few(batch, k, states, U, P, smoothing))
@@ -88,6 +92,8 @@ class LinearizedStep:
 
     def roll(self, first: Array, U: Array, P: Array, smoothing: float) -> Array:
         """Return the states (B, N + 1, nx) of rollouts from first states (B, nx), U (B, N, m) and P (B, np)."""
+        if self.values is not None:
+            return self.values.roll(first, U, P, smoothing)
         count, steps = U.shape[:2]
         X = np.empty((count, steps + 1, first.shape[1]))
         X[:, 0] = first
@@ -232,7 +238,8 @@ class LinearizedStep:
     def prepare(self, slopes: bool) -> None:
         """Compile the step; with ``slopes`` begin to compile these, once the step no longer needs the processors."""
         began = perf_counter()
-        kernel = self._step.kernel if isinstance(self._step, _ByKernel) else None
+        step = (self.values or self)._step
+        kernel = step.kernel if isinstance(step, _ByKernel) else None
         widths = kernel.widths if isinstance(kernel, ProcessorKernel) else None
         if widths is not None:
             widths.begin()
@@ -246,6 +253,8 @@ class LinearizedStep:
     @property
     def evaluator(self) -> Description:
         """Describe the evaluator of next states, with the seconds that were spent on it so far."""
+        if self.values is not None:
+            return self.values.evaluator
         began, step = perf_counter(), self._step
         self._seconds += perf_counter() - began
         if isinstance(step, _ByKernel):
@@ -292,7 +301,7 @@ class LinearizedStep:
         ``how``: all that the program depends on besides the step.
         """
         step, varied = step_identity(self.rollout, self.exact), self.arguments.varied.tolist()
-        identity = None if step is None or None in how else identity_of(step, varied, what, *how)
+        identity = None if step is None or None in how else identity_of(step, varied, self.tangent.kind, what, *how)
         return ProgramSource(make, identity)
 
     def _kernel(self, source: ProgramSource) -> Kernel:

@@ -112,6 +112,13 @@ class RolloutStages:
         vars(found).pop("_stacks", None)
         return found
 
+    def without_forces(self) -> RolloutStages:
+        """Return the same stages with tangents without forces; these themselves where there are none."""
+        own, other = self._linearization.step, self._linearization.without_forces()
+        if other.tangent.size == self.tangent.size:
+            return self
+        return RolloutStages(self.rollout, own.backend, own.threads, own.exact, self._priced, other)
+
     def begin(self, x: Array, time: float) -> None:
         """Let motions begin at a state (nx,) and time [s]; requires a fixed duration and no sums."""
         assert not self._sums and not self.rollout.problem.free_duration

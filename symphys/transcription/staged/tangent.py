@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -237,6 +238,7 @@ class Tangent:
     """
 
     rollout: Rollout
+    kind: ClassVar[str] = "with forces"
 
     @cached_property
     def size(self) -> int:
@@ -363,11 +365,17 @@ class Tangent:
         world, scheme = self.rollout.world, self.rollout.problem.simulation.scheme()
         of_bodies = {f"{body.name}.{field}" for body in world.bodies for field, _ in BODY_FIELDS}
         in_trees = {joint.unwrapped for joint in self._in_trees}
-        names = [name for name in self._layout.names() if name not in of_bodies | in_trees and name != "lag"]
+        implied = of_bodies | in_trees | self._left_out
+        names = [name for name in self._layout.names() if name not in implied and name != "lag"]
         if max_splits(world, scheme) or self.rollout.problem.free_duration:  # half a step, without impacts
             names.append("lag")
         parts = [(name, self._layout[name]) for name in names]
         return tuple((name, part.stop - part.start) for name, part in parts)
+
+    @cached_property
+    def _left_out(self) -> frozenset[str]:
+        """Return the parts of the state that stay as they are, whatever the tangent."""
+        return frozenset()
 
     @cached_property
     def _in_trees(self) -> tuple[Joint, ...]:
@@ -408,24 +416,20 @@ class Tangent:
 
     def _retracted(self, x: Expr, d: Expr) -> Expr:
         old, cursor = self._parts(x), _Cursor(d)
-        new = dict(old)
-        # Poses and velocities: free bodies directly, trees in joint coordinates.
+        new, faster = dict(old), list[Expr]()
+        # Poses: of free bodies directly, of trees in joint coordinates.
         for index, chart in self._charts:
-            bodies = (index,) if chart is None else chart.tree.bodies
-            poses, moving = ({i: self._pair(old, i, fields) for i in bodies} for fields in (POSES, VELOCITIES))
+            poses = self._pairs(old, index, chart, POSES)
             if chart is None:
-                (place, turned), (velocity, spin) = poses[index], moving[index]
-                more = [cursor.take(3) for _ in range(4)]
-                moved = {index: (place + more[0], rotation.multiply(rotation.exponential(more[1]), turned))}
-                after = {index: (velocity + more[2], spin + more[3])}
+                (place, turned), (along, about) = poses[index], (cursor.take(3), cursor.take(3))
+                moved = {index: (place + along, rotation.multiply(rotation.exponential(about), turned))}
             else:
                 along = cursor.take(chart.tree.size)
                 moved = chart.displaced(poses, along)
                 new |= chart.displaced_angles(old, along)
-                after = _transport_velocities(chart, poses, moving, moved, cursor.take(chart.tree.size))
-            for i in bodies:
-                self._set_pair(new, i, POSES, moved[i])
-                self._set_pair(new, i, VELOCITIES, after[i])
+            faster.append(cursor.take(6 if chart is None else chart.tree.size))
+            for i, pose in moved.items():
+                self._set_pair(new, i, POSES, pose)
         # Entries that are their own tangent; whole turns follow the poses.
         turned = self._angle_changes(old, new)
         for name, size in self._plain_parts:
@@ -439,6 +443,17 @@ class Tangent:
                 new[f"{body.name}.{field}"] = old[f"{body.name}.{field}"] + (b - a)
         for name, each in others.items():
             new[name] += each
+        # Velocities: of free bodies directly, of trees as rates.
+        for (index, chart), more in zip(self._charts, faster, strict=True):
+            poses, moving = (self._pairs(old, index, chart, fields) for fields in (POSES, VELOCITIES))
+            rates = more + self._kick_change(old, new, index, chart)
+            if chart is None:
+                velocity, spin = moving[index]
+                after = {index: (velocity + rates[:3], spin + rates[3:])}
+            else:
+                after = _transport_velocities(chart, poses, moving, self._pairs(new, index, chart, POSES), rates)
+            for i, each in after.items():
+                self._set_pair(new, i, VELOCITIES, each)
         return ca.vertcat(self._layout.pack(new), x[self._layout.size :] + d[cursor.at :])
 
     def _difference(self, x: Expr, y: Expr) -> Expr:
@@ -446,16 +461,17 @@ class Tangent:
         found: list[Expr] = []
         # Poses and velocities: free bodies directly, trees in joint coordinates.
         for index, chart in self._charts:
-            bodies = (index,) if chart is None else chart.tree.bodies
-            places = [{i: self._pair(state, i, POSES) for i in bodies} for state in (old, new)]
-            moving = [{i: self._pair(state, i, VELOCITIES) for i in bodies} for state in (old, new)]
+            places = [self._pairs(state, index, chart, POSES) for state in (old, new)]
+            moving = [self._pairs(state, index, chart, VELOCITIES) for state in (old, new)]
             if chart is None:
                 before, after = (each[index] for each in places)
                 found += [after[0] - before[0], rotation.between(before[1], after[1])]
-                found += [b - a for a, b in zip(moving[0][index], moving[1][index], strict=True)]
+                faster = ca.vertcat(*(b - a for a, b in zip(moving[0][index], moving[1][index], strict=True)))
             else:
                 rates = [chart.rates(*each) for each in zip(places, moving, strict=True)]
-                found += [chart.difference(places[0], places[1], (old, new)), rates[1] - rates[0]]
+                found.append(chart.difference(places[0], places[1], (old, new)))
+                faster = rates[1] - rates[0]
+            found.append(faster - self._kick_change(old, new, index, chart))
         # Entries that are their own tangent; whole turns follow the poses.
         turned = self._angle_changes(old, new)
         found += [new[name] - old[name] - turned.get(name, 0) for name, _ in self._plain_parts]
@@ -467,6 +483,10 @@ class Tangent:
                 if (name := f"{body.name}.{field}") in self._independent_reactions:
                     found.append(new[name] - old[name] - (second[k] - first[k]))
         return ca.vertcat(ca.SX(0, 1), *found, y[self._layout.size :] - x[self._layout.size :])
+
+    def _kick_change(self, old: Parts, new: Parts, index: int, chart: JointCoordinateChart | None) -> Expr | float:
+        """Return what changes of velocity or rates, (6,) or (size,), are no part of the tangent."""
+        return 0.0
 
     def _at_fixed_errors(self, old: Parts) -> tuple[list[tuple[Expr, Expr]], Expr]:
         """Return the state as a function of joint errors, rates and reactions: symbols with values, and the state."""
@@ -520,6 +540,12 @@ class Tangent:
     def _pair(self, state: Parts, index: int, fields: tuple[tuple[str, int], ...]) -> Pose | Moving:
         name = self.rollout.world.bodies[index].name
         return state[f"{name}.{fields[0][0]}"], state[f"{name}.{fields[1][0]}"]
+
+    def _pairs(
+        self, state: Parts, index: int, chart: JointCoordinateChart | None, fields: tuple[tuple[str, int], ...]
+    ) -> dict[int, Any]:
+        """Return poses or velocities of the bodies of a chart, or of a free body."""
+        return {i: self._pair(state, i, fields) for i in ((index,) if chart is None else chart.tree.bodies)}
 
     def _set_pair(
         self, state: dict[str, Expr], index: int, fields: tuple[tuple[str, int], ...], both: Pose | Moving

@@ -120,7 +120,7 @@ def term_slopes(symbols: StageSymbols, term: StageTerm, known: dict[Any, TermSlo
         shared = known[term.key]
         function = ReadingFunction(shared.function.function, shared.function.reads, term.after)
         return TermSlopes(function, shared.slopes, shared.curved, shared.parts, shared.bases, shared.acting)
-    identity = terms_identity(symbols.rollout, "slopes of a term", term.key, term.after)
+    identity = terms_identity(symbols.rollout, "slopes of a term", symbols.tangent.kind, term.key, term.after)
     kinds = TermSlopes, ReadingFunction, Pattern
     found = known[term.key] = from_cache(lambda: _made_slopes(symbols, term), identity, kinds)
     return found
