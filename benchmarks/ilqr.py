@@ -29,7 +29,8 @@ from symphys.solvers.core.interface import Iteration, StageContext
 from symphys.solvers.core.point import Incumbent
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
 from symphys.solvers.ddp.forward_pass import forward_pass
-from symphys.solvers.methods.ilqr import STEP_LENGTHS, Ilqr
+from symphys.solvers.ddp.iteration import STEP_LENGTHS
+from symphys.solvers.methods.ilqr import Ilqr
 from symphys.transcription import transcribe
 from symphys.transcription.rollout import symbolic_rollout
 from symphys.transcription.staged.linearization import Linearization

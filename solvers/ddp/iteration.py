@@ -20,7 +20,9 @@ from symphys.solvers.ddp.knots import PaddedKnots
 from symphys.types import Array
 
 STEP_LENGTHS = 0.5 ** np.arange(8.0)
-"""Step lengths, which are evaluated in one batch."""
+"""Step lengths of a line search, which are evaluated in two batches."""
+LONG = 4
+"""How many of them are in the first batch; most searches end there."""
 
 
 class BestMotion(NamedTuple):
@@ -31,12 +33,14 @@ class BestMotion(NamedTuple):
         value: of the augmented objective.
         length: of the step.
         expected: the fall of the objective that the policy expects of it.
+        tried: how many step lengths were evaluated.
     """
 
     motion: StagedMotion
     value: float
     length: float
     expected: float
+    tried: int
 
 
 class LocalExpansion:
@@ -78,11 +82,23 @@ class LocalExpansion:
         return backward_pass(runs, self._costs, self.knots.steps, statics, self.bounds, damping, gradient, compiled)
 
     def search(self, policy: Policy, values: Callable[[MotionBatch], Array]) -> BestMotion:
-        """Evaluate the policy with all step lengths in one batch; ``values`` (B,) of motions decide."""
-        motions = forward_pass(self.problem, self.motion, policy, self.knots, STEP_LENGTHS)
+        """Return the best motion of the policy; ``values`` (B,) of motions decide.
+
+        Half of the step lengths are evaluated only where the shortest of the others is the best.
+        """
+        best = self._best(policy, values, STEP_LENGTHS[:LONG])
+        if best.length > STEP_LENGTHS[LONG - 1] and best.value < math.inf:
+            return best
+        more = self._best(policy, values, STEP_LENGTHS[LONG:])
+        return (more if more.value < best.value else best)._replace(tried=len(STEP_LENGTHS))
+
+    def _best(self, policy: Policy, values: Callable[[MotionBatch], Array], lengths: Array) -> BestMotion:
+        """Return the best motion of some step lengths, which are evaluated in one batch."""
+        motions = forward_pass(self.problem, self.motion, policy, self.knots, lengths)
         found = values(motions)
         found = np.where(np.isfinite(found), found, math.inf)
         best = int(found.argmin())
-        length = float(STEP_LENGTHS[best])
+        length = float(lengths[best])
         expected = -(length * policy.first + length**2 * policy.second)
-        return BestMotion(motions.motion(best, self.motion.smoothing), float(found[best]), length, expected)
+        motion = motions.motion(best, self.motion.smoothing)
+        return BestMotion(motion, float(found[best]), length, expected, len(lengths))

@@ -24,7 +24,7 @@ from symphys.solvers.core.point import Point
 from symphys.solvers.ddp.backward_pass import Policy
 from symphys.solvers.ddp.forward_pass import MotionBatch
 from symphys.solvers.ddp.gains import gains_about
-from symphys.solvers.ddp.iteration import STEP_LENGTHS, BestMotion, LocalExpansion
+from symphys.solvers.ddp.iteration import BestMotion, LocalExpansion
 from symphys.solvers.ddp.knots import PaddedKnots, knot_steps
 from symphys.types import Array
 
@@ -201,7 +201,7 @@ class Ilqr(Method[IlqrState]):
     def _search(self, state: IlqrState, about: LocalExpansion, policy: Policy) -> BestMotion | None:
         """Return the best of the motions of all step lengths; None where none is low enough."""
         best = about.search(policy, lambda motions: self._values(state, motions))
-        self.evaluator.counter.add(Counts(rollouts=len(STEP_LENGTHS)))
+        self.evaluator.counter.add(Counts(rollouts=best.tried))
         if state.value - best.value < MIN_GAIN_RATIO * max(best.expected, 0.0) or best.value >= state.value:
             return None
         self._kept = best.motion

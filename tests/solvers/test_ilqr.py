@@ -16,6 +16,7 @@ from symphys.codegen.toolchain import build
 from symphys.shooting import ShootingProblem
 from symphys.solvers import Outcome, Status, solver
 from symphys.solvers.ddp.gains import follow
+from symphys.solvers.ddp.iteration import LONG
 from symphys.transcription import transcribe
 
 SWING = 98.637754
@@ -107,7 +108,7 @@ def test_budgets_seeds_and_refusals() -> None:
     refused = solve(quadratic())
     assert refused.status is Status.NOT_APPLICABLE and "step by step" in refused.advice
     counts = short.counts
-    assert counts.gradients == 3 * 4 and counts.rollouts >= 3 * 8
+    assert counts.gradients == 3 * 4 and counts.rollouts >= 3 * LONG
 
 
 @pytest.mark.parametrize(
