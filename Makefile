@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --editable
 QUICK := $(addprefix tests/,house model expression findings problem solvers/test_toys.py solvers/test_nothing_lost.py dynamics)
 
-.PHONY: viewer help demo demo-walk test test-quick test-rest test-all test-loaded test-pipelines thorough lint typecheck docs docs-links reference bench bench-list bench-compare gallery clean
+.PHONY: viewer help demo demo-walk test test-quick test-rest test-all test-loaded test-pipelines thorough lint typecheck docs docs-links reference bench bench-list bench-compare gallery release clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z -]*\):.*## /make \1\t/p' Makefile
@@ -91,6 +91,9 @@ gallery: $(VENV)/.installed  ## make the figures of the README again
 	cp build/walk/figures/quadruped_walk-strip.svg reports/gallery/
 	$(BIN)/symphys report build/gallery/ball_throw/gradient-seed0 --video reports/gallery/ball_throw.webp --film
 	$(BIN)/symphys report build/walk/quadruped_walk/stochastic-seed0 --video reports/gallery/quadruped_walk.webp --film
+
+release: $(VENV)/.developing  ## build wheel and sdist into dist/, and try both in fresh environments; publishes nothing
+	$(BIN)/python .ci/release.py $(ARGS)
 
 clean:  ## remove what the other targets made, reports aside
 	rm -rf $(VENV) build dist *.egg-info

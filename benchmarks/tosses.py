@@ -1,12 +1,14 @@
 """How well are recorded impacts of a real cube predicted?
 
-570 tosses of an acrylic cube onto a table (ContactNets, see docs/results/tosses.md); ``--data FOLDER`` has cube_fit.npz
-and cube_check.npz. Tosses of the check file are simulated open loop from their first frame, with the numbers that
-CMA-ES found on the fit file; ``--evaluations 600`` searches for them anew, in a quarter of an hour. The measure is that
-of Acosta, Yang and Posa (2022): means over frames, then over tosses, of the error of the position by the width of the
-cube, and of the angle between orientations. Then the flights before
-the first impact are identified with a start of each toss: gravity in the lengths of the recordings, and the centre of
-mass. Without data a few tosses of the engine itself are predicted and identified, whose errors are those of rounding.
+570 tosses of an acrylic cube onto a table (ContactNets; docs/results/identification.md has the sources). ``--data
+FOLDER`` has cube_fit.npz (285 tosses) and cube_check.npz (114), each with the frames of one toss after the other:
+start, position, orientation (w x y z), velocity, angular_velocity, in world axes. Tosses of the check file are
+simulated open loop from their first frame, with the numbers that CMA-ES found on the fit file; ``--evaluations 600``
+searches for them anew, in a quarter of an hour. The measure is that of Acosta, Yang and Posa (2022): means over
+frames, then over tosses, of the error of the position by the width of the cube, and of the angle between orientations.
+Then the flights before the first impact are identified with a start of each toss: gravity in the lengths of the
+recordings, and the centre of mass. Without data a few tosses of the engine itself are predicted and identified, whose
+errors are those of rounding.
 """
 
 from __future__ import annotations

@@ -1,26 +1,31 @@
-"""The site: Markdown pages of this folder, the notebook, and the reference of the package; ``make docs`` builds it."""
+"""Settings of the documentation site; ``make docs`` builds it."""
 
 from __future__ import annotations
 
 import os
 import re
+import sys
 from contextlib import suppress
 from dataclasses import is_dataclass
 from inspect import get_annotations
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from docutils.nodes import Element, Node
+from docutils.nodes import Element, Node, document, image, meta
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.util.inspect import TypeAliasForwardRef
+from sphinx.util.logging import getLogger
 
 import symphys
 import symphys.model
 import symphys.solvers
 
 ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "docs" / "lessons"))
+from notebook import write_notebooks  # noqa: E402
+
 os.environ.setdefault("SYMPHYS_CACHE", str(ROOT / "build" / "kernels"))
 
 project = "symphys"
@@ -28,7 +33,16 @@ author = "symphys contributors"
 project_copyright = author
 version = release = symphys.__version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+exclude_patterns = ["_static", "drawings"]
 smartquotes = False  # --set is no dash
 linkcheck_timeout = 20
 
@@ -61,9 +75,25 @@ nitpick_ignore_regex = [
     ("py:.*", r"(casadi|ca|cma|gymnasium|jax|matplotlib|np|npt|numpy|pandas|pydantic|torch|xarray)\..*"),
 ]
 
-# Fonts and styles lie in the site; only pages with formulas ask for MathJax on the network.
+# The theme and its colours; the logo and the favicon are drawings of this project.
 html_theme = "furo"
 html_title = f"symphys {release}"
+html_static_path = ["_static"]
+html_css_files = ["katex/katex.min.css", "symphys.css"]
+html_js_files = ["gallery.js", ("katex/render.js", {"defer": "defer"})]
+html_search_scorer = str(ROOT / "docs" / "_static" / "scorer.js")
+# Formulas: a copy of KaTeX in _static/katex; the extension writes the elements, render.js sets them.
+mathjax_path = "katex/katex.min.js"
+html_logo = "_static/logo.svg"
+html_favicon = "_static/favicon.svg"
+html_theme_options = {
+    "light_css_variables": {"color-brand-primary": "#1f5f8b", "color-brand-content": "#1f5f8b"},
+    "dark_css_variables": {"color-brand-primary": "#7fb8e0", "color-brand-content": "#7fb8e0"},
+}
+# The button of a console block copies the commands without their prompts and without what they print.
+copybutton_prompt_text = r"\$ |>>> |\.\.\. "
+copybutton_prompt_is_regexp = True
+copybutton_selector = "div:not(.highlight-text) > div.highlight pre"
 html_show_copyright = False
 html_show_sphinx = False
 html_copy_source = False
@@ -140,8 +170,53 @@ def show_shapes(app: Sphinx, what: str, name: str, described: object, options: o
             lines[k] = re.sub(r"\bsymphys\.[\w.]+\.(\w+)", lambda at: at[1] if at[1] in PUBLIC else at[0], line)
 
 
+def leave_out_of_search(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    """Keep measurements and developers' pages out of the full-text search, so that it finds the guides first."""
+    for page in env.found_docs:
+        if page.startswith("results/") or page in ("architecture", "contributing"):
+            env.metadata[page]["nosearch"] = "true"
+    return []
+
+
+SEARCHED = {
+    "lessons/index": "tutorial, getting, started, learn, course, beginner",
+    "installation": "install, setup, pip, conda, gcc, windows, macos",
+    "faq": "questions, cite, citation, bibtex",
+    "troubleshooting": "error, problem, fails, stuck, debug",
+    "comparison": "alternatives, versus",
+    "gallery": "examples, demos, shipped",
+}
+"""Words by which people search a page that does not contain them."""
+
+
+def add_keywords(app: Sphinx, page: document) -> None:
+    """Let the search find pages by other words than their own."""
+    words = SEARCHED.get(app.env.docname)
+    if words:
+        page += meta(name="keywords", content=words)
+
+
+def mark_light_figures(app: Sphinx, page: document) -> None:
+    """Mark figures on white ground, which the dark theme inverts; drawings read on both themes as they are."""
+    for figure in page.findall(image):
+        if "drawings/" not in figure["uri"] and figure["uri"].endswith((".svg", ".png")):
+            figure["classes"].append("on-white")
+
+
+def write_lessons(app: Sphinx) -> None:
+    """Write the notebooks of the lessons; a picture that is missing is a warning, as elsewhere."""
+    try:
+        write_notebooks(app)
+    except FileNotFoundError as missing:
+        getLogger(__name__).warning("no notebooks of the lessons: %s", missing)
+
+
 def setup(app: Sphinx) -> None:
     """Add what Sphinx has no option for; napoleon reads docstrings at priority 500."""
+    app.connect("builder-inited", write_lessons)
+    app.connect("doctree-read", add_keywords)
+    app.connect("doctree-read", mark_light_figures)
+    app.connect("env-updated", leave_out_of_search)
     app.connect("missing-reference", resolve_by_public_name)
     app.connect("autodoc-process-docstring", keep_bars, priority=400)
     app.connect("autodoc-process-docstring", keep_sentences, priority=600)

@@ -23,8 +23,7 @@ class SolverOptions:
     driver asks it after each iteration. Nothing else depends on which limits there are.
 
     Attributes:
-        max_seconds: the time that a solve may take [s], sessions before a break included, building and compiling not;
-            the iteration that reaches it is the last. inf: no limit.
+        max_seconds: the time that a solve may take [s], including interrupted sessions, without building and compiling.
     """
 
     __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid"}

@@ -381,18 +381,17 @@ class CmaOptions(SolverOptions):
     """Options of CMA-ES.
 
     Attributes:
-        sigma: first standard deviation, in units of scale; with ``knots`` of a quarter of the distance of bounds.
-        knots: 0: all variables are searched. Else deviations from the start are, which for each control are splines of
-            at most so many knots in time.
-        population: candidates in a generation; 0 is pycma's 4 + 3 ln n.
-        evaluations: rollouts in each stage of smoothing; the generation that reaches it is the last.
-        options: pycma's own, such as {tolfun = 1e-8, CMA_diagonal = 50}; cma.CMAOptions() lists them. With more than
-            2,000 variables the covariance is diagonal.
-        samples: of a scenario: in how many each candidate is rolled out.
-        width: how widely these vary, relative to their tables.
-        validation: samples that decide which mean of the search, or the start, is kept; 0: the last is.
-        validation_width: how widely these vary.
-        every: generations between two validations.
+        sigma: initial standard deviation, in units of scale; with ``knots``, of a quarter of the distance of bounds.
+        knots: 0: search all variables; else search deviations from the start, as splines of this many knots for each
+            control.
+        population: candidates in each generation; 0: pycma's 4 + 3 ln n.
+        evaluations: rollouts in each smoothing stage.
+        options: pycma's own options, such as {tolfun = 1e-8, CMA_diagonal = 50}; cma.CMAOptions() lists them.
+        samples: with scenarios, samples for each candidate.
+        width: spread of the samples, relative to the [[scenario]] tables.
+        validation: samples that select the best mean of the search; 0: keep the last.
+        validation_width: spread of the validation samples.
+        every: generations between validations.
     """
 
     sigma: float = 1.0

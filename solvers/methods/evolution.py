@@ -34,7 +34,7 @@ class EvolutionOptions(DescentOptions):
     """Options of the evolution strategy, added to those of ``DescentOptions``; a sample is a pair of rollouts.
 
     Attributes:
-        sigma: how far pairs lie to either side, in units of scale.
+        sigma: standard deviation of the antithetic pairs, in units of scale.
     """
 
     sigma: float = 0.03

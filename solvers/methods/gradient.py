@@ -57,19 +57,17 @@ class GradientOptions(SolverOptions):
     """Options of first-order descent.
 
     Attributes:
-        method: "spectral", "gradient", "momentum" or "adam".
-        iterations: at most, one gradient each (more where a plateau is refused), in each stage of smoothing.
-        rates: of learning, each for an equal share of the iterations; () stands for the method's own. Gradient and
-            momentum: factors on the scaled gradient. Adam: steps in units of scale. Spectral: one number, the length
-            of the first step in units of scale.
+        method: direction of a step.
+        iterations: largest number of gradients in each smoothing stage.
+        rates: learning rates, each for an equal share of the iterations; default: by method. Factors on the scaled
+            gradient (gradient, momentum), steps in units of scale (adam), or the length of the first step (spectral).
         momentum: share of the last direction that is kept.
-        betas: of Adam: share of the mean gradient and of its mean square that is kept.
+        betas: decay rates of Adam's two moments.
         clip: largest norm of the scaled gradient; a longer one is shortened to it.
-        backtracking: compare the merit with the largest of this many last ones; 1 is Armijo's rule,
-            0 takes every step as it comes, plateaus too.
+        backtracking: number of previous merits with whose maximum a step is compared; 1: Armijo's rule; 0: no line
+            search.
         tolerance: converged where the projected scaled gradient is below tolerance * (1 + |merit|).
-        patience: stalled where the merit has not fallen by 1e-5 of itself in so many iterations at the last of the
-            rates; 0 goes on regardless.
+        patience: stalled after this many iterations without a relative decrease of 1e-5; 0: never.
     """
 
     method: Literal["spectral", "gradient", "momentum", "adam"] = "spectral"

@@ -45,12 +45,12 @@ class IlqrOptions(SolverOptions):
     """Options of iLQR.
 
     Attributes:
-        iterations: linearisations at most, in each stage of smoothing.
-        damping: first lambda, added to the curvature of the objective by each knot, in units of its scale.
-        tolerance: converged where the expected fall is below tolerance * (1 + |objective|).
-        patience: stalled where the objective has not fallen by 1e-5 of itself in so many iterations; 0 goes on.
-        penalty: first penalty of the constraints, as a factor on their own.
-        growth: factor on the penalty where constraints do not come nearer.
+        iterations: largest number of linearisations in each smoothing stage.
+        damping: initial regularisation of the control Hessian, in units of scale.
+        tolerance: converged where the expected decrease is below tolerance * (1 + |objective|).
+        patience: stalled after this many iterations without a relative decrease of 1e-5; 0: never.
+        penalty: initial factor on the penalties of the constraints.
+        growth: factor on the penalty when violations do not decrease.
     """
 
     iterations: int = 300

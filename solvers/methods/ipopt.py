@@ -137,10 +137,10 @@ class IpoptOptions(SolverOptions):
     """Options of IPOPT.
 
     Attributes:
-        iterations: at most, in each stage of smoothing.
+        iterations: largest number in each smoothing stage.
         tolerance: IPOPT's tol, on its scaled optimality error.
-        hessian: "limited-memory" or "exact".
-        options: IPOPT's own, such as {mu_strategy = "adaptive"}, passed on as they are.
+        hessian: BFGS approximation or exact second derivatives.
+        options: IPOPT's own options, such as {mu_strategy = "adaptive"}.
     """
 
     iterations: int = 300

@@ -56,11 +56,11 @@ class LeastSquaresOptions(SolverOptions):
     """Options of Levenberg-Marquardt.
 
     Attributes:
-        iterations: Jacobians at most (more where a plateau is refused), in each stage of smoothing.
-        damping: first lambda, as a share of the largest squared column of the first scaled Jacobian.
-        tolerance: converged where the projected scaled gradient is below tolerance * (1 + merit), or where no column
-            of the Jacobian is nearer to the residuals than this cosine.
-        patience: stalled where the merit has not fallen by 1e-5 of itself in so many iterations; 0 goes on regardless.
+        iterations: largest number of Jacobians in each smoothing stage.
+        damping: initial lambda, relative to the largest squared column norm of the scaled Jacobian.
+        tolerance: converged where the projected scaled gradient is below tolerance * (1 + merit), or the cosines
+            between residuals and Jacobian columns below tolerance.
+        patience: stalled after this many iterations without a relative decrease of 1e-5; 0: never.
     """
 
     iterations: int = 100

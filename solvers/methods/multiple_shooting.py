@@ -71,14 +71,13 @@ class MultipleShootingOptions(SolverOptions):
     """Options of multiple shooting.
 
     Attributes:
-        iterations: at most, in each stage of smoothing.
-        tolerance: on the scaled optimality error of IPOPT or FATROP; defects are at most so large.
-        steps_between_nodes: a node every so many steps; 0: so many that there are at most 40 intervals.
-        backend: "ipopt" or "fatrop", which factorises stage after stage.
-        hessian: "gauss-newton" leaves the curvature of the steps and of the constraints out; "exact" has it, by
-            differences of slopes, and is what FATROP goes on with where it finds no step; "limited-memory" is IPOPT's
-            own approximation. "auto": exact where a cost is no sum of squares, else gauss-newton.
-        options: those of IPOPT, such as {mu_strategy = "adaptive"}, or of FATROP, passed on as they are.
+        iterations: largest number in each smoothing stage.
+        tolerance: on the scaled optimality error; also bounds the defects.
+        steps_between_nodes: steps in each shooting interval; 0: at most 40 intervals.
+        backend: NLP solver; FATROP factorises stage by stage.
+        hessian: "gauss-newton" omits the curvature of steps and constraints, "exact" includes it, "limited-memory" is
+            IPOPT's; "auto": gauss-newton if all costs are sums of squares, else exact.
+        options: options of IPOPT, such as {mu_strategy = "adaptive"}, or of FATROP.
     """
 
     iterations: int = 200

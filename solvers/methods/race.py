@@ -105,13 +105,12 @@ class RaceOptions(SolverOptions):
     """Options of the race.
 
     Attributes:
-        finisher_iterations: in each stage of smoothing, each time it starts; and as many where what it meets is to be
-            a stationary point.
-        rounds: of the search, at most.
-        generations: of a round.
-        population: candidates of a generation.
-        knots: of the splines among which is searched, for each control.
-        sigma: first standard deviation of the search, in units of a quarter of the distance of bounds.
+        finisher_iterations: of the finisher in each smoothing stage, at each start; also of the final convergence.
+        rounds: largest number of search rounds.
+        generations: in each round.
+        population: candidates in each generation.
+        knots: of the search splines, for each control.
+        sigma: initial standard deviation of the search, in quarters of the distance of bounds.
     """
 
     finisher_iterations: int = 30

@@ -42,12 +42,12 @@ class StochasticOptions(DescentOptions):
 
     Attributes:
         clip: largest norm of each sample's scaled gradient; inf: none.
-        adjoint_discount: [1/s] how fast adjoints decay on their way back; 0: not at all. Its old name is ``forget``.
-        fallen: weight of a motion that was over before its time.
-        horizons: [s] shorter motions that gradients begin with, one after the other.
+        adjoint_discount: [1/s] decay rate of the adjoint, backwards in time.
+        fallen: weight of the gradient of a motion that ended early.
+        horizons: [s] shorter motions with which training begins, in this order.
         growth: share of the iterations that the ``horizons`` take together.
-        evolution: share of the direction that comes from values alone.
-        sigma: how far the points of these values lie from the current one, in units of scale.
+        evolution: share of the direction from an evolution strategy.
+        sigma: standard deviation of that strategy, in units of scale.
     """
 
     clip: float = 1.0

@@ -35,17 +35,17 @@ class DescentOptions(SolverOptions):
     """Options that all descents over samples share.
 
     Attributes:
-        iterations: batches, in each stage of smoothing.
-        samples: of the scenarios in a batch, the problem's own among them. Discretisations take turns.
-        width: how widely samples vary, relative to their tables.
-        rate: of Adam, in units of scale.
-        hold: share of the iterations at the full rate; from then on it falls in proportion, to ``last`` of it.
+        iterations: number of batches in each smoothing stage.
+        samples: samples in each batch, including the nominal one.
+        width: spread of the samples, relative to the [[scenario]] tables.
+        rate: learning rate of Adam, in units of scale.
+        hold: share of the iterations at the full rate, which then falls linearly.
         last: share of the rate at the end.
-        betas: of Adam: share of the mean gradient and of its mean square that is kept.
-        validation: samples that decide which point is kept, the start among them; 0: the last point is.
-        validation_width: how widely these vary.
-        every: iterations between two validations.
-        patience: share of the iterations before the first of them.
+        betas: decay rates of Adam's two moments.
+        validation: samples that select the best point; 0: keep the last.
+        validation_width: spread of the validation samples.
+        every: iterations between validations.
+        patience: share of the iterations before the first validation.
     """
 
     iterations: int = 200

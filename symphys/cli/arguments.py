@@ -28,14 +28,14 @@ settings_option = click.option(
     "assignments",
     multiple=True,
     metavar="KEY=VALUE",
-    help="Change a value of the problem file: simulation.dt=0.005, solver.cma.evaluations=2000. Repeatable.",
+    help="Change a value of the problem file, e.g. simulation.dt=0.005 or solver.cma.evaluations=2000. Repeatable.",
 )
 out_option = click.option(
     "--out",
     type=click.Path(path_type=Path, file_okay=False),
     default=REPORTS,
     show_default=True,
-    help="Folder for what is written.",
+    help="Output folder.",
 )
 
 
@@ -78,13 +78,13 @@ def sweep_options(command: F) -> F:
         multiple=True,
         metavar="KEY=VALUES",
         help="Solve for several values of a key: ball.mass=0.2:2:10 (10 values from 0.2 to 2), ball.mass=0.1:10:5:log, "
-        "ground.friction=0.2,0.5,1. Repeatable: every combination. `none`: without what the file sweeps.",
+        "ground.friction=0.2,0.5,1. Repeatable: every combination. `none` ignores the sweep in the file.",
     )
     samples = click.option(
         "--samples",
         metavar="KIND:COUNT",
-        help="Samples in place of every combination: lhs:100 (Latin hypercube), sobol:64, with a seed sobol:64:1; or "
-        "grid. Keys may then have a range without a count: ball.mass=0.2:2.",
+        help="Sample the sweep instead of solving every combination: lhs:100 (Latin hypercube), sobol:64, sobol:64:1 "
+        "(with a seed), or grid (every combination). Keys may then have a range without a count: ball.mass=0.2:2.",
     )
     return sweep(samples(command))
 
@@ -95,8 +95,8 @@ backend_option = click.option(
     show_default=True,
     metavar="auto|casadi|c|simd|simd32|cuda|cuda32",
     shell_complete=complete_backend,
-    help="What evaluates: SIMD kernels (simd32: in single precision), casadi's C (all need a C compiler), a GPU "
-    "(cuda32: in single precision; needs the extra symphys[cuda]), or casadi's virtual machine.",
+    help="Evaluate with SIMD kernels (simd32: single precision) or casadi's C code, which need a C compiler, with a "
+    "GPU (cuda32: single precision; needs the extra symphys[cuda]), or with casadi's virtual machine (casadi).",
 )
 
 

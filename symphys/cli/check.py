@@ -28,7 +28,7 @@ BUILDING, BUILDING_TAKES = "building the problem", 8.0
     "folder",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="RUN_FOLDER",
-    help="Look at what this run of the problem found, instead of the guess.",
+    help="Examine the solution of this run instead of the guess.",
 )
 def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int:
     """Validate a problem file, and say how far its gradient and its motion can be trusted at the guess.

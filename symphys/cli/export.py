@@ -15,10 +15,8 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.argument("source", metavar="FILE", shell_complete=complete_problem)
 @click.option("--c", "c", type=FOLDER, metavar="DIR", help="Folder for C sources: step, rollout and gradient.")
 @click.option("--casadi", type=FOLDER, metavar="DIR", help="Folder for functions that plain casadi loads.")
-@click.option(
-    "--mjcf", type=FOLDER, metavar="DIR", help="Folder for a model file of MuJoCo: bodies, joints, the start."
-)
-@click.option("--approximate", is_flag=True, help="Leave out of that model what MuJoCo has no counterpart for.")
+@click.option("--mjcf", type=FOLDER, metavar="DIR", help="Folder for a MuJoCo model: bodies, joints, initial state.")
+@click.option("--approximate", is_flag=True, help="Leave out of the MuJoCo model what MuJoCo does not support.")
 @settings_option
 def export(
     source: str,

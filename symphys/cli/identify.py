@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("source", metavar="FILE", shell_complete=complete_problem)
 @settings_option
-@click.option("--loss", type=click.Choice(["squares", "huber"]), help="In place of the one in [identify].")
-@click.option("--bootstrap", type=click.IntRange(0, 1000), metavar="N", help="Draws of the bootstrap; 0: none.")
-@click.option("--check", type=click.Choice(["none", "cma"]), help="Whether CMA-ES looks for other minima.")
-@click.option("--threads", type=click.IntRange(1, 256), help="That share the simulations; all by default.")
+@click.option("--loss", type=click.Choice(["squares", "huber"]), help="Loss function.  [default: that of [identify]]")
+@click.option("--bootstrap", type=click.IntRange(0, 1000), metavar="N", help="Number of bootstrap draws; 0 for none.")
+@click.option("--check", type=click.Choice(["none", "cma"]), help="Search for other minima by CMA-ES.")
+@click.option("--threads", type=click.IntRange(1, 256), help="Number of threads of the simulations.  [default: all]")
 @out_option
 def identify(source: str, assignments: tuple[str, ...], threads: int | None, out: Path, **options: Any) -> int:
     """Estimate the variables of a problem from its recordings, and say what one may believe of them.

@@ -16,24 +16,22 @@ STYLES = {"taken": "green", "approximated": "yellow", "left out": "red", "recove
 
 @click.command("import")
 @click.argument("model", metavar="MODEL", type=str)
-@click.option(
-    "--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Where to write the robot."
-)
-@click.option("--keyframe", metavar="NAME", help="The model's keyframe at which it begins; else its reference pose.")
-@click.option("--no-self-collision", is_flag=True, help="Bodies of the robot pass through each other.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", help="Robot file to write.")
+@click.option("--keyframe", metavar="NAME", help="MJCF: start at this keyframe instead of the reference pose.")
+@click.option("--no-self-collision", is_flag=True, help="Remove contacts between bodies of the robot.")
 @click.option(
     "--base",
     type=click.Choice(["auto", "free", "fixed"]),
     default="auto",
     show_default=True,
-    help="Of a URDF: whether its root link floats.",
+    help="URDF: whether the root link floats.",
 )
 @click.option(
     "--assets",
     type=click.Path(path_type=Path, file_okay=False),
     multiple=True,
     metavar="DIR",
-    help="A folder besides the model's own from which meshes and included files may be read. Repeatable.",
+    help="Permit reading meshes and included files from this folder, besides the model's own. Repeatable.",
 )
 @click.option(
     "--meshes",

@@ -75,7 +75,7 @@ def new(file: Path, source: str) -> None:
 
 
 @click.command()
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File to write.  [default: print it]")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="File to write.  [default: stdout]")
 @click.option("--markdown", is_flag=True, help="Write the reference of tables and keys as a Markdown page instead.")
 def schema(out: Path | None, markdown: bool) -> None:
     """Write the JSON Schema of problem files, with which editors complete and check them."""

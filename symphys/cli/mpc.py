@@ -31,7 +31,7 @@ COMPILING, TENTHS, PART = "compiling the model and the plant", 10, "controlling,
     type=click.IntRange(1, 256),
     default=1,
     show_default=True,
-    help="That share the steps of a plan; more pay for robots with many joints.",
+    help="Number of threads of the planner. Several help for robots with many joints.",
 )
 @out_option
 def mpc(source: str, assignments: tuple[str, ...], threads: int, out: Path) -> int:

@@ -40,8 +40,8 @@ pages_option = click.option(
 figures_option = click.option(
     "--figures",
     is_flag=True,
-    help="Make all pages, and write every figure of every run as SVG, with its numbers as CSV, into its folder "
-    "`figures`.",
+    help="Write all pages, and every figure of every run as SVG and its numbers as CSV, into the folder `figures` of "
+    "the run.",
 )
 
 
@@ -56,27 +56,27 @@ def wants_figures(pages: str | None, figures: bool) -> bool:
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @pages_option
 @figures_option
-@click.option("--all", "remake", is_flag=True, help="Make all pages, also where nothing that they show has changed.")
+@click.option("--all", "remake", is_flag=True, help="Write all pages, also those that are up to date.")
 @click.option("--new", is_flag=True, hidden=True, help="Make only pages that are missing or out of date: the default.")
 @click.option(
     "--jobs",
     type=click.IntRange(1, MAX_JOBS),
     default=None,
-    help="How many processes make pages.  [default: one for each processor]",
+    help="Number of processes.  [default: one for each processor]",
 )
 @click.option(
     "--single",
     metavar="FILE",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Write the page of the run in DIR to FILE instead: one file that needs no other, to be sent or moved.",
+    help="Write the page of the run in DIR as one self-contained file.",
 )
 @click.option(
     "--video",
     metavar="FILE",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Write the motion of the run in DIR to FILE instead: .webp, .gif or .png that moves. Needs Chromium.",
+    help="Write the motion of the run in DIR as an animated .webp, .gif or .png. Needs Chromium.",
 )
-@click.option("--film", is_flag=True, help="With --video: begin with the solve, from the guess to the result.")
+@click.option("--film", is_flag=True, help="With --video: show the solve first, from the guess to the result.")
 def report(
     folder: Path,
     pages: str | None,

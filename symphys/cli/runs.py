@@ -43,7 +43,7 @@ where_option = click.option(
     "conditions",
     multiple=True,
     metavar="CONDITION",
-    help="Only runs of which this holds: objective<0.5, solver=cma, run=ball*, ground.friction>=0.3. Repeatable: "
+    help="Keep runs that satisfy a condition: objective<0.5, solver=cma, run=ball*, ground.friction>=0.3. Repeatable: "
     "all must hold.",
 )
 
@@ -57,7 +57,7 @@ def format_options(command: F) -> F:
             "--columns",
             "names",
             metavar="A,B",
-            help="Columns, separated by commas; `all` for every one, which --csv and --json print anyway.",
+            help="Columns, separated by commas; `all` for every one. --csv and --json print all by default.",
         ),
     ):
         command = option(command)
@@ -194,8 +194,8 @@ class ReadingProgress:
 @click.command()
 @click.argument("folder", metavar="[DIR]", type=click.Path(path_type=Path), default=REPORTS)
 @where_option
-@click.option("--sort", metavar="KEY", help="Sort by a column; -KEY: the largest first. Several with commas.")
-@click.option("--limit", type=click.IntRange(1), metavar="N", help="Print at most so many runs.")
+@click.option("--sort", metavar="KEY", help="Sort by columns, separated by commas; -KEY sorts in descending order.")
+@click.option("--limit", type=click.IntRange(1), metavar="N", help="Print at most N runs.")
 @format_options
 def ls(
     folder: Path,
@@ -226,13 +226,13 @@ def ls(
 @click.command()
 @click.argument("folder", metavar="[DIR]", type=click.Path(path_type=Path), default=REPORTS)
 @where_option
-@click.option("--overall", is_flag=True, help="One run, the best of all cases.")
+@click.option("--overall", is_flag=True, help="Print only the best run of all cases.")
 @click.option(
     "--by",
     metavar="KEY",
     default="objective",
     show_default=True,
-    help="Of runs with equal verdicts the one with the least of this column is best; -KEY: with the most.",
+    help="Rank runs of equal verdict by this column, the smallest first; -KEY: the largest first.",
 )
 @format_options
 def best(

@@ -22,10 +22,10 @@ from symphys.cli.arguments import (
 @click.command()
 @click.argument("source", metavar="FILE", shell_complete=complete_problem)
 @settings_option
-@click.option("--keyframe", metavar="NAME", help="Of a model of MuJoCo: where it begins; else at its reference pose.")
-@click.option("--base", type=click.Choice(["free", "fixed"]), help="Of a URDF: whether its root link floats.")
-@click.option("--no-self-collision", is_flag=True, help="Of a model: its bodies pass through each other.")
-@click.option("--text", is_flag=True, help="Print the file instead; also of a shipped robot or task.")
+@click.option("--keyframe", metavar="NAME", help="MJCF: start at this keyframe instead of the reference pose.")
+@click.option("--base", type=click.Choice(["free", "fixed"]), help="URDF: whether the root link floats.")
+@click.option("--no-self-collision", is_flag=True, help="Remove contacts between bodies of the model.")
+@click.option("--text", is_flag=True, help="Print the file instead, also for shipped robots and tasks.")
 @out_option
 def show(
     source: str,

@@ -70,22 +70,22 @@ def read_time(_context: click.Context | None, option: click.Parameter, text: str
     "names",
     metavar="A,B",
     shell_complete=complete_solvers,
-    help="Solvers, separated by commas.  [default: the file's `solvers`, else what fits it]",
+    help="Solvers, separated by commas.  [default: those of the file, else an automatic choice]",
 )
 @click.option(
     "--seeds",
     type=click.IntRange(1, MAX_SEEDS),
     default=1,
     show_default=True,
-    help="How many seeds; seed 0 starts from the guess as it is, the others from one perturbed by its spread.",
+    help="Number of seeds. Seed 0 starts from the guess; the others perturb it by the spread of each variable.",
 )
 @click.option(
     "--guess",
     "guess_from",
     metavar="RUN_FOLDER",
     type=click.Path(path_type=Path, file_okay=False),
-    help="Start from what another run has found: its variables by name, on any grid of knots, step or duration; with "
-    "multiple_shooting its motion and multipliers too.",
+    help="Start from the solution of another run. Variables match by name and are resampled to the knots of this "
+    "problem; multiple_shooting also uses the motion and the multipliers.",
 )
 @settings_option
 @sweep_options
@@ -94,23 +94,23 @@ def read_time(_context: click.Context | None, option: click.Parameter, text: str
     type=click.IntRange(1, MAX_JOBS),
     default=1,
     show_default=True,
-    help="How many runs go on at once; with --on, how many drivers.",
+    help="Number of parallel runs; with --on, number of workers.",
 )
 @click.option(
     "--multi-start",
     "--together",
     "multi_start",
     is_flag=True,
-    help="Solve the seeds of gradient and least_squares side by side, their evaluations in batches. Sooner done, but "
-    "the seconds of each run are those of all.",
+    help="Solve the seeds of gradient and least_squares in one process, with batched evaluations. Faster in total; "
+    "each run reports the time of all.",
 )
 @click.option(
     "--unexamined",
     is_flag=True,
-    help="Leave out how far solutions can be trusted, which for long motions takes as long as solving them; "
-    "`symphys check --at RUN_FOLDER` does it later.",
+    help="Skip the examination of solutions, which is slow for long motions; `symphys check --at RUN_FOLDER` does it "
+    "later.",
 )
-@click.option("--no-report", is_flag=True, help="Make no pages; `symphys report DIR` makes them later.")
+@click.option("--no-report", is_flag=True, help="Write no pages; `symphys report DIR` writes them later.")
 @pages_option
 @backend_option
 @out_option
@@ -119,38 +119,41 @@ def read_time(_context: click.Context | None, option: click.Parameter, text: str
     type=click.IntRange(0, MAX_RETRIES),
     default=0,
     show_default=True,
-    help="How often a run that fails is tried again; one whose process dies is so once in any case.",
+    help="Number of retries of a failed run. A run whose process died is always retried once.",
 )
 @click.option(
     "--timeout",
     metavar="TIME",
     callback=read_time,
-    help="End a run after so long, whatever it is at: 90, 10min, 2h. It can go on later.",
+    help="Stop a run after this time: 90 (seconds), 10min, 2h. The same command resumes it.",
 )
 @click.option(
-    "--budget", metavar="TIME", callback=read_time, help="Stop the whole batch after so long. The same command goes on."
+    "--budget",
+    metavar="TIME",
+    callback=read_time,
+    help="Stop the whole batch after this time. The same command resumes it.",
 )
 @click.option(
     "--rerun",
     type=click.Choice(("failed", "changed", "all")),
     default=None,
-    help="Do again what is over: runs that failed, those of another version of symphys, or all.",
+    help="Repeat runs: those that failed, those of another version of symphys, or all.",
 )
-@click.option("--dry-run", is_flag=True, help="Say what would be done, and why, and do nothing.")
-@click.option("--json", is_flag=True, help="Write what happens to stdout, a JSON object a line.")
-@click.option("--live", is_flag=True, help="Show objectives and errors in a browser on this machine while it solves.")
-@click.option("--quiet", is_flag=True, help="Show nothing but failures.")
+@click.option("--dry-run", is_flag=True, help="Print what would run, and why; run nothing.")
+@click.option("--json", is_flag=True, help="Print events to stdout, one JSON object a line.")
+@click.option("--live", is_flag=True, help="Show the progress in a browser on this machine.")
+@click.option("--quiet", is_flag=True, help="Print failures only.")
 @click.option(
     "--on",
     type=click.Choice(("dask", "slurm")),
     default=None,
-    help="Let as many drivers as --jobs says do the runs: on dask workers, or as jobs of Slurm.",
+    help="Distribute the runs over --jobs workers: dask workers, or Slurm jobs.",
 )
 @click.option(
     "--scheduler",
     metavar="TEXT",
-    help="dask: the address of a cluster, tcp://host:8786, instead of workers here. slurm: what to ask for, "
-    "partition=short,timeout_min=60,mem_gb=4, or local.",
+    help="dask: address of a cluster, e.g. tcp://host:8786  [default: workers on this machine]. slurm: job parameters, "
+    "e.g. partition=short,timeout_min=60,mem_gb=4, or local.",
 )
 def solve(
     sources: tuple[str, ...],

@@ -1,6 +1,6 @@
 """Automatic solver choice for problems that name no solver: the first of ``SITUATIONS`` that holds decides.
 
-The choice follows from the problem file alone; nothing is built or evaluated for it. docs/results/profiles.md has
+The choice follows from the problem file alone; nothing is built or evaluated for it. docs/results/solvers.md has
 the measurements behind it.
 """
 

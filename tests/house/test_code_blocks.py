@@ -3,9 +3,12 @@
 - ``python``: the blocks of a page run in order, in one namespace and one fresh process, in an empty folder. A page with
   a line ``% needs: torch compiler`` is skipped where a package, or a C compiler, is missing.
 - ``toml``: a whole problem, or after a line ``% fragment of: NAME`` (``<!-- fragment of: NAME -->`` where comments of
-  MyST would show) tables that are put into a shipped problem, or into ``croquet``, the problem of the first page.
+  MyST would show) tables that are put into a shipped problem, or into ``croquet``, the problem of the first lesson.
 - ``sh``: commands of symphys with options that exist, targets of the Makefile, and a few commands of the shell.
-- ``json``: can be read. ``c``: was printed by the page's Python. ``console`` and ``text``: what no one runs.
+- ``json``: can be read. ``c``: was printed by the page's Python. ``console`` and ``text``: not run.
+
+Lessons are run from top to bottom by test_lessons.py: their Python, their ``console``, and their ``toml`` that names a
+file in its first line. Options of the commands in ``console`` are checked here too.
 """
 
 from __future__ import annotations
@@ -18,7 +21,6 @@ import subprocess
 import sys
 import tomllib
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -26,20 +28,22 @@ import click
 import pytest
 from tools import run_blocks
 from tools.makefile import targets
-from tools.markdown_pages import ROOT, Block, blocks, needs, of, pages
+from tools.markdown_pages import ROOT, Block, available, blocks, is_lesson, needs, of, pages
+from tools.run_lesson import file_name, steps
 
 import symphys
 from symphys.cli.app import app
-from symphys.codegen import KernelUnavailable
-from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.problem import load_problem
 
 RULED = {"python", "toml", "sh", "json", "c", "console", "text"}
 DIRECTIVE = re.compile(r"\{(?!code|sourcecode)[a-z:-]+\}")
 """Any of MyST, whose build checks them, but those that would hide code from these tests."""
-PLAIN_COMMANDS = {"pip", "apt-get", "cd", "git", "eval", "export", "python", "python3"}
+PLAIN_COMMANDS = {"pip", "apt-get", "cd", "git", "eval", "export", "python", "python3", ".venv/bin/python"}
+LESSON_COMMANDS = {"cat", "cut", "grep", "head", "ls", "tail"}
+"""Commands of a console block, beside those above."""
+OPERATOR = re.compile(r"\s(?:\||>|<|&&|\|\|)\s.*", re.DOTALL)
 SECONDS = 1800.0
-CROQUET = ("docs/first_problem.md", "README.md")
+CROQUET = "docs/lessons/1_throw.md"
 
 
 @cache
@@ -54,7 +58,7 @@ def pages_with(language: str) -> list[str]:
 @cache
 def printed(page: str, folder: Path) -> list[str]:
     """What each Python block of a page prints, run in a folder."""
-    code = json.dumps([(block.page, block.line, block.text) for block in of("python", of_page(page))])
+    code = "".join(json.dumps([block.page, block.line, block.text]) + "\n" for block in of("python", of_page(page)))
     done = subprocess.run(
         [sys.executable, run_blocks.__file__],
         input=code,
@@ -81,8 +85,7 @@ def whole_problem(name: str) -> str:
     """The text of the problem that fragments belong to."""
     if name != "croquet":
         return (ROOT / "problems" / f"{name}.toml").read_text(encoding="utf-8")
-    documents = [page for page in CROQUET if page in pages()]
-    return next(block.text for page in documents for block in of("toml", of_page(page)) if block.whole is None)
+    return next(block.text for block in of("toml", of_page(CROQUET)) if file_name(block) == "croquet.toml")
 
 
 def with_fragment(whole: dict[str, Any], fragment: dict[str, Any]) -> dict[str, Any]:
@@ -121,6 +124,8 @@ def fault_of(words: list[str]) -> str | None:
     """What is wrong with a command; None where it can be given."""
     if words[0] == "symphys":
         return usage_fault(words[1:])
+    if words[0].rpartition("/")[2].startswith("python") and words[1:3] == ["-m", "symphys"]:
+        return usage_fault(words[3:])
     if words[0] == "make":
         missing = [word for word in words[1:] if "=" not in word and word not in targets()]
         return f"the Makefile has no {missing[0]}" if missing else None
@@ -156,25 +161,19 @@ def test_every_block_has_a_language_with_a_rule(page: str) -> None:
     assert unruled == [], f"a fence has one of {', '.join(sorted(RULED))}, or a directive"
 
 
+def pages_run_here() -> list[str]:
+    """Pages with Python that are not lessons."""
+    return [page for page in pages_with("python") if not is_lesson(page)]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("page", pages_with("python"))
+@pytest.mark.parametrize("page", pages_run_here())
 def test_python_runs_and_prints_what_is_shown_in_c(page: str, tmp_path: Path) -> None:
     missing = [name for name in needs((ROOT / page).read_text(encoding="utf-8")) if not available(name)]
     if missing:
         pytest.skip(f"{page} needs {', '.join(missing)}")
     output = unspaced("".join(printed(page, tmp_path)))
     assert [block.place for block in of("c", of_page(page)) if unspaced(block.text) not in output] == []
-
-
-def available(need: str) -> bool:
-    """Whether what a page needs is there: a package, or "compiler", a C compiler."""
-    if need != "compiler":
-        return find_spec(need) is not None
-    try:
-        find_compiler()
-    except KernelUnavailable:
-        return False
-    return True
 
 
 def unspaced(text: str) -> str:
@@ -184,13 +183,15 @@ def unspaced(text: str) -> str:
 
 def test_c_is_on_pages_with_python() -> None:
     """Elsewhere nothing would print it."""
-    assert [page for page in pages_with("c") if page not in pages_with("python")] == []
+    assert [page for page in pages_with("c") if page not in pages_run_here()] == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", pages_with("toml"))
 def test_toml_loads(page: str, tmp_path: Path) -> None:
     for block in of("toml", of_page(page)):
+        if is_lesson(page) and file_name(block) is not None:
+            continue
         try:
             tables = tables_of(block)
             if block.whole is None:
@@ -213,6 +214,19 @@ def test_commands_can_be_given(page: str) -> None:
     assert faults == []
 
 
+@pytest.mark.parametrize("page", [page for page in pages_with("console") if is_lesson(page)])
+def test_commands_of_lessons_can_be_given(page: str) -> None:
+    """What follows a pipe is left to the run of the lesson."""
+    given = [step for step in steps((ROOT / page).read_text(encoding="utf-8"), page) if step.kind == "command"]
+    faults = [
+        f"{page}:{step.line}: {shlex.join(words)}: {fault}"
+        for step in given
+        for words in commands(OPERATOR.sub("", step.text))
+        if words[0] not in LESSON_COMMANDS and (fault := fault_of(words))
+    ]
+    assert faults == []
+
+
 def test_json_can_be_read() -> None:
     for page in pages_with("json"):
         for block in of("json", of_page(page)):
@@ -230,6 +244,7 @@ def test_faults_in_blocks_are_found(tmp_path: Path) -> None:
     assert fault_of(["symphys", "solve", "my.toml", "--set", "a.b=1", "--out", "x"]) is None
     assert "--sets" in str(fault_of(["symphys", "solve", "my.toml", "--sets", "1"]))
     assert "solv" in str(fault_of(["symphys", "solv", "my.toml"]))
+    assert "solv" in str(fault_of([".venv/bin/python", "-m", "symphys", "solv", "my.toml"]))
     assert "many" in str(fault_of(["symphys", "solve", "my.toml", "--seeds", "many"]))
     assert "Missing argument" in str(fault_of(["symphys", "solve"]))
     assert fault_of(["make", "test", "ARGS=-x"]) is None
@@ -238,6 +253,7 @@ def test_faults_in_blocks_are_found(tmp_path: Path) -> None:
     text = (
         "% fragment of: croquet\n```toml\n[simulation]\n```\n\n    code\n\n```\n```\n- a\n  ```{code-block} c\n  ```\n"
     )
+    assert OPERATOR.sub("", "symphys ls reports | head -3") == "symphys ls reports"
     found = blocks(text, "p.md")
     assert [(block.language, block.line, block.whole) for block in found] == [
         ("toml", 3, "croquet"),

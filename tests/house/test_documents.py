@@ -15,7 +15,10 @@ MADE = {"build/kernels"}
 WRITTEN = {"api.md", "problem_reference.md"}
 """Pages of docs/ that a program writes."""
 PAGES = sorted(path.name for path in (ROOT / "docs").glob("*.md") if path.name not in WRITTEN)
-DOCUMENTS = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", *(f"docs/{page}" for page in PAGES)]
+FOLDERS = ("lessons", "concepts")
+"""Folders of docs/ whose pages their own index.md names."""
+BELOW = sorted(str(path.relative_to(ROOT)) for name in FOLDERS for path in (ROOT / "docs" / name).glob("*.md"))
+DOCUMENTS = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", *(f"docs/{page}" for page in PAGES), *BELOW]
 FRONT_PAGE = "docs/index.md"
 
 
@@ -63,6 +66,15 @@ def test_every_page_is_named_on_the_front_page() -> None:
     assert [page for page in PAGES if page != "index.md" and f"({page})" not in text] == []
 
 
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_every_page_of_a_folder_is_named_on_its_index(folder: str) -> None:
+    """And the front page names that index."""
+    index = (ROOT / "docs" / folder / "index.md").read_text(encoding="utf-8")
+    names = [path.name for path in (ROOT / "docs" / folder).glob("*.md") if path.name != "index.md"]
+    assert [name for name in sorted(names) if f"({name})" not in index] == []
+    assert f"({folder}/index.md)" in (ROOT / FRONT_PAGE).read_text(encoding="utf-8")
+
+
 @cache
 def words_of_the_code() -> set[str]:
     """Every word in the files of the code, their names, and what libraries and formats are called."""
@@ -82,14 +94,34 @@ def test_names_that_documents_name_are_those_of_the_code(name: str) -> None:
     assert [found for found in named if not words_of_the_code().issuperset(found.split("."))] == []
 
 
-def test_results_name_every_benchmark_and_note_and_only_what_exists() -> None:
-    """Scripts, notes of closed studies and targets of make."""
+def test_results_name_every_benchmark_and_only_what_exists() -> None:
+    """Targets of make, scripts and notes."""
     pages = sorted((ROOT / "docs" / "results").glob("*.md"))
     whole = "\n".join(page.read_text(encoding="utf-8") for page in pages)
     made = set(re.findall(r"(?:`|^)make\s([a-z][\w-]*)", whole, re.MULTILINE))
     assert made - targets() == set()
     assert benchmarks() - made == set()
-    files = {file.name for file in (ROOT / "benchmarks").glob("*.py")}
-    assert set(re.findall(r"benchmarks/(\w+\.py)", whole)) - files == set()
-    notes = {note.name for note in (ROOT / "benchmarks" / "notes").glob("*.md")} - {"README.md"}
-    assert set(re.findall(r"benchmarks/notes/(\w+\.md)", whole)) == notes
+    named = set(re.findall(r"benchmarks/[\w./-]+\.(?:py|md)", whole))
+    assert sorted(path for path in named if not (ROOT / path).exists()) == []
+
+
+def test_the_index_of_results_links_to_every_page() -> None:
+    """In its table; the table of contents is tested with the site."""
+    folder = ROOT / "docs" / "results"
+    linked = set(re.findall(r"\]\((\w+\.md)", (folder / "index.md").read_text(encoding="utf-8")))
+    assert linked >= {page.name for page in folder.glob("*.md")} - {"index.md"}
+
+
+def test_the_list_of_notes_has_each_note_in_a_line_of_its_own() -> None:
+    """Notes lie beside the list, or in a folder that is named after the month until which they were measured."""
+    folder = ROOT / "benchmarks" / "notes"
+    lines = (folder / "README.md").read_text(encoding="utf-8").splitlines()
+    rows = [re.fullmatch(r"\| \[[\w -]+\]\(([\w./-]+\.md)\) \| (\S.*) \|", line) for line in lines]
+    notes = [note.relative_to(folder).as_posix() for note in folder.rglob("*.md")]
+    assert sorted(row[1] for row in rows if row) == sorted(set(notes) - {"README.md"})
+
+
+def test_links_of_notes_lead_to_files() -> None:
+    for note in sorted((ROOT / "benchmarks" / "notes").rglob("*.md")):
+        targets_of_links = re.findall(r"\]\(([^()#\s:]+)[^():]*\)", note.read_text(encoding="utf-8"))
+        assert [target for target in targets_of_links if not (note.parent / target).exists()] == [], note.name

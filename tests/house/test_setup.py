@@ -73,11 +73,23 @@ def test_wheel_holds_what_is_needed_at_run_time(tmp_path: Path) -> None:
     held = set(zipfile.ZipFile(wheel).namelist())
     assert wheel_names() <= held
     assert {name.partition("/")[0] for name in held if ".dist-info/" not in name} == {"symphys"}
+    (metadata,) = [name for name in held if name.endswith(".dist-info/METADATA")]
+    described = zipfile.ZipFile(wheel).read(metadata).decode()
+    assert "# symphys" in described and "](docs/" not in described
 
 
 def project_files() -> list[Path]:
     """What the build reads."""
-    tops = ["setup.cfg", "pyproject.toml", "README.md", "LICENSE"]
+    tops = [
+        "setup.py",
+        "setup.cfg",
+        "pyproject.toml",
+        "MANIFEST.in",
+        "README.md",
+        "LICENSE",
+        "CHANGELOG.md",
+        "CITATION.cff",
+    ]
     folders = [path for top in ("symphys", *MAPPED) for path in (ROOT / top).rglob("*")]
     files = [path.relative_to(ROOT) for path in folders if path.is_file() and not LEFT_OUT & {*path.parts}]
     return [Path(top) for top in tops] + files

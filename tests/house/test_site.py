@@ -1,12 +1,8 @@
-"""The site is whole: its reference is current, its pages are listed, its links lead somewhere, its notebook runs."""
+"""The site is whole: its reference is current, its pages are listed, its links lead somewhere."""
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 from urllib.parse import unquote
@@ -16,14 +12,10 @@ from markdown_it import MarkdownIt
 from tools.markdown_pages import ROOT, pages
 
 import symphys
-from symphys.codegen import KernelUnavailable
-from symphys.codegen.toolchain.compiler import find_compiler
 from symphys.problem import reference_page
 from symphys.solvers import SOLVERS
 
 DOCS = ROOT / "docs"
-NOTEBOOK = DOCS / "ball_throw.ipynb"
-RUNNER = ROOT / "tests" / "tools" / "run_notebook.py"
 INCLUDE = re.compile(r"^```\{include\} (\S+)$", re.MULTILINE)
 ADDRESS = re.compile(r"\w+://|mailto:")
 
@@ -88,41 +80,3 @@ def test_anchors_are_those_of_code_hosts(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("# A `b.c`, [d](e.md)\n\n## Twice\n\n## Twice\n\n```sh\n# no heading\n```\n", encoding="utf-8")
     assert anchors(page) == {"a-bc-d", "twice", "twice-1"}
-
-
-def test_the_notebook_has_no_outputs() -> None:
-    """It is stored as it was written; its cells have ids that stay."""
-    notebook = json.loads(NOTEBOOK.read_text(encoding="utf-8"))
-    cells = [cell for cell in notebook["cells"] if cell["cell_type"] == "code"]
-    assert notebook["nbformat"] == 4 and all(cell["outputs"] == [] for cell in cells)
-    assert [cell["execution_count"] for cell in cells] == [None] * len(cells)
-    assert len({cell["id"] for cell in notebook["cells"]}) == len(notebook["cells"])
-
-
-@pytest.mark.thorough
-def test_the_notebook_runs(tmp_path: Path) -> None:
-    """In an empty folder, as it stands; its figures show, and what its text says of the numbers holds."""
-    pytest.importorskip("nbclient")
-    pytest.importorskip("ipykernel")
-    try:
-        find_compiler()
-    except KernelUnavailable:
-        pytest.skip("without a C compiler the notebook's batches of gradients take minutes")
-    done = subprocess.run(
-        [sys.executable, str(RUNNER), str(NOTEBOOK)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=tmp_path,
-        env=os.environ
-        | {"IPYTHONDIR": str(tmp_path / "ipython"), "CUDA_VISIBLE_DEVICES": ""}
-        | {"PYTHONWARNINGS": "error:symphys:DeprecationWarning"},
-    )
-    assert done.returncode == 0, done.stderr
-    outputs = [output for cell in json.loads(done.stdout.splitlines()[-1]) for output in cell]
-    texts = "\n".join(text for _, text in outputs)
-    assert sum("image/png" in kinds for kinds, _ in outputs) == 3
-    assert "by least_squares: solved" in texts and "((128,), (128, 6))" in texts
-    arrived = re.search(r"(\d+) of 128 throws end below 0.01", texts)
-    assert arrived is not None and int(arrived[1]) > 64
-    assert (tmp_path / "reports" / "ball_throw" / "least_squares-seed0" / "result.json").exists()

@@ -5,9 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from markdown_it import MarkdownIt
+
+from symphys.codegen import KernelUnavailable
+from symphys.codegen.toolchain.compiler import find_compiler
 
 ROOT = Path(__file__).parents[2]
 NEEDS = re.compile(r"^(?:% needs: (.*)|<!-- needs: (.*) -->)$", re.MULTILINE)
@@ -53,6 +57,22 @@ def pages() -> list[str]:
 def needs(text: str) -> list[str]:
     """The packages that a page's Python needs: ``% needs: torch gymnasium`` on a line of its own."""
     return [name for found in NEEDS.finditer(text) for name in re.split(r"[,\s]+", found[1] or found[2])]
+
+
+def available(need: str) -> bool:
+    """Whether a package is installed; "compiler" is a C compiler."""
+    if need != "compiler":
+        return find_spec(need) is not None
+    try:
+        find_compiler()
+    except KernelUnavailable:
+        return False
+    return True
+
+
+def is_lesson(page: str) -> bool:
+    """Whether a page is a lesson, which is run from top to bottom: ``docs/lessons/1_throw.md``."""
+    return re.fullmatch(r"docs/lessons/\d.*\.md", page) is not None
 
 
 def blocks(text: str, page: str) -> list[Block]:

@@ -22,46 +22,46 @@ SENSED = ", ".join(f'"{OWNERS[kind.owner]}.{kind.key}"' for kind in SENSOR_KINDS
 
 
 class SensorTable(SchemaTable):
-    """A vector that controllers may use, in the velocities that are reported."""
+    """A vector that controllers read, evaluated at the start of each step."""
 
-    name: Identifier = Field(description="how controllers refer to it")
+    name: Identifier = Field(description="its name in controllers")
     reads: Texts = Field(
-        description=f'formulas, joined one after the other: {SENSED}, "knee.command" (of the step before), '
-        '"torso.position[2]", "sin(2 * pi * time)"'
+        description=f'formulas, concatenated: {SENSED}, "knee.command" (of the previous step), "sin(2 * pi * time)"'
     )
 
 
 class NetTable(SchemaTable):
-    """A multi-layer perceptron; its weights are a layer's matrix row by row, then its biases, layer after layer."""
+    """A multi-layer perceptron.
 
-    hidden: list[Width] = Field(default=[], description="the width of each hidden layer; none: one layer")
-    activation: Activation = Field(default="tanh", description="of hidden layers")
-    output: Activation = Field(default="linear", description='of the last layer; with "tanh" outputs are bounded')
-    biases: bool = Field(default=True, description="whether every layer adds a bias to each of its outputs")
-    skip: bool = Field(default=False, description="adds a matrix from the inputs straight to the outputs")
+    Weights are stored layer by layer: the matrix row by row, then the biases.
+    """
+
+    hidden: list[Width] = Field(default=[], description="width of each hidden layer")
+    activation: Activation = Field(default="tanh", description="of the hidden layers")
+    output: Activation = Field(default="linear", description='of the last layer; "tanh" bounds the outputs')
+    biases: bool = Field(default=True, description="whether layers have biases")
+    skip: bool = Field(default=False, description="adds a matrix from inputs to outputs")
     weights: str | None = Field(
-        default=None, description="a .npy file with all of them, beside this file; default: random"
+        default=None, description="a .npy file with all weights, beside this file; default: random"
     )
     spread: NonNegative = Field(
-        default=1.0, description="random weights have this standard deviation, over the root of a layer's inputs"
+        default=1.0, description="random weights have standard deviation spread / sqrt(layer inputs)"
     )
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of random weights")
 
 
 class FunctionTable(SchemaTable):
-    """A casadi function that Python gives: symphys.load(..., functions={name: function})."""
+    """A casadi function from Python: symphys.load(..., functions={name: function})."""
 
-    weights: Numbers | None = Field(default=None, description="its numbers at the start; default 0")
+    weights: Numbers | None = Field(default=None, description="initial weights; default 0")
 
 
 class DrivingTable(SchemaTable):
     """Outputs and inputs of a controller: the quantities that it drives, and the sensors that it reads."""
 
-    name: Identifier = Field(
-        description='variables set its numbers: "name.weights", "name.gains", "name.frequency", ...'
-    )
-    drives: Texts = Field(description='"knee.command", "ball.force[0:2]", or a list')
-    senses: list[str] = Field(default=[], description="names of sensors, joined one after the other")
+    name: Identifier = Field(description='variables set its numbers: "name.weights", "name.gains", ...')
+    drives: Texts = Field(description='inputs: "knee.command", "ball.force[0:2]"')
+    senses: list[str] = Field(default=[], description="names of sensors, concatenated")
     scale: Numbers = Field(default=1.0, description="factor of all outputs, or one for each")
 
 
@@ -82,47 +82,43 @@ def kinds_of_controllers() -> type[SchemaTable]:
 
 
 class ControllerTable(kinds_of_controllers()):  # type: ignore[misc]
-    """A controller that sets inputs at every step; the outputs of several that drive one input add up."""
+    """A controller that sets inputs at every step; controllers that drive the same input add up."""
 
     net: NetTable | None = Field(default=None, description="{ hidden = [32, 32] }")
-    function: FunctionTable | None = Field(default=None, description="{ weights = [0, 0] }, and a function from Python")
+    function: FunctionTable | None = Field(
+        default=None, description="{ weights = [0, 0] }, with a function from Python"
+    )
 
 
 class ForceTable(SchemaTable):
-    """A force that follows from the state by a formula: a spring, drag, wind, Magnus' force."""
+    """A force given by a formula of the state: a spring, drag, wind, the Magnus force."""
 
-    name: Identifier = Field(description='formulas name its numbers: "drag.c"')
-    on: str = Field(description='what it is added to: "ball.force", "ball.torque", "knee.command", "ball.force[0:2]"')
-    against: str | None = Field(
-        default=None, description="what the opposite is added to, as of a spring between two bodies: post.force"
-    )
-    value: str = Field(
-        description='formula in N or N m, world frame: "-drag.c * norm(ball.velocity) * ball.velocity"; it is '
-        "evaluated in the middle of each step"
-    )
-    during: str | None = Field(default=None, min_length=1, description="the phase in which alone it acts; else always")
+    name: Identifier = Field(description='its name in formulas, for its numbers: "drag.c"')
+    on: str = Field(description='the input: "ball.force", "ball.torque", "knee.command", "ball.force[0:2]"')
+    against: str | None = Field(default=None, description="input that gets the opposite force: post.force")
+    value: str = Field(description='formula [N] or [N m], world frame: "-drag.c * norm(ball.velocity) * ball.velocity"')
+    during: str | None = Field(default=None, min_length=1, description="the phase in which it acts; default: always")
     numbers: dict[Identifier, Numbers] = Field(
-        default={}, description="numbers of the formula, which variables may set: { c = 0.02 } is drag.c"
+        default={}, description="parameters, which variables may set: { c = 0.02 } is drag.c"
     )
 
 
 class ReferenceTable(SchemaTable):
-    """A trajectory that is given, whose columns formulas name: "walk.hip" is its column hip at `time`."""
+    """A given trajectory: "walk.hip" is the value of its column hip at `time`."""
 
-    name: Identifier = Field(description='formulas name its columns: "walk.hip"')
+    name: Identifier = Field(description='its name in formulas; columns are "walk.hip"')
     file: str | None = Field(
         default=None,
         min_length=1,
-        description="a CSV file with a header, or an NPZ file, beside this file; one column is `time` [s], increasing",
+        description="a CSV file with a header, or an NPZ file; its column `time`, in seconds, increases",
     )
     table: dict[str, list[Finite]] | None = Field(
-        default=None, description="its columns, instead of a file: { time = [0, 1], hip = [0, 0.5] }"
+        default=None, description="columns, instead of a file: { time = [0, 1], hip = [0, 0.5] }"
     )
     interpolation: Literal["linear", "cubic"] = Field(
-        default="linear", description="between rows; before the first and after the last the values stay"
+        default="linear", description="between rows; the first and last values extend beyond the ends"
     )
     delay: Finite | None = Field(
         default=None,
-        description="the columns count so much later [s]: at `time` they are those of time - delay. Where it is given, "
-        "0 too, variables may set it: walk.delay",
+        description="columns are read at time - delay [s]; if stated, variables may set it",
     )

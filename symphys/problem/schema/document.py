@@ -44,9 +44,11 @@ class Document(SchemaTable):
     model_config = ConfigDict(json_schema_extra={"anyOf": [{"required": ["body"]}, {"required": ["include"]}]})
 
     title: Label | None = Field(default=None, description="one line; default: the file's name")
-    description: str = Field(default="", description="what the problem is about")
+    description: str = Field(default="", description="what the problem is about; Markdown")
     solvers: list[Label] | None = Field(
-        default=None, min_length=1, description="which solvers `symphys solve` runs without --solver; default: all"
+        default=None,
+        min_length=1,
+        description="solvers that `symphys solve` runs without --solver; default: chosen from the problem",
     )
     simulation: SimulationTable
     world: WorldTable = WorldTable()

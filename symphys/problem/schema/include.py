@@ -18,39 +18,34 @@ Prefix = Annotated[
 
 
 class IncludeTable(SchemaTable):
-    """A file whose tables are put before those of this one: a robot, a course.
+    """A file whose tables come before those of this file: a robot, a course.
 
-    It holds what a problem file may, but for [simulation], [objective], [solver] and further includes.
+    It may hold any table but [simulation], [objective], [solver] and [[include]].
     """
 
     file: str = Field(
         min_length=1,
-        description='"robots/table_robot.toml": relative to the folder of this file, else a shipped robot of that path;'
-        " a model of MuJoCo (.xml) or a URDF (.urdf) becomes tables, see the page Robots of the documentation",
+        description='a path relative to this file, or a shipped robot: "robots/table_robot.toml"; MuJoCo (.xml) and '
+        "URDF (.urdf) models are converted, see the page Robots",
     )
     position: Vector = Field(
         default=[0.0, 0.0, 0.0],
-        description="shifts its bodies, joints, planes and blocks [m], after the turn; its ground, variables and "
-        "formulas stay as they are",
+        description="shift of its bodies, joints, planes and blocks [m], after the rotation",
     )
-    yaw_deg: Finite = Field(default=0.0, description="turns them about the z axis of the world, with their velocities")
-    prefix: Prefix = Field(
-        default="", description='put before all names of that file, where they are used too: "left_" makes left_torso'
-    )
-    keyframe: str | None = Field(
-        default=None, description="of an .xml: its keyframe at which the robot begins; otherwise at its reference pose"
-    )
+    yaw_deg: Finite = Field(default=0.0, description="rotation about the world's z axis, velocities included")
+    prefix: Prefix = Field(default="", description='put before all its names: "left_" makes left_torso')
+    keyframe: str | None = Field(default=None, description="of an .xml: initial keyframe; default: the reference pose")
     self_collision: bool = Field(
-        default=True, description="of an .xml or .urdf: whether bodies of the robot may touch each other"
+        default=True, description="of an .xml or .urdf: whether its bodies may touch each other"
     )
     base: Literal["auto", "free", "fixed"] = Field(
         default="auto",
-        description='of a .urdf: whether its root link floats; "auto": see the page Robots of the documentation',
+        description="of a .urdf: whether its root link floats",
     )
 
 
 class IncludedTable(SchemaTable):
-    """The text of an included file, as run folders keep it."""
+    """The text of an included file, in run folders."""
 
     file: str = Field(description="as [[include]] names it")
-    text: str = Field(description="what is in it; it goes before the file itself")
+    text: str = Field(description="its content")

@@ -50,9 +50,9 @@ OWN = {name: field for name, (_, field) in keys_of(fields(Joint)).items()}
 class HeldTable(SchemaTable):
     """The name of a joint and the bodies that it connects."""
 
-    name: Identifier = Field(description="how formulas, variables and settings refer to it")
+    name: Identifier = Field(description="its name in formulas, variables and settings")
     between: Annotated[list[str], Field(min_length=2, max_length=2)] = Field(
-        description='two bodies, or "world" and a body; coordinates are those of the second against the first'
+        description='two bodies, or "world" and a body; coordinates are relative to the first'
     )
 
 
@@ -61,70 +61,63 @@ class MotorTable(kinds_of_motors()):  # type: ignore[misc]
 
 
 class SpringTable(table_of("SpringNumbersTable", fields(Spring))):  # type: ignore[misc]
-    """Along every coordinate: torque = -stiffness (angle - rest) - damping rate."""
+    """A spring along every coordinate: torque = -stiffness (angle - rest) - damping rate."""
 
 
 class CouplingTable(SchemaTable):
-    """A coordinate that follows another: a gear, a parallel gripper, a joint that mimics another."""
+    """A joint coordinate that follows another one: a gear, a gripper, a mimic joint."""
 
-    name: Identifier = Field(description="how states refer to it")
+    name: Identifier = Field(description="its name in states")
     joints: Annotated[list[str], Field(min_length=1, max_length=2)] = Field(
-        description="the joint that follows and the one that it follows, each with one coordinate and in one tree; one "
-        "alone is held where the polynomial says"
+        description="[follower, leader], in one tree, with one coordinate each; a single joint is held at c0"
     )
     polynomial: Annotated[list[Finite], Field(min_length=1, max_length=5)] = Field(
         default=[0.0, 1.0],
-        description="[c0, c1, c2, c3, c4]: the first coordinate is c0 + c1 q + c2 q^2 + ... of the second's q, an "
-        "angle that counts whole turns: a screw of lead h has [0, h / 6.2832]",
+        description="[c0, ..., c4]: follower = c0 + c1 q + c2 q^2 + ..., with the leader's coordinate q",
     )
 
 
 class SiteMotorTable(table_of("SiteMotorNumbersTable", fields(SiteMotor))):  # type: ignore[misc]
-    """A force at the site and a torque, along the site's axes, in proportion to a command: a rotor, a thruster."""
+    """A force and a torque at the site, proportional to a command: a rotor, a thruster."""
 
 
 class SiteTable(SchemaTable):
-    """A named point with axes on a body: formulas name its position, orientation and velocity."""
+    """A named frame on a body, for formulas and thrusters."""
 
-    name: Identifier = Field(description="how formulas refer to it: name.position, name.orientation, name.velocity")
+    name: Identifier = Field(description="its name in formulas: name.position, name.orientation, name.velocity")
     body: str = Field(description='the body that carries it, or "world"')
-    position: Vector = Field(
-        default=[0.0, 0.0, 0.0], description="from the centre of mass, in the body's frame [m]; world coordinates there"
-    )
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="in the body's frame, from its centre of mass [m]")
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
-    motor: SiteMotorTable | None = Field(
-        default=None, description=f"acts on the body by the command name.command: {SiteMotor.example}"
-    )
+    motor: SiteMotorTable | None = Field(default=None, description=f"driven by name.command: {SiteMotor.example}")
 
 
 class JointTable(kinds_of_joints()):  # type: ignore[misc]
-    """A joint between two bodies, or a body and the world; coordinates are 0 as the bodies lie in the file.
+    """A joint between two bodies, or a body and the world.
 
-    With ``start`` they begin elsewhere. Angles count whole turns: a hinge that has gone round twice is at 12.57 rad.
-    The table of one kind says how.
+    Give one kind: ball, hinge, slider, helical, universal or fixed. Coordinates are 0 in the pose of the file. Angles
+    count whole turns.
     """
 
-    point: Vector | None = Field(default=None, description="where the joint is at the start, world coordinates [m]")
+    point: Vector | None = Field(
+        default=None, description="position of the joint in the file's pose, world coordinates [m]"
+    )
     anchors: Annotated[list[Vector], Field(min_length=2, max_length=2)] | None = Field(
         default=None,
-        description="instead of point: the joint's place on the first and on the second, each in its body's frame [m] "
-        "(that of the world in world coordinates); at the start the two must meet",
+        description="instead of point: its position in the frames of both bodies [m], which must coincide",
     )
     motor: MotorTable | None = Field(
         default=None, description="drives every coordinate: { servo = { gain = 20, torque = 30, velocity = 8 } }"
     )
     limits: Ends | None = Field(
         default=None,
-        description="[lower, upper] of every coordinate [rad], through any number of turns, or [m]; -inf and inf are "
-        "none",
+        description="[lower, upper] of every coordinate [rad] or [m]; -inf and inf mean none",
     )
-    limits_deg: Ends | None = Field(default=None, description="the same in degrees, where the joint turns")
+    limits_deg: Ends | None = Field(default=None, description="limits in degrees, for joints that turn")
     start: Coordinates | None = Field(
         default=None,
-        description="the coordinate at the start [rad], or [m], or a list of all; default 0. The second body, and all "
-        "that hangs on it, is carried there from where it lies in the file",
+        description="initial coordinate [rad] or [m], or a list; moves the second body and its descendants; default 0",
     )
-    start_deg: Coordinates | None = Field(default=None, description="the same in degrees, where the joint turns")
+    start_deg: Coordinates | None = Field(default=None, description="start in degrees, for joints that turn")
     spring: SpringTable | None = Field(default=None, description="{ stiffness = 5, damping = 0.1, rest = 0 }")
     armature: NonNegative = OWN["armature"]
     friction: NonNegative = OWN["friction"]

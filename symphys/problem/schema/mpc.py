@@ -14,47 +14,47 @@ Latency = NonNegative | Literal["measured", "cpu"]
 
 
 class PlantTable(SchemaTable):
-    """The plant that `symphys mpc` simulates in place of the real robot; keys left out are as in the file."""
+    """The plant that `symphys mpc` simulates in place of the real robot."""
 
     dt: Positive | None = Field(
         default=None,
-        description="the longest time step [s]; a tick has a whole number of steps. Default: half of [simulation]'s dt",
+        description="longest time step [s]; every tick has a whole number of steps. Default: half of [simulation]'s dt",
     )
     masses: Positive = Field(default=1.0, description="factor of all masses and inertias")
     set: dict[str, Any] = Field(
         default={}, description='other values, by the keys of --set: { "ground.friction" = 0.6, "upper.mass" = 1.2 }'
     )
-    noise: NonNegative = Field(
-        default=0.0, description="standard deviation of measured coordinates, positions [m] and angles [rad]"
-    )
-    rate_noise: NonNegative = Field(default=0.0, description="that of measured rates and velocities [m/s, rad/s]")
+    noise: NonNegative = Field(default=0.0, description="standard deviation of measured positions [m] and angles [rad]")
+    rate_noise: NonNegative = Field(default=0.0, description="standard deviation of measured velocities [m/s, rad/s]")
     seed: Seed = Field(default=0, description="of the noise")
     delay: NonNegative = Field(default=0.0, description="from a command to its effect [s], in whole steps of the plant")
     latency: Latency = Field(
         default="measured",
-        description='how long after its measurement a plan acts [s]; "measured": as long as the solver took; "cpu": as '
-        "much processor time as it took, for busy machines",
+        description='from a measurement to its plan [s]: a number, the solver\'s wall time ("measured") or processor '
+        'time ("cpu")',
     )
 
 
 class MpcTable(SchemaTable):
-    """Model predictive control: `symphys mpc FILE`, and symphys.Controller."""
+    """Model predictive control, for `symphys mpc` and symphys.Controller."""
 
-    rate: Positive = Field(description="measurements and new plans in a second [Hz]")
+    rate: Positive = Field(description="measurements and plans per second [Hz]")
     horizon: Positive | None = Field(
-        default=None, description="how far a plan looks ahead [s], a whole number of dt; default: the whole duration"
+        default=None, description="length of a plan [s], a whole number of dt; default: the whole duration"
     )
     dt: Positive | None = Field(default=None, description="time step of the model [s]; default: that of [simulation]")
-    iterations: Iterations = Field(default=1, description="of iLQR at each tick")
-    first_iterations: Iterations = Field(default=50, description="of iLQR before the first tick, from the guess")
-    damping: Positive = Field(default=1e-4, description="first and least regularisation, in units of scale")
+    iterations: Iterations = Field(default=1, description="iLQR iterations in each tick")
+    first_iterations: Iterations = Field(
+        default=50, description="iLQR iterations before the first tick, from the guess"
+    )
+    damping: Positive = Field(default=1e-4, description="initial and smallest regularisation, in units of scale")
     smoothing: NonNegative | None = Field(
-        default=None, description="of the model's contacts [m/s]; default: the last of [simulation]'s"
+        default=None, description="of the model's contacts [m/s]; default: the last stage of [simulation]"
     )
     feedback: bool = Field(
-        default=False, description="between ticks, commands answer what is measured, by the gains of the plan"
+        default=False, description="correct commands between ticks by the feedback gains of the plan"
     )
     duration: Positive | None = Field(
-        default=None, description="how long `symphys mpc` goes on [s]; default: five times [simulation]'s duration"
+        default=None, description="length of a `symphys mpc` run [s]; default: five times [simulation]'s duration"
     )
     plant: PlantTable = PlantTable()

@@ -23,148 +23,140 @@ from symphys.problem.schema.types import (
     Texts,
 )
 
-UNIT = 'of the value, such as "m/s", for messages; default: that of its formula, where it is clear'
+UNIT = 'of the value, for messages, such as "m/s"; default: derived from the formula'
 Knots = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 class VariableTable(SchemaTable):
-    """Something that a solver may choose."""
+    """A quantity that the solver chooses."""
 
-    name: Identifier = Field(description="how formulas and results refer to it")
+    name: Identifier = Field(description="its name in formulas and results")
     sets: Texts = Field(
-        description='what it sets: "ball.velocity", "ball.force[0:2]", "knee.command", "knee.start", '
-        '"ground.friction", or a list; an orientation (w, x, y, z) is normalised'
+        description='"ball.velocity", "ball.force[0:2]", "knee.command", "knee.start", "ground.friction", or a list'
     )
     guess: Numbers | None = Field(
-        default=None, description="where solvers start; default: what the file says (forces and commands: 0)"
+        default=None, description="where solvers start; default: the file's value (forces and commands: 0)"
     )
-    lower: Bounds | None = Field(
-        default=None, description="for all components, or one for each; default: none, or what is physical"
-    )
-    upper: Bounds | None = Field(default=None, description="likewise; default: none, or what is physical")
+    lower: Bounds | None = Field(default=None, description="lower bound; default: none, or the physical one")
+    upper: Bounds | None = Field(default=None, description="upper bound; default: none, or the physical one")
     scale: Numbers | None = Field(
-        default=None, description="a typical change; default 1, for parameters their own size"
+        default=None, description="a typical change; default: 1, for parameters their own size"
     )
     spread: Numbers | None = Field(
         default=None,
         description="standard deviation with which seeds above 0 perturb the guess; default: a tenth of scale",
     )
     knots: Knots = Field(default=1, description="for forces, torques and commands: number of values over the duration")
-    interpolation: Interpolation = Field(
-        default="constant", description="of forces, torques and commands between knots"
-    )
+    interpolation: Interpolation = Field(default="constant", description="between knots")
     each: Literal["recording"] | None = Field(
         default=None,
-        description='"recording": a value of its own for every recording, such as a start or the offset of a clock',
+        description='"recording": a separate value for every recording',
     )
     prior: Prior | None = Field(
         default=None,
-        description="what `symphys identify` knows beforehand: [mean, standard deviation], each a number or a list "
-        "with one for each component",
+        description="[mean, standard deviation], numbers or lists, for `symphys identify`",
     )
 
 
 class GuessTable(SchemaTable):
-    """A guess of the states along the motion, for solvers whose variables are states too (multiple_shooting).
+    """A guess of the states along the motion, for multiple_shooting.
 
-    What is named moves on straight lines between the times at which it is named, and stays before and after. Its rates
-    are the slopes of these lines where they are not named themselves. Everything else moves as the guess of the
-    variables has it.
+    Quantities are interpolated linearly between the times at which they are given, and constant outside. Rates that
+    are not given are the slopes. Other quantities come from the rollout of the variables' guess.
     """
 
     states: list[dict[str, Any]] = Field(
-        default=[], description="{ at = 2.0, knee.angle = 1.2, torso.position = [0, 0, 1] }, times [s] in any order"
+        default=[], description="{ at = 2.0, knee.angle = 1.2, torso.position = [0, 0, 1] }, times in seconds"
     )
     follows: dict[str, str] = Field(
-        default={}, description='formulas of time and of references: { "knee.angle" = "walk.knee" }'
+        default={}, description='formulas of time and references: { "knee.angle" = "walk.knee" }'
     )
 
 
 class PhaseTable(SchemaTable):
-    """A stretch of the motion. Phases follow each other from the start, in the order of the file."""
+    """A part of the motion; phases follow each other in the order of the file."""
 
-    name: Label = Field(description='costs and constraints name it: during = "flight", at = "end of flight"')
-    until: Positive | None = Field(default=None, description="when it ends [s]; the last may leave that out")
+    name: Label = Field(description='its name: during = "flight", at = "end of flight"')
+    until: Positive | None = Field(default=None, description="when it ends [s]; not needed for the last phase")
     share: Positive | None = Field(
         default=None,
         le=1,
-        description="when it ends, as a share of the duration, at the nearest step",
+        description="instead of until: when it ends, as a share of the duration",
     )
     sets: dict[str, Any] = Field(
         default={},
-        description='numbers that hold in it alone: { "ground.friction" = 0.05, gravity = [0, 0, -1.6] }; of contacts, '
-        'motors and springs, and gravity. Variables may set them: "ice.ground.friction"',
+        description='values in this phase: { "ground.friction" = 0.05, gravity = [0, 0, -1.6] }; variables set '
+        '"ice.ground.friction"',
     )
 
 
 class CostTable(SchemaTable):
-    """A term of the objective: a number to make small, or a vector whose squares are summed."""
+    """A term of the objective, to be minimised."""
 
-    name: Label = Field(description="how results and reports refer to it")
+    name: Label = Field(description="its name in results")
     at: Moment = Field(
-        default="end", description='"end", "always" (integral over time), a time [s], or "end of" or "start of" a phase'
+        default="end",
+        description='"always" integrates over time; a number is a time [s]; "end of" and "start of" name a phase',
     )
-    during: Label | None = Field(default=None, description="a phase over which it is integrated, instead of at")
+    during: Label | None = Field(default=None, description="instead of at: a phase over which it is integrated")
     value: str | None = Field(default=None, description="formula of a number")
-    squares: str | None = Field(default=None, description="formula of a vector; the cost is the sum of its squares")
-    weight: Finite = Field(default=1.0, description="factor of the term; a negative one makes the value large")
+    squares: str | None = Field(
+        default=None, description="instead of value: formula of a vector whose squares are summed"
+    )
+    weight: Finite = Field(default=1.0, description="factor in the objective; a negative weight maximises")
 
 
 class TargetTable(SchemaTable):
     """A vector that should be zero within a tolerance; the objective gets weight * |value|^2."""
 
-    name: Label = Field(description="how results and reports refer to it")
-    at: Instant = Field(default="end", description='"end", a time [s], or "end of" or "start of" a phase')
-    value: str = Field(description="formula of what should be zero")
+    name: Label = Field(description="its name in results")
+    at: Instant = Field(default="end", description='a number is a time [s]; "end of" and "start of" name a phase')
+    value: str = Field(description="formula that should be zero")
     unit: Label | None = Field(default=None, description=UNIT)
-    tolerance: Positive = Field(description="met where the Euclidean norm of the value is at most this")
-    weight: NonNegative = Field(default=1.0, description="factor of the squared norm of the value in the objective")
+    tolerance: Positive = Field(description="largest Euclidean norm that counts as met")
+    weight: NonNegative = Field(default=1.0, description="factor of the squared norm in the objective")
 
 
 class ConstraintTable(SchemaTable):
     """Bounds on every component of a vector."""
 
-    name: Label = Field(description="how results and reports refer to it")
+    name: Label = Field(description="its name in results")
     at: Moment = Field(
-        default="end", description='"end", "always" (every time step), a time [s], or "end of" or "start of" a phase'
+        default="end",
+        description='"always" means every step; a number is a time [s]; "end of" and "start of" name a phase',
     )
-    during: Label | None = Field(default=None, description="a phase in which it holds always, instead of at")
-    value: str = Field(description="formula of what is bounded")
-    lower: Bounds | None = Field(default=None, description="for all components, or one for each; default: none")
-    upper: Bounds | None = Field(default=None, description="likewise; default: none")
+    during: Label | None = Field(default=None, description="instead of at: a phase in which it always holds")
+    value: str = Field(description="formula of the bounded vector")
+    lower: Bounds | None = Field(default=None, description="lower bound; default: none")
+    upper: Bounds | None = Field(default=None, description="upper bound; default: none")
     equals: Numbers | None = Field(default=None, description="instead of lower and upper")
     tolerance: Positive = Field(default=1e-3, description="largest violation of a component that counts as met")
-    penalty: Positive = Field(
-        default=1e3, description="weight of squared violations for solvers that know no constraints"
-    )
+    penalty: Positive = Field(default=1e3, description="weight of squared violations, for solvers without constraints")
     unit: Label | None = Field(default=None, description=UNIT)
 
 
 class OutputTable(SchemaTable):
-    """A number that is reported: while solvers work, in results and in reports. Nothing depends on it."""
+    """A reported number; it does not influence the solution."""
 
-    name: Label = Field(description="how results and reports refer to it")
-    at: Instant = Field(default="end", description='"end", a time [s], or "end of" or "start of" a phase')
+    name: Label = Field(description="its name in results")
+    at: Instant = Field(default="end", description='a number is a time [s]; "end of" and "start of" name a phase')
     value: str = Field(description="formula of a number")
     unit: Label | None = Field(default=None, description='such as "m/s"')
 
 
 class TerminationTable(SchemaTable):
-    """A condition that ends a motion early: from then on nothing moves, and running costs stop."""
+    """A condition that ends a motion early; motion and running costs stop there."""
 
-    margin: str = Field(
-        description="formula of a number of the state; the motion ends where it falls below 0. Formulas know `alive`, "
-        "which is 1 until then and 0 from then on"
-    )
-    cost: NonNegative = Field(default=0.0, description="added for every second that is left; more than standing costs")
+    margin: str = Field(description="formula of the state; the motion ends where it falls below 0")
+    cost: NonNegative = Field(default=0.0, description="for every remaining second; more than the running costs")
 
 
 class ObjectiveTable(SchemaTable):
-    """The goal of the objective, and when a solve stops."""
+    """When a solve stops."""
 
-    goal: Finite | None = Field(default=None, description="the objective should come down to this")
+    goal: Finite | None = Field(default=None, description="value to which the objective should fall")
     stop: Stop | None = Field(
         default=None,
-        description='"met": stop at the first point that meets every target, constraint and the goal; "converged": '
-        "go on to the optimum. Default: met with a goal, or with targets and no costs",
+        description="stop at the first point that meets everything, or continue to the optimum; default: met with a "
+        "goal, or with targets and no costs",
     )

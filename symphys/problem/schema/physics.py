@@ -9,7 +9,7 @@ from pydantic import Field
 
 from symphys.model.world import GRAVITY, Law, Scheme
 from symphys.problem.schema.declared import table_of
-from symphys.problem.schema.shapes import EXAMPLES, UPRIGHT, ShapeTable, SolidTable
+from symphys.problem.schema.shapes import UPRIGHT, ShapeTable, SolidTable
 from symphys.problem.schema.types import (
     Finite,
     Grid,
@@ -33,12 +33,11 @@ DEFAULT = Scheme()
 
 
 class SimulationTable(SchemaTable):
-    """Duration, time step and settings of the integration."""
+    """Duration, time step and settings of the integrator."""
 
     duration: Positive | None = Field(
         default=None,
-        description="how long to simulate [s]; a whole number of time steps; needed unless there are [[recording]] "
-        "tables, up to whose last sample it then goes",
+        description="simulated time [s], a whole number of steps; default: up to the last [[recording]] sample",
     )
     dt: Positive = Field(description="time step [s]")
     sweeps: Sweeps = Field(
@@ -48,48 +47,41 @@ class SimulationTable(SchemaTable):
         default=DEFAULT.position_sweeps, description="sweeps of the pass that removes penetration"
     )
     warm_start: bool = Field(
-        default=DEFAULT.warm_start, description="start each step from the last one's contact forces"
+        default=DEFAULT.warm_start, description="start each step from the previous step's contact forces"
     )
     smoothing: Smoothing = Field(
         default=0.0,
         validate_default=True,
-        description="width [m/s] of the smooth contact law for solvers; 0 is exact. A list is stages, such as "
-        "[0.1, 0.01, 0]: each starts where the one before ended",
+        description="width of the smoothed contact law [m/s]; 0 is exact. A list gives stages: [0.1, 0.01, 0]",
     )
     push_out: Share = Field(default=DEFAULT.push_out, description="share of a penetration that one step removes")
     time_of_impact: bool = Field(
-        default=DEFAULT.time_of_impact, description="find the instant of each impact; without it gradients are wrong"
+        default=DEFAULT.time_of_impact, description="locate each impact within its step; gradients are wrong without it"
     )
     impact_friction: bool = Field(
-        default=DEFAULT.impact_friction, description="friction at an impact aims at the velocity at that instant"
+        default=DEFAULT.impact_friction, description="evaluate friction of an impact at the instant of the impact"
     )
     cuts: Cuts | None = Field(
         default=DEFAULT.cuts,
-        description="how often a step may be cut at an impact, so that impacts are taken one after the other; each "
-        "adds the work of a step. With 0 gradients of a body that is hit while it touches another are wrong. "
-        "Default: 2 where bodies may be hit off their centres, as boxes are, else 1",
+        description="how often an impact may split a step, which costs another step; with 0, gradients are wrong "
+        "where a body is hit while it touches another. Default: 2 if bodies can be hit off centre (boxes), else 1",
     )
-    energy_cap: bool = Field(
-        default=DEFAULT.energy_cap, description="no impact adds energy, which restitution with friction can"
-    )
+    energy_cap: bool = Field(default=DEFAULT.energy_cap, description="limit restitution so that no impact adds energy")
     load_sharing: bool = Field(
         default=DEFAULT.load_sharing,
-        description="points of a body that lie in a plane share their load linearly; without it the share depends on "
-        "all that was before",
+        description="distribute loads linearly over coplanar contact points, independently of the history",
     )
     newton_start: bool = Field(
         default=DEFAULT.newton_start,
-        description="all constraints on a few bodies are solved together before the sweeps: what several faces, wheels "
-        "or feet carry is shared by least squares, and impacts on points close together settle",
+        description="solve a few bodies' constraints together before the sweeps; settles several feet, wheels or "
+        "simultaneous impacts",
     )
 
 
 class WorldTable(SchemaTable):
-    """Gravity, which acts on every body."""
+    """Gravity."""
 
-    gravity: Vector = Field(
-        default=list(GRAVITY), description="acceleration of free bodies [m/s^2], for instance [0, 0, -9.81]"
-    )
+    gravity: Vector = Field(default=list(GRAVITY), description="acceleration of free bodies [m/s^2]")
 
 
 STATED = [each for each in fields(Law) if "combine" in each.metadata]
@@ -100,8 +92,8 @@ REST = [each for each in fields(Law) if "combine" not in each.metadata]
 class SurfaceTable(table_of("StatedTable", STATED, optional=True)):  # type: ignore[misc]
     """Contact properties of one surface.
 
-    Friction and restitution of a contact are the product of what its two surfaces state, torsion and rolling their
-    sum; if neither surface states it, the one in [contact] holds; a [[pair]] table overrides all.
+    Two touching surfaces multiply their friction and restitution, and add torsion and rolling. A value that neither
+    states comes from [contact]. A [[pair]] table overrides all.
     """
 
 
@@ -109,18 +101,18 @@ class MemberTable(SurfaceTable):
     """A surface that may belong to a group."""
 
     group: Identifier | None = Field(
-        default=None, description="a name shared by several surfaces, for collides_with and [[pair]]"
+        default=None, description="a name that several surfaces share, for collides_with and [[pair]]"
     )
     collides_with: list[str] | None = Field(
-        default=None, description="names of the bodies, static surfaces and groups that it may touch; default: all"
+        default=None, description="bodies, static surfaces and groups that it may touch; default: all"
     )
 
 
 class BodyTable(MemberTable):
-    """A rigid body and its state at the start, in world coordinates."""
+    """A rigid body and its initial state, in world coordinates."""
 
-    name: Identifier = Field(description="how formulas refer to it")
-    shape: ShapeTable | None = Field(default=None, description="its surface; without one it touches nothing")
+    name: Identifier = Field(description="its name in formulas")
+    shape: ShapeTable | None = Field(default=None, description="without a shape, the body touches nothing")
     mass: NonNegative | None = Field(
         default=None,
         description="of the whole body [kg]; needed unless density is given; 0: a frame between two joints",
@@ -128,65 +120,66 @@ class BodyTable(MemberTable):
     density: Positive | None = Field(default=None, description="[kg/m^3], instead of mass, for solid shapes")
     inertia: Inertia | None = Field(
         default=None,
-        description="about the centre of mass [kg m^2]: a number, three principal moments or a 3 x 3 matrix",
+        description="about the centre of mass [kg m^2]: a number, principal moments or a 3 x 3 matrix; default: from "
+        "shape and mass",
     )
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="of the centre of mass [m]")
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
-    velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="of the centre of mass at the start [m/s]")
-    angular_velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="at the start, world axes [rad/s]")
+    velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="initial velocity of the centre of mass [m/s]")
+    angular_velocity: Vector = Field(
+        default=[0.0, 0.0, 0.0], description="initial angular velocity, world axes [rad/s]"
+    )
 
 
 class GroundTable(MemberTable):
-    """The floor: the horizontal plane called ground."""
+    """The horizontal plane named ground."""
 
     height: Finite = Field(default=0.0, description="z of the surface [m]")
 
 
 class PlaneTable(MemberTable):
-    """A static wall: everything behind the plane is solid."""
+    """A static plane: everything behind it is solid."""
 
-    name: Identifier = Field(description="how pairs and settings refer to it")
-    normal: Vector = Field(description="out of the wall, any length but 0")
+    name: Identifier = Field(description="its name in pairs and settings")
+    normal: Vector = Field(description="points out of the wall; any length but 0")
     point: Vector | None = Field(default=None, description="any point of the plane [m]")
     offset: Finite | None = Field(
-        default=None, description="distance of the plane from the origin along the normal [m]"
+        default=None, description="instead of point: distance from the origin along the normal [m]"
     )
 
 
 class BlockTable(MemberTable):
-    """A static solid: a ramp, a step, a post, a wall with an end."""
+    """A static solid: a ramp, a step, a post."""
 
-    name: Identifier = Field(description="how pairs, formulas and settings refer to it")
-    shape: SolidTable = Field(description=f"its surface: {EXAMPLES}")
+    name: Identifier = Field(description="its name in pairs, formulas and settings")
+    shape: SolidTable = Field(description="one of the shapes")
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="of its centre [m]")
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
 
 
 class TerrainTable(MemberTable):
-    """Static ground of varying height: everything below is solid. Either a formula, or a grid of heights."""
+    """Static uneven ground, from a formula or a grid of heights; everything below is solid."""
 
-    name: Identifier = Field(description="how pairs and settings refer to it")
+    name: Identifier = Field(description="its name in pairs and settings")
     height: str | None = Field(
         default=None, description='formula of x and y [m], twice differentiable: "0.1 * sin(3 * x)"'
     )
     heights: Grid | None = Field(
         default=None,
-        description="z [m] on a grid, rows along y, columns along x; a smooth surface through them, within the range "
-        "of the four around a place, that goes straight on beyond the edges",
+        description="instead of height: z [m] on a grid, rows along y, columns along x; the surface does not overshoot",
     )
-    spacing: Spacing | None = Field(default=None, description="of the grid [m]: a number, or [along x, along y]")
+    spacing: Spacing | None = Field(default=None, description="grid spacing [m]: a number, or [along x, along y]")
     origin: Pair | None = Field(default=None, description="x and y of the first height [m]; default [0, 0]")
 
 
 class ContactTable(table_of("LawTable", fields(Law))):  # type: ignore[misc]
-    """The law of contacts for which no surface and no pair states anything else."""
+    """Default contact properties."""
 
 
 class PairTable(table_of("PairLawTable", REST, base=SurfaceTable, optional=True)):  # type: ignore[misc]
-    """Contact properties of a pair of surfaces, in place of their own."""
+    """Contact properties of a pair of surfaces, which replace their own."""
 
     between: Annotated[list[str], Field(min_length=2, max_length=2)] = Field(
-        description="two names of surfaces or groups; a table with two surfaces' names beats one with a group, and "
-        "that one a table with two groups"
+        description="two surfaces or groups; names of surfaces take precedence over groups"
     )
     collide: bool = Field(default=True, description="false: the two pass through each other")

@@ -82,40 +82,36 @@ Noise = Annotated[
 class ColumnsTable(SchemaTable):
     """The columns of a quantity, and their units."""
 
-    columns: Texts = Field(description='names of columns, or one array (n, components) of an NPZ file: "orientation"')
-    unit: Unit | None = Field(default=None, description="of the columns; default: that of the engine, SI and rad")
-    factor: Finite = Field(default=1.0, description="of the numbers, instead of unit: 0.001 for millimetres")
-    offset: Finite = Field(default=0.0, description="added after that, in the unit of the engine")
+    columns: Texts = Field(description="names of columns, or one array (n, components) of an NPZ file")
+    unit: Unit | None = Field(default=None, description="of the columns; default: SI and rad")
+    factor: Finite = Field(default=1.0, description="instead of unit: 0.001 for millimetres")
+    offset: Finite = Field(default=0.0, description="added after conversion, in SI units")
     quaternion: Literal["wxyz", "xyzw"] = Field(
-        default="wxyz", description="the order of the columns of an orientation; scipy and ROS have xyzw"
+        default="wxyz", description="order of an orientation's columns; scipy and ROS use xyzw"
     )
 
 
 class MeasuredTable(ColumnsTable):
-    """A quantity that was measured. NaN or an empty cell is a missing sample."""
+    """A measured quantity; NaN or an empty cell is a missing sample."""
 
-    value: str = Field(
-        description='formula of what the columns are: "cube.position", "cube.orientation", "hinge.angle", '
-        '"ball.position[2]", "foot.contact_force[2]"'
-    )
-    name: Label | None = Field(default=None, description="how reports refer to it; default: the formula")
+    value: str = Field(description='formula: "cube.position", "hinge.angle", "foot.contact_force[2]"')
+    name: Label | None = Field(default=None, description="its name in reports; default: the formula")
     noise: Noise | None = Field(
         default=None,
-        description="standard deviation, or one for each component, in the unit of the engine; of an orientation in "
-        "rad; default: estimated",
+        description="standard deviation in SI units (orientations: rad), or one for each component; default: estimated",
     )
 
 
 class InputTable(ColumnsTable):
-    """An input that was recorded: the command of a motor, a force or a torque on a body."""
+    """A recorded input: the command of a motor, a force or a torque on a body."""
 
     interpolation: Interpolation = Field(
         default="constant",
-        description='between samples: "constant", held until the next one, as drives hold their commands, or "linear"',
+        description='"constant" holds each sample until the next one, as motor drives do',
     )
     delay: Finite = Field(
         default=0.0,
-        description="it acts so much later than recorded [s]; a variable may set knee.command.delay, for all tables",
+        description="the input acts this much later [s]; variables set knee.command.delay",
     )
 
 
@@ -142,69 +138,61 @@ Inputs = Annotated[
 
 
 class FrameTable(SchemaTable):
-    """Origin and axes of the measurement system in the world."""
+    """Pose of the measurement system in the world; for positions, orientations, velocities and forces."""
 
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="of its origin [m]")
     orientation: Orientation = Field(
-        default=[1.0, 0.0, 0.0, 0.0], description="of its axes: (w, x, y, z), or { roll_deg, pitch_deg, yaw_deg }"
+        default=[1.0, 0.0, 0.0, 0.0], description="quaternion [w, x, y, z], or { roll_deg, pitch_deg, yaw_deg }"
     )
 
 
 class RecordingTable(SchemaTable):
-    """Measured motions: from files, or from a table of numbers in this file."""
+    """Measured motions, from files or from a table."""
 
     name: Identifier = Field(
-        description="of the recordings: toss/0017. Variables may set toss.offset, what is added to its times in "
-        "seconds, and toss.scale, a factor of its lengths"
+        description="recordings are named toss/0017; variables may set toss.offset (seconds added to times) and "
+        "toss.scale (factor of lengths)"
     )
     files: Texts | None = Field(
         default=None,
-        description='CSV files with a header, or NPZ files, beside this file: "tosses/*.csv", or a list; a pattern '
-        "stays in the folder of this file",
+        description='CSV files with a header, or NPZ files, in this folder: "tosses/*.csv"',
     )
     table: dict[str, Cells] | None = Field(
         default=None, description="columns, instead of files: { time = [0, 0.1], z = [1.0, nan] }"
     )
-    measured: list[MeasuredTable] = Field(min_length=1, description="which columns are which quantities")
+    measured: list[MeasuredTable] = Field(min_length=1, description="the measured quantities and their columns")
     rows: Label | None = Field(
         default=None,
-        description="of an NPZ file with one recording after the other: the array of their first rows, and at its end "
-        "the number of all rows",
+        description="of an NPZ file with several recordings: array of their first rows, then the number of rows",
     )
-    split: Label | None = Field(
-        default=None, description="a column of numbers; where its value changes, the next recording begins"
-    )
-    time: Label | None = Field(default=None, description="the column of times; default: time, without rate")
-    time_factor: Positive = Field(default=1.0, description="of the times: 0.001 for milliseconds")
-    rate: Positive | None = Field(default=None, description="samples in a second [Hz], where no column has the time")
+    split: Label | None = Field(default=None, description="a column; a new recording begins where its value changes")
+    time: Label | None = Field(default=None, description="column of times; default: time, without rate")
+    time_factor: Positive = Field(default=1.0, description="factor of the times: 0.001 for milliseconds")
+    rate: Positive | None = Field(default=None, description="sampling rate [Hz], if no column has times")
     clock: Literal["file", "first row"] | None = Field(
         default=None,
-        description="whether times are those of the file, or begin with 0 at the first row of each recording; "
-        'default: "first row" with start, rows or split, otherwise "file"',
+        description='"first row": times begin at 0 in each recording; default: "first row" with start, rows or split, '
+        'else "file"',
     )
     offset: Finite = Field(default=0.0, description="added to the times [s], after time_factor and clock")
-    until: Positive | None = Field(default=None, description="later samples are left out [s]")
+    until: Positive | None = Field(default=None, description="later samples are ignored [s]")
     frame: FrameTable | None = Field(
         default=None,
-        description="of the measurement system, for positions, orientations, velocities and forces; default: that of "
-        "the world",
+        description="frame of the measurement system; default: world",
     )
     start: dict[str, Any] = Field(
         default={},
-        description='what the first row sets at the start of the motion: { "cube.position" = ["x", "y", "z"] }, with '
-        'the units of the same columns in measured, or { "cube.velocity" = { columns = "v", unit = "mm/s" } }. Joints '
-        "too: hinge.angle, hinge.rate",
+        description='initial state from the first row, in the units of measured: { "cube.position" = ["x", "y", "z"], '
+        '"hinge.angle" = { columns = "q", unit = "deg" } }',
     )
     inputs: Inputs = Field(
         default={},
-        description='what drove the motion, recorded beside it: { "knee.command" = "u" }, or { "knee.command" = { '
-        'columns = "u", unit = "deg", interpolation = "linear" } }; also forces and torques on bodies. Before the '
-        "first and after the last sample values stay, and rows without a number are left out",
+        description='recorded commands, forces and torques: { "knee.command" = "u" } or { "knee.command" = { columns '
+        '= "u", unit = "deg" } }; the end values extend',
     )
     held_back: Held = Field(
         default=False,
-        description="recordings that are predicted only, not fitted to: true, a share such as 0.3 (evenly spread), or "
-        "a list of numbers from 0 or of names of files",
+        description="for validation only: true, a share (evenly spread), or a list of indices or file names",
     )
     weight: Positive = Field(default=1.0, description="factor of the squared residuals")
 
@@ -216,27 +204,25 @@ class RecordingTable(SchemaTable):
 
 
 class RecordedFileTable(SchemaTable):
-    """A file of a [[recording]], as run folders keep it."""
+    """A file of a [[recording]], in run folders."""
 
-    file: str = Field(description="as found beside the problem file")
-    path: str = Field(default="", description="where it was")
-    sha256: str = Field(pattern="^[0-9a-f]{64}$", description="of its content, which must not have changed")
-    text: str | None = Field(default=None, description="what is in it, where it is small")
+    file: str = Field(description="its name beside the problem file")
+    path: str = Field(default="", description="its original path")
+    sha256: str = Field(pattern="^[0-9a-f]{64}$", description="of its unchanged content")
+    text: str | None = Field(default=None, description="its content, if small")
 
 
 class IdentifyTable(SchemaTable):
-    """Settings of the identification of parameters from recordings."""
+    """Settings of parameter identification."""
 
     loss: Literal["squares", "huber"] = Field(
-        default="squares", description='of residuals over their noise; "huber" grows linearly beyond threshold'
+        default="squares", description='of normalised residuals; "huber" grows linearly beyond threshold'
     )
     threshold: Positive = Field(default=3.0, description="of the Huber loss, in standard deviations")
     iterations: Annotated[int, Field(ge=0, le=10_000)] = Field(default=100, description="of Levenberg-Marquardt")
-    tolerance: Positive = Field(
-        default=1e-4, description="converged where a step is below this share of the standard errors"
-    )
+    tolerance: Positive = Field(default=1e-4, description="converged where a step is smaller, in standard errors")
     bootstrap: Annotated[int, Field(ge=0, le=1000)] = Field(
-        default=0, description="fits to recordings drawn anew, whose spread gives a second interval; 0: none"
+        default=0, description="number of bootstrap fits for a second interval; 0: none"
     )
     horizons: Annotated[
         list[float],
@@ -246,18 +232,15 @@ class IdentifyTable(SchemaTable):
         ),
     ] = Field(
         default=[1.0],
-        description="shares of the recordings' time that are fitted one after the other, rising to 1: "
-        "[0.3, 0.5, 0.7, 0.85, 1] follows motions with many impacts",
+        description="increasing shares of the recorded time; [0.3, 0.5, 0.7, 0.85, 1] suits many impacts",
     )
     held_back_starts: Literal["guess", "before impact", "whole"] = Field(
         default="whole",
-        description="where own numbers of recordings that are held back come from, such as their starts: the guess, a "
-        "fit to what was measured before the first impact, or to the whole; shared numbers stay",
+        description="how starts of held-back recordings are found: from the guess, or fitted up to the first impact "
+        "or to the whole",
     )
     check: Literal["none", "cma"] = Field(
-        default="none", description='"cma": CMA-ES looks for other minima, from the same bounds'
+        default="none", description='"cma": search for other minima by CMA-ES within the bounds'
     )
-    check_evaluations: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
-        default=1000, description="of the whole residuals by CMA-ES"
-    )
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of the random numbers of both")
+    check_evaluations: Annotated[int, Field(ge=1, le=1_000_000)] = Field(default=1000, description="of CMA-ES")
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of bootstrap and CMA-ES")

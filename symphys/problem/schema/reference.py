@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from math import isinf
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import BaseModel
@@ -16,6 +17,7 @@ from symphys.problem.reading.messages import listed
 from symphys.problem.reading.solver_options import options_model
 from symphys.problem.schema import Document
 from symphys.problem.schema.physics import MemberTable, SurfaceTable
+from symphys.problem.schema.types import numbers_schema
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 UNIT = re.compile(r" ?\[((?:m|s|kg|rad|Hz|N|degrees|1/s)(?:[ /^][\w /^]*)?)\]")
@@ -25,16 +27,33 @@ DEFAULT = re.compile(r"(?:^|[;:.,] )[Dd]efault:? ([^.;]+)(?=[.;]|$)")
 COMPONENTS = {2: "[a, b]", 3: "[x, y, z]", 4: "[w, x, y, z]"}
 HEAD = """# Reference of problem files
 
-Every table and key of a problem file. `symphys schema --markdown` prints this page, and `symphys schema` prints the
-same as a JSON Schema, with which editors complete and check files. [Problem files](problem_files.md) explains the
-tables by examples.
+This page lists every table and key. [Problem files](problem_files.md) explains them by examples. `symphys schema`
+prints a JSON Schema, with which editors complete and check problem files.
 
-A `[table]` occurs once, a `[[table]]` any number of times, and a heading with a point is a table within another. Units
-are SI, z points up, and coordinates are those of the world unless the key says otherwise. A *name* consists of letters,
-digits and `_`, with a letter first. A *text* is any string; a *formula* is a text in the language of
-[formulas](formulas.md). Where no default is given, a key that is not needed is left out.
+A `[table]` occurs once, a `[[table]]` any number of times; a heading with a dot is a table inside another. Units are
+SI, z points up, and coordinates are world coordinates unless stated otherwise. A key marked *needed* is required.
+
+- *name*: letters, digits and `_`, starting with a letter.
+- *text*: any string. *formula*: a text in the language of [formulas](formulas.md).
+- *numbers*: one number for all components, a list with one for each, or a list of such lists, one for each knot.
 """
 SHARED = "These keys belong to `[[body]]`, `[ground]`, `[[plane]]`, `[[block]]` and `[[terrain]]`."
+REPEATED = {
+    "body.shape.parts": ("body.shape", "[[body]]"),
+    "[[block]]": ("[[body]]",),
+    "block.shape": ("body.shape.parts",),
+    "joint.slider": ("joint.hinge",),
+    "joint.helical": ("joint.hinge",),
+    "[[site]]": ("[[body]]",),
+    "[[constraint]]": ("[[target]]",),
+    "[[output]]": ("[[target]]",),
+    "recording.frame": ("[[body]]",),
+    "recording.inputs": ("recording.measured",),
+    "[solver.cma]": ("[solver.stochastic]",),
+    "[solver.evolution]": ("[solver.stochastic]",),
+}
+"""Headings of tables to those of others whose rows they repeat: equal rows become one row that links there."""
+EVERY_SOLVER = "Options of every solver"
 Schema = Mapping[str, Any]
 
 
@@ -98,18 +117,29 @@ def reference_page(solvers: Mapping[str, type[Any]]) -> str:
     old = {definition_of(key): name for name, key in tables.items() if key.get("deprecated")}
     parts = [HEAD, section("Top of the file", "Keys before the first table.")]
     parts.append(table({"properties": {k: v for k, v in tables.items() if not definition_of(v)}}, titles))
+    by_title = {title: schema["$defs"][name]["properties"] for name, title in titles.items()}
+    limits = shared_by([by_title[f"[{path}]"] for path in options])
     for name, title in titles.items():
         definition = schema["$defs"][name]
+        elsewhere = {other: by_title[other] for other in REPEATED.get(title, ()) if other in by_title}
         solver = title.removeprefix("[solver.").removesuffix("]")
         if solver in solvers:
             unlimited = {field.name for field in fields(solvers[solver]) if infinite(field.default)}
-            parts += [section(f"`{title}`", f"Options of the solver `{solver}`."), table(definition, titles, unlimited)]
+            if solver == next(iter(solvers)):
+                parts += [
+                    section(EVERY_SOLVER, "They belong to each of the following tables."),
+                    table(limits, titles, unlimited),
+                ]
+            own = {k: v for k, v in definition["properties"].items() if k not in limits["properties"]}
+            parts.append(section(f"`{title}`", f"[Solvers](solvers.md#{solver}) explains it."))
+            parts.append(table({"properties": own}, titles, unlimited, elsewhere))
             continue
         if title == "[[body]]":
             shared = f"{text_of(SurfaceTable.model_json_schema())} {SHARED}"
-            parts += [section("Surfaces", shared), table(SURFACE, titles, shared=False)]
+            parts += [section("Surfaces", shared), table(SURFACE, titles)]
         renamed = f" The old name `[{old[name]}]` is still read." if name in old else ""
-        parts += [section(f"`{title}`", text_of(definition) + renamed), table(definition, titles)]
+        elsewhere = {"Surfaces": SURFACE["properties"], **elsewhere}
+        parts += [section(f"`{title}`", text_of(definition) + renamed), table(definition, titles, (), elsewhere)]
     parts.append(section("`[set]`", sentence(schema["properties"]["set"]["description"])))
     return "\n".join(parts)
 
@@ -146,24 +176,44 @@ def section(title: str, text: str) -> str:
     return f"{'###' if '.' in title and '[' not in title else '##'} {title}\n\n{text}\n"
 
 
-def table(definition: Schema, titles: Mapping[str, str], unlimited: Collection[str] = (), shared: bool = True) -> str:
-    """The keys of a table, those first that are needed.
+def shared_by(tables: Sequence[Schema]) -> Schema:
+    """Return a table of the keys that all of some tables have, with one meaning."""
+    first, *others = tables
+    return {"properties": {name: key for name, key in first.items() if all(key == each.get(name) for each in others)}}
+
+
+def table(
+    definition: Schema,
+    titles: Mapping[str, str],
+    unlimited: Collection[str] = (),
+    elsewhere: Mapping[str, Schema] = MappingProxyType({}),
+) -> str:
+    """Return the keys of a table, those first that are needed.
 
     Args:
         definition: the table's JSON Schema.
         titles: headings of the sections by definition.
         unlimited: keys whose default is inf, which JSON cannot write.
-        shared: whether the keys of surfaces are left to the section that lists them.
+        elsewhere: by the heading of another section the keys that it lists; equal ones share a row that links there.
     """
     needed = definition.get("required", [])
     keys = sorted(definition["properties"].items(), key=lambda item: item[0] not in needed)
-    elsewhere = [k for k, v in keys if shared and v == SURFACE["properties"].get(k)]
-    rows = ["| key | type and unit | default | meaning |", "|---|---|---|---|"]
+    listed_in: dict[str, str] = {}
+    for title, others in elsewhere.items():
+        for name, key in keys:
+            if key == others.get(name):
+                listed_in.setdefault(name, title)
+    rows = ["| key | type | default | meaning |", "|---|---|---|---|"]
     for name, key in keys:
-        if name not in elsewhere:
+        if name not in listed_in:
             rows.append(row(name, key, titles, "needed" if name in needed else "`inf`" if name in unlimited else ""))
-    if elsewhere:
-        rows.append(f"| {', '.join(f'`{k}`' for k in elsewhere)} | | | as for all [surfaces](#surfaces) |")
+    for title in elsewhere:
+        names = [f"`{name}`" for name, _ in keys if listed_in.get(name) == title]
+        link = f"[{title.strip('[]')}](#{anchor(title)})"
+        if len(names) == len(elsewhere[title]):
+            rows.append(f"| all of {link} | | | |")
+        elif names:
+            rows.append(f"| {', '.join(names)} | | | see {link} |")
     return "\n".join(rows) + "\n"
 
 
@@ -237,6 +287,8 @@ def written(value: Any) -> str:
 
 def type_of(key: Schema, titles: Mapping[str, str]) -> str:
     """The kind of value in a few words: ``number > 0``, ``[x, y, z]``, ``"end" or number``."""
+    if [*key.get("anyOf", ())] == numbers_schema()["anyOf"]:
+        return "numbers"
     choices = key.get("anyOf") or key.get("oneOf")
     if choices:
         flat = [{"const": value} for choice in choices for value in choice.get("enum", [])]
@@ -259,7 +311,7 @@ def type_of(key: Schema, titles: Mapping[str, str]) -> str:
         name = definition_of(key)
         return f"[table](#{anchor(titles[name])})" if name is not None and name in titles else "table"
     if key.get("type") == "boolean":
-        return "`true` or `false`"
+        return "boolean"
     return number_type(key)
 
 

@@ -47,11 +47,9 @@ class SolidTable(one_of_the_shapes()):  # type: ignore[misc]
 
 
 class PartTable(SolidTable):
-    """One part of a compound: a shape, and its place in the body's frame."""
+    """One part of a compound: a shape and its pose in the body's frame."""
 
-    centre: Vector = Field(
-        default=[0.0, 0.0, 0.0], description="of the part, from the centre of mass, in the body's frame [m]"
-    )
+    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="position of the part in the body's frame [m]")
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
 
 
@@ -59,33 +57,29 @@ class PlacedSphereTable(SchemaTable):
     """One sphere of a compound of spheres."""
 
     radius: Positive = Field(description="of the sphere [m]")
-    centre: Vector = Field(
-        default=[0.0, 0.0, 0.0], description="of the sphere, from the centre of mass, in the body's frame [m]"
-    )
+    centre: Vector = Field(default=[0.0, 0.0, 0.0], description="position of the sphere in the body's frame [m]")
 
 
 class SphereTable(SchemaTable):
     """A sphere about the centre of mass."""
 
     radius: Positive = Field(description="of the sphere [m]")
-    hollow: bool = Field(
-        default=False, description="a thin shell instead of a solid sphere: I = 2/3 m r^2 instead of 2/5"
-    )
+    hollow: bool = Field(default=False, description="a thin shell, I = 2/3 m r^2, instead of a solid sphere, 2/5 m r^2")
 
 
 class ShapeTable(SolidTable):
-    """One of the shapes, or a compound of several."""
+    """A shape, or a compound of several."""
 
     sphere: SphereTable | None = Field(default=None, description=Sphere.example)
     spheres: list[PlacedSphereTable] | None = Field(
         default=None,
         min_length=1,
         max_length=MAX_PARTS,
-        description="a compound of spheres: [{ radius = 0.1, centre = [0.2, 0, 0] }, ...]",
+        description="compound of spheres: [{ radius = 0.1, centre = [0.2, 0, 0] }, ...]",
     )
     parts: list[PartTable] | None = Field(
         default=None,
         min_length=1,
         max_length=MAX_PARTS,
-        description="a compound: [{ box = { size = [0.2, 0.1, 0.3] }, centre = [0.2, 0, 0] }, ...]",
+        description="compound: [{ box = { size = [0.2, 0.1, 0.3] }, centre = [0.2, 0, 0] }, ...]",
     )

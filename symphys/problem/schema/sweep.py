@@ -17,9 +17,9 @@ class RangeTable(SchemaTable):
     """Numbers from one end to the other."""
 
     start: Finite = Field(alias="from", description="the first value")
-    to: Finite = Field(description="the last value; it is included")
+    to: Finite = Field(description="the last value, included")
     count: Annotated[int, Field(ge=2, le=MAX_VALUES)] | None = Field(
-        default=None, description="how many values; samples may do without, and then take any number between the ends"
+        default=None, description="number of values; without it, samples take any number in the range"
     )
     spacing: Literal["linear", "log"] = Field(default="linear", description='"log": by equal factors')
 
@@ -42,16 +42,16 @@ AXIS: dict[str, Any] = {
 
 
 class SweepTable(SchemaTable):
-    """Keys that take several values; `symphys solve` solves each combination, or samples of them.
+    """Keys that take several values; `symphys solve` solves every combination, or samples of them.
 
-    Further keys are those of `--set`, such as `"ball.mass"`, each with a list of values or with a table
+    Further keys are those of `--set`, such as `"ball.mass"`, each with a list of values or a table
     { from = 0.2, to = 2, count = 10, spacing = "log" }. [Sweeps](command_line.md#sweeps) has examples.
     """
 
     model_config = ConfigDict(extra="allow", json_schema_extra={"additionalProperties": AXIS})
 
-    samples: Samples = Field(default="grid", description='every combination, or samples that fill the space: "sobol"')
+    samples: Samples = Field(default="grid", description="all combinations, or space-filling samples")
     count: Annotated[int, Field(ge=1, le=MAX_SAMPLES)] | None = Field(
-        default=None, description="how many samples; a grid has none, and Sobol samples a power of two"
+        default=None, description="number of samples, for Sobol a power of two; not for a grid"
     )
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of the random numbers of samples")
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of the samples")

@@ -149,11 +149,11 @@ Stop = Literal["met", "converged"]
 
 
 class RollPitchYaw(SchemaTable):
-    """An orientation as angles: turn by roll about x, then pitch about y, then yaw about z, all fixed world axes."""
+    """Rotations about the fixed world axes, in this order."""
 
-    roll_deg: Finite = Field(default=0.0, description="about x, first [degrees]")
-    pitch_deg: Finite = Field(default=0.0, description="about y, second [degrees]")
-    yaw_deg: Finite = Field(default=0.0, description="about z, third [degrees]")
+    roll_deg: Finite = Field(default=0.0, description="about x [degrees]")
+    pitch_deg: Finite = Field(default=0.0, description="about y [degrees]")
+    yaw_deg: Finite = Field(default=0.0, description="about z [degrees]")
 
 
 Orientation = Annotated[
