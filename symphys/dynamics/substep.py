@@ -8,6 +8,7 @@ from typing import Any
 
 import casadi as ca
 
+from symphys.dynamics.applied import Wrench
 from symphys.dynamics.arguments import law_as_arguments
 from symphys.dynamics.articulated.forward_kinematics import FinalPose
 from symphys.dynamics.collision import Contact
@@ -28,12 +29,14 @@ from symphys.dynamics.joints.assembly import (
 from symphys.dynamics.joints.loop_closure import TreeDisplacement
 from symphys.dynamics.joints.warm_start import (
     Rotors,
+    Struck,
     add_joint_forces,
     commanded,
     impulses_along,
     keep_momentum,
     keep_rotors,
     lasting_forces,
+    limit_impacts,
     motor_impulses,
     project_velocities,
 )
@@ -134,7 +137,8 @@ def advance(
     # 8. what is stored: persistent forces (20), velocities (21)
     values: State = {"lag": half}
     (whole, momenta), rotors = _with_late_impulses(constraints, impulses, momenta), Rotors()
-    reactions = _store_forces(context, constraints, impulses, solved.momenta, kick, values)
+    impacts = limit_impacts(context, joints, by_joints)
+    reactions = _store_forces(context, constraints, impulses, solved.momenta, kick, values, x, impacts)
     if world.joints:
         struck, forces = lasting_forces(context, constraints, joints, by_joints, solved.momenta, x, kick)
         angles = unwrapped_angles(context, jointed, closed, duration)
@@ -212,13 +216,23 @@ def _store_forces(
     solved: AllVelocities,
     kick: Expr,
     values: State,
+    x: State,
+    impacts: Struck,
 ) -> list[tuple[Expr, Expr]]:
-    """Store persistent contact forces (without impacts) in ``values``; return their sum on each body."""
+    """Store persistent contact forces (without impacts) in ``values``; return their sum on each body.
+
+    Where a limit of a body's joints is struck, its contacts keep the forces of the last substep, as joints do: what
+    they give holds the impact, and would go on for the rest of the step.
+    """
     scheme = context.settings.scheme
     total = [(ca.SX.zeros(3), ca.SX.zeros(3)) for _ in context.world.bodies]
     for pair, each, impulse in zip(context.world.pairs, constraints, impulses, strict=True):
         moving = tuple(solved[i] for i in each.carriers) if pair.law.soft else ()
         force, torque = _persistent(each.constraint, impulse, kick, context.shortest_kick, moving)
+        struck = [impact for group, impact in impacts.items() if group & set(each.bodies)]
+        if struck and not pair.law.soft:
+            kept = x[f"{pair.name}.force"], x[f"{pair.name}.torque"] if pair.law.spins else ca.SX.zeros(3)
+            force, torque = _unless_struck(tuple(struck), kept, (force, torque))
         values[f"{pair.name}.force"] = force if scheme.warm_start else ca.SX.zeros(3)
         if pair.law.spins:
             values[f"{pair.name}.torque"] = torque if scheme.warm_start else ca.SX.zeros(3)
@@ -226,6 +240,12 @@ def _store_forces(
         for body, summed in zip(each.bodies, sums, strict=True):
             total[body] = summed
     return total
+
+
+@traced
+def _unless_struck(impacts: tuple[Expr, ...], kept: Wrench, found: Wrench) -> Wrench:
+    struck = ca.mmax(ca.vertcat(*impacts))
+    return ca.if_else(struck, kept[0], found[0]), ca.if_else(struck, kept[1], found[1])
 
 
 @traced

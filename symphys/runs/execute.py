@@ -302,11 +302,14 @@ def confirmed(transcription: Transcription, z: Array) -> bool:
     if not verdict.solved:
         return False
     rows = list[dict[str, Any]]()
-    for row in trust.finer_values(transcription, z):
-        rows.append(row)
-        if not holds(Examination.from_json(files.strict({"refined": [row]})), judged(verdict)):
-            return False
-    found = {**trust.survey(transcription, transcription.record(z)), "refined": rows}
+    try:
+        for row in trust.finer_values(transcription, z):
+            rows.append(row)
+            if not holds(Examination.from_json(files.strict({"refined": [row]})), judged(verdict)):
+                return False
+        found = {**trust.survey(transcription, transcription.record(z)), "refined": rows}
+    except NotFinite:  # another evaluator, or finer steps, lead somewhere that no number describes
+        return False
     return not doubts(Examination.from_json(files.strict(found)), judged(verdict))
 
 

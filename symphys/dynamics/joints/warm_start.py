@@ -61,6 +61,13 @@ def lasting_forces(
     return struck, _lasting_forces(context, joints, given, struck, solved, x, kick)
 
 
+def limit_impacts(context: StepContext, joints: Sequence[JointConstraint], given: Sequence[JointImpulse]) -> Struck:
+    """Return for each component with limits 1 if one of these is struck: then its contacts hold an impact, too."""
+    limited = {body for each in joints if each.name.rpartition(".")[2] in LIMITS for body in each.placed.bodies}
+    found = _struck(context, (), joints, given)
+    return {group: impact for group, impact in found.items() if group & limited}
+
+
 def _struck(
     context: StepContext,
     contacts: Sequence[PlacedConstraint],
