@@ -69,7 +69,7 @@ napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 # Types of other packages, and of the package's own rooms, which the page does not describe.
 nitpick_ignore_regex = [
-    ("py:class", "Array|ArrayLike|Figure|Path|Record|RecordedRollout|Replay|Source"),
+    ("py:class", "Array|ArrayLike|Figure|GuessedStates|Measure|Path|Record|RecordedRollout|Replay|Source"),
     ("py:.*", r"symphys\.[a-z_]+\..*"),
     ("py:.*", r"(collections|pathlib|types|typing|functools|enum|os)\..*"),
     ("py:.*", r"(casadi|ca|cma|gymnasium|jax|matplotlib|np|npt|numpy|pandas|pydantic|torch|xarray)\..*"),
