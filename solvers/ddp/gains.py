@@ -35,7 +35,8 @@ def gains_about(problem: ShootingProblem, z: Array, smoothing: float) -> dict[st
     for damping in DAMPINGS.tolist():
         policy = backward_pass(runs, costs, knots, staged.statics, bounds, damping)
         if policy is not None:
-            return gain_arrays(motion, policy, knots, staged)
+            found = gain_arrays(motion, policy, knots, staged)
+            return {**found, "by_state": staged.whole_gains(motion, found["step"].astype(np.int64), found["by_state"])}
     return {}
 
 

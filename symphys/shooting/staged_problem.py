@@ -229,6 +229,14 @@ class StagedProblem(Protocol):
         """Return slopes of all steps."""
         ...
 
+    def whole_gains(self, motion: StagedMotion, steps: Ints, by_state: Array) -> Array:
+        """Return gains by the tangents of all of a state, from those (K, n) by the tangents of ``linearize``.
+
+        They answer the states of the motion before ``steps`` (K,). Where the tangents are those of all of a state, the
+        gains are returned as they are.
+        """
+        ...
+
     def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
         """Yield the slopes in runs of steps, the last run first, each as soon as it is known.
 

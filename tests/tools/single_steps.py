@@ -17,6 +17,10 @@ class SingleSteps:
     def follow(self, *arguments: Any) -> None:
         """Not at once."""
 
+    def whole_gains(self, motion: StagedMotion, steps: Any, by_state: Any) -> Any:
+        """As they are: tangents are of all of a state."""
+        return by_state
+
     def linearize_from_end(self, motion: StagedMotion) -> Iterator[Linearized]:
         """Step by step."""
         found = self.linearize(motion)

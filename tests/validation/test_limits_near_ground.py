@@ -1,7 +1,7 @@
 """A knee that meets its stop while the tip of its leg is just above the ground: impacts give no energy.
 
-The stop slows the shank and throws the tip down, so the ground is met within the same step by what the stop did. Without
-gravity, motors and restitution no motion may end with more energy than it began with, beyond the error of a step.
+The stop slows the shank and throws the tip down, so the ground is met within the same step by what the stop did. No
+motion may end with more energy than it began with, without gravity, motors and restitution.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ from symphys.transcription import transcribe
 STOP, LINK, RADIUS, DT = 2.2, 0.5, 0.02, 0.01
 MASSES = {"thigh": (16.0, 0.3), "shank": (8.0, 0.15)}
 
-SHAPES: dict[str, Any] = {"thigh": {}, "shank": {"shape": {"spheres": [{"radius": RADIUS, "centre": [0, 0, -LINK / 2]}]}}}
+SHAPES: dict[str, Any] = {
+    "thigh": {},
+    "shank": {"shape": {"spheres": [{"radius": RADIUS, "centre": [0, 0, -LINK / 2]}]}},
+}
 
 
 def kinetic() -> str:

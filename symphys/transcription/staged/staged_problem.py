@@ -24,6 +24,7 @@ from symphys.transcription.staged.linearization import Linearization, statics_of
 from symphys.transcription.staged.policy_rollout import PolicyRollout, PolicySizes, running_costs, running_sums
 from symphys.transcription.staged.stage_functions import ByColumns, StepRows
 from symphys.transcription.staged.stage_terms import Kind, StageTerm
+from symphys.transcription.staged.tangent import Tangent
 from symphys.transcription.staged.term_slopes import Blocks, TermGroups, TermSlopes
 from symphys.types import Array, Ints
 
@@ -117,7 +118,21 @@ class RolloutStages:
         own, other = self._linearization.step, self._linearization.without_forces()
         if other.tangent.size == self.tangent.size:
             return self
-        return RolloutStages(self.rollout, own.backend, own.threads, own.exact, self._priced, other)
+        made = RolloutStages(self.rollout, own.backend, own.threads, own.exact, self._priced, other)
+        made._whole = self.tangent
+        return made
+
+    _whole: Tangent | None = None
+
+    def whole_gains(self, motion: StagedMotion, steps: Ints, by_state: Array) -> Array:
+        """Implement ``StagedProblem.whole_gains``, to first order about the states."""
+        if self._whole is None:
+            return by_state
+        n, p, found = self.tangent.size, self.parameters(motion.z[None])[0], list[Array]()
+        for x, row in zip(self._plain(motion).x[steps], by_state, strict=True):
+            reduced = np.array(ca.DM(self.tangent.projection(x, p))) @ np.array(ca.DM(self._whole.basis(x, p)))
+            found.append(np.concatenate([row[:n] @ reduced, row[n:]]))
+        return np.array(found).reshape(len(by_state), -1)
 
     def begin(self, x: Array, time: float) -> None:
         """Let motions begin at a state (nx,) and time [s]; requires a fixed duration and no sums."""

@@ -85,3 +85,21 @@ def test_without_forces_nothing_changes() -> None:
     }
     stages = RolloutStages(symbolic_rollout(symphys.load(tables), timed=True), "casadi")
     assert stages.without_forces() is stages
+
+
+def test_gains_answer_whole_states(tmp_path: Path) -> None:
+    """A gain that reads the reduced tangent reads the same of the whole one, for small deviations."""
+    problem = problem_of("soft", tmp_path)
+    stages = RolloutStages(symbolic_rollout(problem, timed=True), "casadi")
+    reduced = stages.without_forces()
+    z = np.concatenate([variable.guess.ravel() for variable in problem.variables])
+    motion, rng, steps = stages.roll_out(z, 0.0), np.random.default_rng(0), np.array([3, 5])
+    rows = rng.normal(size=(2, reduced.tangent_size))
+    whole = reduced.whole_gains(motion, steps, rows)
+    assert whole.shape == (2, stages.tangent_size)
+    for k, row, lifted in zip(steps, rows, whole, strict=True):
+        x = motion.x[k][None]
+        moved = stages.retract(x, 1e-6 * rng.normal(size=(1, stages.tangent_size)))
+        near, far = reduced.difference(x, moved)[0], stages.difference(x, moved)[0]
+        assert lifted @ far == pytest.approx(row @ near, abs=1e-4 * np.abs(row * near).max())
+    assert stages.whole_gains(motion, steps, whole) is whole
