@@ -25,6 +25,7 @@ from engines import Rolling, Runs
 from imported_models import Imported, Match, all_models, begin, imported, matched, unforced
 
 from symphys.dynamics.functions import step_function
+from symphys.errors import install_advice
 from symphys.model.state_layout import Layout, initial_state
 from symphys.model.world import Scheme
 from symphys.types import Array
@@ -78,7 +79,7 @@ def rows(quick: bool = False, models: tuple[str, ...] = ()) -> Iterator[Row]:
     """
     found = [model.name for model in all_models()]
     if not found:
-        raise SystemExit("no models: pip install 'symphys[models]'")
+        raise SystemExit(f"no models: {install_advice('models')}")
     if quick:
         yield measure(models[0] if models else "gymnasium/ant", True)
         return

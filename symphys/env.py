@@ -1,4 +1,4 @@
-"""Gymnasium environments of any problem with controllers, motors or inputs; needs the extra ``symphys[env]``.
+"""Gymnasium environments of any problem with controllers, motors or inputs; needs the extra ``env``.
 
 Actions take the place of the controllers' outputs, and observations are the readings of sensors. The reward of a step
 is minus its cost, so that the return of an episode is minus the objective. If the problem's [termination] ends a motion
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symphys.api.compiled import CompiledStep, compile_step
-from symphys.errors import SymphysError
+from symphys.errors import SymphysError, install_advice
 from symphys.problem.problem import Source
 from symphys.types import Array
 
@@ -23,7 +23,7 @@ try:
     from gymnasium.spaces import Box
     from gymnasium.vector.utils import batch_space
 except ImportError as error:
-    raise ImportError('symphys.env needs Gymnasium: pip install "symphys[env]"') from error
+    raise ImportError(f"symphys.env needs Gymnasium: {install_advice('env')}") from error
 
 Info = dict[str, Any]
 

@@ -15,6 +15,11 @@ class Unavailable(SymphysError):
     """Something that this machine lacks, such as a C compiler; says what to do. Elsewhere the same command may work."""
 
 
+def install_advice(extra: str) -> str:
+    """Return how to install an extra: symphys is on no package index, so pip needs the path of a checkout."""
+    return f"pip install '.[{extra}]' in a checkout of symphys"
+
+
 @dataclass(frozen=True)
 class Issue:
     """One fault of a problem file.

@@ -1,4 +1,4 @@
-"""Rollouts and steps as differentiable functions of JAX arrays; needs the extra ``symphys[jax]``.
+"""Rollouts and steps as differentiable functions of JAX arrays; needs the extra ``jax``.
 
 Batches go to the compiled kernels by a callback to the host, in double precision, under ``jit``, ``grad`` and ``vmap``
 alike. Gradients are those of the kernels; they cannot be differentiated again, nor forwards.
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symphys.api.compiled import CompiledRollout, CompiledStep, compile, compile_step
-from symphys.errors import SymphysError
+from symphys.errors import SymphysError, install_advice
 from symphys.problem.problem import Source
 from symphys.transcription.open_step import StepResult, StepStart
 from symphys.transcription.recorded_rollout import RecordedRollout
@@ -23,7 +23,7 @@ try:
     import jax
     import jax.numpy as jnp
 except ImportError as error:
-    raise ImportError('symphys.jax needs JAX: pip install "symphys[jax]"') from error
+    raise ImportError(f"symphys.jax needs JAX: {install_advice('jax')}") from error
 
 Array = Any
 """jax.Array"""

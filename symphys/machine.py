@@ -228,7 +228,7 @@ def _threads(kernel: ProcessorKernel) -> str:
     alone = kernel.gradient(rows, [1.0])[1]
     kernel.threads = 2
     _require(kernel.gradient(rows, [1.0])[1], alone, 0.0)
-    return "give what one gives"
+    return "same result as one thread"
 
 
 def _warm(program: Program, cache: Cache) -> str:

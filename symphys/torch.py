@@ -1,4 +1,4 @@
-"""Rollouts and steps as differentiable functions of PyTorch tensors; needs the extra ``symphys[torch]``.
+"""Rollouts and steps as differentiable functions of PyTorch tensors; needs the extra ``torch``.
 
 Batches go to the compiled kernels, in double precision. States stay in double precision; observations and costs have
 the precision and the device of the action. Gradients are those of the kernels; they cannot be differentiated again.
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symphys.api.compiled import CompiledRollout, CompiledStep, compile, compile_step
+from symphys.errors import install_advice
 from symphys.problem.problem import Source
 from symphys.transcription.open_step import StepResult, StepStart
 from symphys.transcription.recorded_rollout import RecordedRollout
@@ -21,7 +22,7 @@ from symphys.types import Array
 try:
     import torch
 except ImportError as error:
-    raise ImportError('symphys.torch needs PyTorch: pip install "symphys[torch]"') from error
+    raise ImportError(f"symphys.torch needs PyTorch: {install_advice('torch')}") from error
 
 Tensor = Any
 """torch.Tensor"""

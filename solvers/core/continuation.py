@@ -26,8 +26,8 @@ Rate = Callable[[CountingEvaluator, Sequence[Array]], list[Point]]
 """Evaluates points by the solver's own measure, without offering them to the incumbent; [] if it has none."""
 EXACT_SMOOTHING = 0.0
 BETTER_CANDIDATE = (
-    "{} does better in the exact rollout than what the last stage came to, and is kept: what the stages gained, they "
-    "gained for another problem; try other stages, or none"
+    "{} is better in the exact rollout than the last stage, and is kept. The later stages improved the smoothed "
+    "problem only: try other stages, or none"
 )
 
 

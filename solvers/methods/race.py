@@ -76,8 +76,8 @@ NO_LIMIT = 10**12
 """Evaluations of a search, which its rounds limit."""
 SEEDS = 100_000
 """Between the seeds of searches that begin anew."""
-LOWEST = "everything is met, and from there no step lowers what it costs: good enough, or at a kink"
-ASTRAY = "what costs less misses what is asked for"
+LOWEST = "everything is met, and no step lowers the costs: the point is a minimum or lies at a kink"
+ASTRAY = "cheaper points violate a target or constraint"
 GIVEN_UP = "hops about it come no nearer: another guess, or stages of smoothing"
 USED_UP = "the finisher's iterations are used up: raise `finisher_iterations`"
 HOP_SIGMAS, HOP_KNOTS = (0.05, 0.1, 0.2), (3, 4, 6, 2)
@@ -105,11 +105,12 @@ class RaceOptions(SolverOptions):
     """Options of the race.
 
     Attributes:
-        finisher_iterations: of the finisher in each smoothing stage, at each start; also of the final convergence.
+        finisher_iterations: iterations of the finisher in each smoothing stage, at each start, and of the final
+            convergence.
         rounds: largest number of search rounds.
         generations: in each round.
         population: candidates in each generation.
-        knots: of the search splines, for each control.
+        knots: knots of the search splines, for each control.
         sigma: initial standard deviation of the search, in quarters of the distance of bounds.
     """
 

@@ -104,7 +104,7 @@ def load_robot(
     assets: Iterable[str | Path] = (),
     meshes: Literal["hull", "fit"] = "hull",
 ) -> Robot:
-    """Read a robot from an MJCF or URDF file; needs the extra ``symphys[robots]``.
+    """Read a robot from an MJCF or URDF file; needs the extra ``robots``.
 
     Args:
         path: the file, or ``package://gymnasium/envs/mujoco/assets/ant.xml`` for one in an installed package.

@@ -213,8 +213,8 @@ class Follower:
                 self.end(index, found.result)
         if self.left and not asked:
             self.ledger.note(
-                f"no driver is left, and {len(self.left)} of {len(self.indices)} runs are not done; the same command "
-                "does the rest"
+                f"all workers ended, and {len(self.left)} of {len(self.indices)} runs are not done; run the same "
+                "command again to complete them"
             )
 
     def close(self) -> None:
@@ -233,4 +233,4 @@ def outcome(job: Job) -> Result:
             return read_result(job.folder.path / RESULT)
     except files.FileError as error:
         return failure(job, str(error), again=True)
-    return found.result or failure(job, f"its driver could not write what it came to: {found.why}", again=True)
+    return found.result or failure(job, f"the worker could not write its result: {found.why}", again=True)

@@ -34,7 +34,7 @@ GROUPS = {
     "Problems": (new, check, show, solve, mpc, identify),
     "Results": (report, open_page, ls, best, diff, replay),
     "Robots and exports": (import_robot, export),
-    "What is there": (listing, schema, doctor, cache),
+    "Installation": (listing, schema, doctor, cache),
 }
 FIRST = "Begin with `symphys solve ball_throw`, then `symphys open`. `symphys COMMAND -h` has the options."
 

@@ -96,7 +96,7 @@ backend_option = click.option(
     metavar="auto|casadi|c|simd|simd32|cuda|cuda32",
     shell_complete=complete_backend,
     help="Evaluate with SIMD kernels (simd32: single precision) or casadi's C code, which need a C compiler, with a "
-    "GPU (cuda32: single precision; needs the extra symphys[cuda]), or with casadi's virtual machine (casadi).",
+    "GPU (cuda32: single precision; needs the extra cuda), or with casadi's virtual machine (casadi).",
 )
 
 

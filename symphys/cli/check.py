@@ -31,9 +31,9 @@ BUILDING, BUILDING_TAKES = "building the problem", 8.0
     help="Examine the solution of this run instead of the guess.",
 )
 def check(source: str, assignments: tuple[str, ...], folder: Path | None) -> int:
-    """Validate a problem file, and say how far its gradient and its motion can be trusted at the guess.
+    """Validate a problem file and examine its gradient and motion at the guess.
 
-    Exit code 1: the gradient disagrees with differences, or something is not finite.
+    Exit code 1: the gradient disagrees with differences, a check says "do not rely on it", or something is not finite.
     """
     from symphys.cli.examined import Examined, print_examined
     from symphys.cli.watching import working

@@ -26,7 +26,7 @@ def export(
     approximate: bool,
     assignments: tuple[str, ...],
 ) -> None:
-    """Write a problem as plain C sources, as casadi functions, or as a model for MuJoCo, that need no symphys.
+    """Export a problem as C sources, casadi functions or a MuJoCo model.
 
     Files that symphys did not write, or that were changed since, are not overwritten. What a model for MuJoCo
     approximates or leaves out stands in its first lines, and is printed.

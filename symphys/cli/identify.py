@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @click.option("--threads", type=click.IntRange(1, 256), help="Number of threads of the simulations.  [default: all]")
 @out_option
 def identify(source: str, assignments: tuple[str, ...], threads: int | None, out: Path, **options: Any) -> int:
-    """Estimate the variables of a problem from its recordings, and say what one may believe of them.
+    """Estimate the variables of a problem from recordings, with intervals and a residual analysis.
 
     Levenberg-Marquardt over all [[recording]] tables at once. The estimates with their intervals, what the recordings
     do not determine, and how well those that were held back are predicted go to the terminal and into the run folder.

@@ -50,9 +50,9 @@ def import_robot(
     assets: tuple[Path, ...],
     meshes: str,
 ) -> None:
-    """Read a robot from an MJCF or URDF file, say what becomes of each of its parts, and write it as TOML.
+    """Convert an MJCF or URDF model to a robot file, and list what was approximated or left out.
 
-    MuJoCo does the reading, which `pip install 'symphys[robots]'` brings. The file that is written is for [[include]].
+    Needs MuJoCo: `pip install '.[robots]'` in the checkout. The file that is written is for [[include]].
     """
     from symphys.api.robot import load_robot
 

@@ -17,8 +17,7 @@ from symphys.cli.arguments import complete_problem
 def listing() -> None:
     """List the shipped problems, the robots and tasks that problems include, and the solvers.
 
-    A problem has the solvers that it names, and the seconds that the first of them takes, all of the command included,
-    on two cores with AVX2, where all is compiled.
+    Brackets show the solvers that a problem names and the time of the first one, on two cores with compiled kernels.
     """
     from symphys import problems
     from symphys.problem import load_problem
@@ -38,7 +37,7 @@ def listing() -> None:
         echo_item(solver.name, solver.summary)
 
 
-NO_SOLVER = "chosen for it"
+NO_SOLVER = "automatic"
 """In place of the solvers that a problem names."""
 
 
@@ -62,7 +61,7 @@ def echo_item(name: str, text: str) -> None:
 def new(file: Path, source: str) -> None:
     """Write a copy of a shipped problem, robot or task, to be changed.
 
-    What it includes is found from anywhere. A file that is there already is not overwritten.
+    Includes are found from any folder. Existing files are not overwritten.
     """
     from symphys import problems
     from symphys.api.tools import new as copy
@@ -94,7 +93,7 @@ def schema(out: Path | None, markdown: bool) -> None:
 
 @click.command()
 def doctor() -> int:
-    """Say what symphys finds on this machine, try each thing, and say what to do about what does not work."""
+    """Test compilers, GPU and optional packages, and print how to fix what fails."""
     threads.limit()
     from symphys.machine import examine, healthy
 
@@ -107,7 +106,7 @@ def doctor() -> int:
 
 @click.group()
 def cache() -> None:
-    """Look at the kept kernels, or remove them."""
+    """Show or clear the cache of compiled kernels."""
 
 
 @cache.command()

@@ -35,10 +35,10 @@ COMPILING, TENTHS, PART = "compiling the model and the plant", 10, "controlling,
 )
 @out_option
 def mpc(source: str, assignments: tuple[str, ...], threads: int, out: Path) -> int:
-    """Control the plant of a problem by its table [mpc], and report the closed loop.
+    """Simulate model predictive control of a plant, and report the closed loop.
 
-    Every tick measures the plant, shifts the last plan and improves it. A plan acts when it is ready; time goes on
-    meanwhile by as much as the solver took. Ctrl-C ends the loop, and what happened until then is written.
+    Every tick measures the plant, shifts the last plan and improves it. A plan acts after the time that the
+    solver took. Ctrl-C ends the loop, and what happened until then is written.
 
     Exit code 0: every target is met at the end. Exit code 1: one is not, or the loop ended before its time.
     """
@@ -80,7 +80,7 @@ def lines(record: ClosedLoopRecord) -> list[str]:
         f"worst {1e3 * record.worst:.3g} ms",
     ]
     if record.share < 1:
-        found.append("  when late    the plan before goes on until the new one is ready")
+        found.append("  when late    the previous plan continues until the new one is ready")
     for target in record.targets:
         word = f"met for {target.held:.3g} s" if target.met else "not met"
         found.append(f"  target       {target.name}: {target.error:.3g} of {target.tolerance:g}, {word}")

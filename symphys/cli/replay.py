@@ -12,10 +12,10 @@ from symphys import threads
 @click.command()
 @click.argument("folder", metavar="RUN", type=click.Path(path_type=Path))
 def replay(folder: Path) -> int:
-    """Roll out what a run found again, from the problem and the settings in its folder, and compare.
+    """Repeat the exact rollout of a run and compare it bit for bit.
 
     Exit code 0: the motion and all numbers are the same, to the bit. Exit code 1: they are not; the largest difference
-    of each quantity is printed, and which versions and which processor are others than then.
+    of each quantity is printed, and the versions and processors that differ.
     """
     threads.limit()
     from symphys.cli.watching import working

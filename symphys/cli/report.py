@@ -139,7 +139,7 @@ def report(
 @click.command("open")
 @click.argument("folder", metavar="[DIR]", default="reports", type=click.Path(path_type=Path))
 def open_page(folder: Path) -> int:
-    """Show the report of DIR, which is `reports` if it is left out, in a browser, and print its address.
+    """Show the report of DIR (default: reports) in a browser.
 
     DIR is that of a run or an identification, or one above run folders. A page that is out of date is made first.
     """

@@ -206,7 +206,7 @@ def ls(
     as_csv: bool,
     as_json: bool,
 ) -> None:
-    """List all runs below DIR, which is `reports` if it is left out.
+    """List all runs below DIR (default: reports).
 
     A run whose files cannot be read is listed with the file and the reason.
     """
@@ -244,7 +244,7 @@ def best(
     as_csv: bool,
     as_json: bool,
 ) -> None:
-    """List the best run of each case below DIR, which is `reports` if it is left out.
+    """List the best run of each case below DIR (default: reports).
 
     A case is a problem with its settings. A run is better by its verdict, then by the objective, then by its cost in
     rollouts.
@@ -282,7 +282,7 @@ def diff(first: Path, second: Path) -> None:
             raise click.UsageError(f"{folder} is no run folder; `symphys ls DIR` lists those below a folder")
     found = differences(first, second)
     if not found:
-        click.echo("no difference: the same was asked for, and the same was found")
+        click.echo("no difference in configuration or results")
     part = ""
     for each in found:
         if each.part != part:

@@ -39,7 +39,7 @@ def show(
     """Simulate the guess of a problem, or a robot by itself, and draw the motion.
 
     A robot is a shipped one, or a file that problems may include, also one of an installed package
-    (package://NAME/PATH). It falls to the ground, and motors that aim at an angle or a position hold the start.
+    (package://NAME/PATH). The robot drops to the ground while its position motors hold the start.
     """
     from symphys import problems
     from symphys.importing.packages import model_file

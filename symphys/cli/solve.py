@@ -183,8 +183,8 @@ def solve(
 ) -> int:
     """Solve problems, and write a report.
 
-    FILE is a problem file, or the name of a shipped problem (see `symphys list`). What is done already is not done
-    again, and what was interrupted goes on where it stopped.
+    FILE is a problem file, or the name of a shipped problem (see `symphys list`). Completed runs are reused;
+    interrupted runs resume.
     """
     began = perf_counter()
     threads.limit()

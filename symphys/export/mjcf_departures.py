@@ -74,7 +74,10 @@ def departures(start: StartState) -> list[Departure]:
 def shorter_step(dt: float, count: int) -> Iterator[Departure]:
     """Yield the departure of a time step that is cut into parts."""
     if count > 1:
-        text = f"{dt / count:g} s in place of {dt:g} s, at which MuJoCo does not hold these motors, springs or contacts"
+        text = (
+            f"time step {dt / count:g} s instead of {dt:g} s, because MuJoCo is unstable with these motors, springs or "
+            f"contacts at {dt:g} s"
+        )
         yield Departure("approximated", ("time step",), text)
 
 

@@ -90,7 +90,7 @@ def advice(trust: Examination, judged: Judged) -> str:
     """Write one paragraph of what follows from the findings."""
     lines = findings(trust, judged)
     if trust.fault:
-        return f"Mend this first, since solvers cannot pass it: {trust.fault}."
+        return f"Fix this first, because no solver can continue past it: {trust.fault}."
     level = {about: worst_of(each.level for each in lines if each.about == about) for about in SUBJECTS}
     parts = (
         of_influence(trust, judged),
@@ -109,26 +109,25 @@ def of_influence(trust: Examination, judged: Judged) -> str:
     none = [check.variable for check in trust.gradient if unfelt(check)]
     if not none:
         return ""
-    why = f"The gradient of {listed(none)} is zero or next to it: nothing that the problem asks for depends on it here"
+    them = "it" if len(none) == 1 else "them"
+    why = f"The gradient of {listed(none)} is zero or negligible: no target, constraint or cost depends on {them} here."
     if judged.accepted:
-        return f"{why}."
+        return why
     return (
-        f"{why}, as where a body is held by friction or misses what it should hit; begin elsewhere, smooth the "
-        "contacts, or use a solver that needs no gradient."
+        f"{why} Typical causes are a body that friction holds and a throw that misses. Use another guess, smoothing, "
+        "or a derivative-free solver."
     )
 
 
 def of_misses(trust: Examination) -> str:
     """Advise on near misses and glancing touches."""
     line = next(iter(miss_findings(trust)), None)
-    return f"Close by the motion is another one. {line.meaning}" if line else ""
+    return f"A small change of the variables changes the contacts. {line.meaning}" if line else ""
 
 
 def of_slopes(trust: Examination, level: Mapping[str, str]) -> tuple[str, ...]:
     """Advise on gradients, for solvers that follow them."""
-    other = (
-        "Simulated more finely the gradient is another one: halve the time step where a solver that follows it stalls."
-    )
+    other = "The gradient changes under refinement: halve the time step if a gradient-based solver stalls."
     return (
         of_gradient(level[GRADIENT], level[GROWTH]),
         of_growth(trust, level[GROWTH], level[GRADIENT]),
@@ -141,21 +140,21 @@ def of_accepted(level: Mapping[str, str]) -> tuple[str, ...]:
     kinks = worst_of([level[GRADIENT], level[SLOPES]]) in (FAIR, BAD)
     sensitive = level[GROWTH] in (FAIR, BAD)
     return (
-        "Gradients are right up to what is named below; what was found does not rest on them."
+        "The gradients have the errors listed below; the result does not depend on them."
         if kinks
         else of_gradient(level[GRADIENT], level[GROWTH]),
-        "The end is sensitive to what comes before." if sensitive else "",
+        "The final state is sensitive to earlier states." if sensitive else "",
     )
 
 
 def of_gradient(level: str, growth: str) -> str:
     """Advise on the comparison of the gradient with finite differences."""
     if level == BAD and growth == BAD:
-        return "Gradient and differences disagree, as they must where changes grow so fast."
+        return "Gradient and finite differences disagree, as expected for such a high sensitivity."
     return {
         GOOD: "The gradient is right: it agrees with differences.",
         FAIR: "The gradient is right up to kinks nearby; a little smoothing may help a solver that stalls.",
-        BAD: "Here the gradient misleads: use a solver that needs none, raise the smoothing, or begin elsewhere.",
+        BAD: "The gradient is misleading here: use a derivative-free solver, more smoothing, or another guess.",
     }.get(level, "")
 
 
@@ -163,7 +162,7 @@ def of_growth(trust: Examination, level: str, gradient: str) -> str:
     """Advise on the growth of changes; only a gradient that is right is said to reach far."""
     far = reach(trust.growth)
     if not math.isnan(far.lost):
-        return f"Derivatives break off going back from the end at t = {show(far.lost)} s: begin from another guess."
+        return f"Derivatives are not finite before t = {show(far.lost)} s: use another guess."
     if level == BAD:
         if math.isfinite(far.end):
             return (
@@ -174,8 +173,8 @@ def of_growth(trust: Examination, level: str, gradient: str) -> str:
     if level == GOOD and gradient not in (GOOD, FAIR):
         return ""
     return {
-        GOOD: "It reaches over the whole horizon, since changes hardly grow on the way.",
-        FAIR: "The end is sensitive to what comes before, so small steps are to be expected.",
+        GOOD: "It is reliable over the whole horizon, because perturbations hardly grow.",
+        FAIR: "The final state is sensitive to earlier states, so solvers can take only small steps.",
     }.get(level, "")
 
 
@@ -183,10 +182,10 @@ def of_grid(trust: Examination, level: str, judged: Judged) -> str:
     """Advise on the result of refinement."""
     if level == GOOD:
         held = "still meets every check" if judged.met and judged.checked else "changes little"
-        return f"The result {held} when it is simulated more finely, so it is not an accident of the time grid."
+        return f"The result {held} in a finer simulation, so it is not an artefact of the time grid."
     return {
-        FAIR: "Simulated more finely it drifts a little: to build on the result, solve again with half the time step.",
-        BAD: f"Simulated more finely it falls apart: {finer(trust, judged)} until the result holds.",
+        FAIR: "A finer simulation changes the result slightly: to build on it, solve again with half the time step.",
+        BAD: f"The result does not hold in a finer simulation: {finer(trust, judged)} until it does.",
     }.get(level, "")
 
 
@@ -200,7 +199,7 @@ def finer(trust: Examination, judged: Judged) -> str:
 def of_smoothing(level: str) -> str:
     """Advise on the smoothed rollout, where solvers use it."""
     if level in (FAIR, BAD):
-        return "Without the smoothing that solvers see the answer is another: lower it, or solve again without."
+        return "The result differs without smoothing: lower the smoothing, or solve again without it."
     return ""
 
 
@@ -213,8 +212,8 @@ def of_physics(lines: Sequence[Finding], level: Mapping[str, str]) -> str:
     parts.append(
         {
             GOOD: "The contacts are resolved cleanly.",
-            FAIR: "The contacts are resolved with small errors, named below.",
-            BAD: "The contacts are not resolved well enough; mend that before anything else.",
+            FAIR: "The contacts are resolved with small errors, listed below.",
+            BAD: "The contacts are not resolved accurately enough. Fix this first.",
         }.get(level[CONTACTS], "")
     )
     return " ".join(part for part in parts if part)

@@ -17,7 +17,9 @@ INFLUENCE = "influence"
 NO_INFLUENCE_SHARE = 1e-8
 """A variable whose change by its scale changes no more, as a share of the value, changes nothing; what friction holds
 creeps by about a hundredth of that."""
-NO_INFLUENCE = "Nothing that the problem asks for depends on it here, so no solver that follows gradients moves it."
+NO_INFLUENCE = (
+    "No target, constraint or cost depends on this variable here, so gradient-based solvers do not change it."
+)
 
 GRADIENT_LIMITS = (1e-4, 1e-2)
 """Relative errors of a gradient: below the first it agrees, above the second it must not be used."""
@@ -77,8 +79,8 @@ def refined_finding(refined: Refined, judged: Judged) -> Finding:
         level = graded(refined.worst, WORST_LIMITS)
         meaning = {
             GOOD: "Every check is still met.",
-            FAIR: "Misses a tolerance by a little: the solution depends on the time grid.",
-            BAD: "Misses by far: the solution belongs to this time grid, not to the physics.",
+            FAIR: "A tolerance is missed by a little: the solution depends on the time grid.",
+            BAD: "A tolerance is missed by far: the solution is an artefact of this time grid.",
             UNKNOWN: "Could not be simulated.",
         }[level]
         doubt = {
@@ -104,7 +106,7 @@ def slope_finding(trust: Examination) -> list[Finding]:
     meaning = {
         GOOD: "The gradient hardly depends on the discretisation.",
         FAIR: "The gradient depends on the discretisation; a solver will notice, a smaller step helps.",
-        BAD: "Simulated more finely, the gradient is another one: it belongs to this time grid.",
+        BAD: "The gradient changes under refinement: it is an artefact of this time grid.",
     }[level]
     order = trust.order.get("gradient", math.nan)
     if ORDERS[0] <= order <= ORDERS[1]:
@@ -194,17 +196,21 @@ def smoothed_findings(rows: tuple[Smoothed, ...], judged: Judged) -> list[Findin
         level = smoothed_level(rows[0], judged)
         level = BAD if level == UNKNOWN else level
         if level != GOOD and judged.accepted:
-            return [Finding(SMOOTHING, UNKNOWN, what, number, "Smoothed it is another motion; it is judged without.")]
+            return [
+                Finding(
+                    SMOOTHING, UNKNOWN, what, number, "The smoothed motion differs from the exact one, which is judged."
+                )
+            ]
         meaning = {
-            GOOD: "What the solver sees is what happens without smoothing.",
-            FAIR: "The solver sees something a little better or worse than what happens: lower the smoothing at last.",
-            BAD: "The solver sees another problem than the one that is judged: lower the smoothing.",
+            GOOD: "The smoothed and the exact rollout agree.",
+            FAIR: "The smoothed rollout differs slightly from the exact one: lower the smoothing in the last stage.",
+            BAD: "The smoothed problem differs from the exact problem, which is judged: lower the smoothing.",
         }[level]
         return [Finding(SMOOTHING, level, what, number, meaning)]
     most = max((row.smoothing for row in rows if smoothed_level(row, judged) == GOOD), default=math.nan)
     if math.isnan(most):
-        return [Finding(SMOOTHING, UNKNOWN, what, number, "Even the least of these would make it another problem.")]
-    return [Finding(SMOOTHING, GOOD, what, number, f"Up to {show(most)} m/s it would change little.")]
+        return [Finding(SMOOTHING, UNKNOWN, what, number, "Even the smallest of these values changes the result.")]
+    return [Finding(SMOOTHING, GOOD, what, number, f"Smoothing up to {show(most)} m/s would change the result little.")]
 
 
 def smoothed_level(row: Smoothed, judged: Judged) -> str:

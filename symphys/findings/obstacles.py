@@ -13,23 +13,24 @@ TARGETS, BOUNDS = "targets", "bounds"
 MAX_BOUNDS = 3
 """How many bounds are named."""
 CONTRADICTING = (
-    "{names} cannot {all} be met near here: whatever is varied, some combination of their values stays the same, and "
-    "too large for their tolerances; change what one of them asks for, or let more vary"
+    "{names} cannot {all} be met near this point: a combination of their errors does not depend on the variables and "
+    "exceeds the tolerances. Change one of the targets, or add variables"
 )
 OPPOSED = (
-    "{names} hold each other: here, what brings one nearer takes another away as much; give the one that matters more "
-    "weight, allow another more tolerance, or let more vary"
+    "the gradients of {names} cancel here: improving one target worsens the others equally. Change their weights or "
+    "tolerances, or add variables"
 )
 OUTWEIGHED = (
-    "the costs hold {names} back: a [[target]] is a penalty beside them, so weigh it more (`weight`), or state a "
-    "[[constraint]] in its place"
+    "the costs outweigh {names}: a [[target]] is a penalty term. Raise its `weight`, or use a [[constraint]] instead"
 )
 UNTOUCHED = (
-    "nothing moves {body}: {contact} comes nearest, to {gap} m at t = {time} s, and from there no gradient says where "
-    "to go; begin with a motion that touches it, or let a search find one (`--solver race`)"
+    "nothing moves {body}: the closest approach is {gap} m ({contact} at t = {time} s), so the gradient of its motion "
+    "is zero. Start from a motion that touches it, or search without gradients (`--solver race`)"
 )
-EQUATIONS = "More equations than numbers that may vary: all are met only where some of them depend on each other."
-HELD = "It ends there, and what is minimised falls beyond: the bound holds it back. Widen it, if it may be wider."
+EQUATIONS = "There are more target components than unknowns. All can be met only if some of them are dependent."
+HELD = (
+    "The variable lies on its bound, and the objective decreases beyond it. Widen the bound if the problem allows it."
+)
 
 
 def obstacle_findings(trust: Examination, judged: Judged) -> list[Finding]:
@@ -39,7 +40,7 @@ def obstacle_findings(trust: Examination, judged: Judged) -> list[Finding]:
         kinds = (
             (trust.contradicting, "that contradict each other", CONTRADICTING),
             (against(trust), "that oppose each other", OPPOSED),
-            (trust.outweighed, "that costs hold back", OUTWEIGHED),
+            (trust.outweighed, "that the costs outweigh", OUTWEIGHED),
         )
         for names, which, clause in kinds:
             if names:
@@ -73,8 +74,8 @@ def obstacles(trust: Examination, judged: Judged) -> tuple[str, ...]:
     if bounds:
         named = [bound_words(bound) for bound in bounds[:MAX_BOUNDS]]
         more = [f"{len(bounds) - MAX_BOUNDS} more"] if len(bounds) > MAX_BOUNDS else []
-        verb = "holds" if len(bounds) == 1 else "hold"
-        clauses.append(f"{listed([*named, *more])} {verb} the answer back, which would improve beyond")
+        verb, them = ("is", "it") if len(bounds) == 1 else ("are", "them")
+        clauses.append(f"{listed([*named, *more])} {verb} active: the objective would improve beyond {them}")
     return tuple(clauses)
 
 

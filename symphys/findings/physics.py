@@ -37,12 +37,12 @@ COUNTED = (
     (
         "ambiguous_impacts",
         "Several bodies that meet at one instant",
-        "Rigid bodies have no one answer then: with the least gap between them the outcome is another.",
+        "Simultaneous impacts of rigid bodies have no unique outcome: the smallest gap between them changes it.",
     ),
     (
         "paradoxes",
-        "Contacts that friction pulls together",
-        "Painleve's paradox: Coulomb's law has no sliding solution there, or several; the contact sticks at once.",
+        "Painlevé's paradox (jamming contacts)",
+        "Coulomb's law has no sliding solution there, or several; the contact sticks at once.",
     ),
 )
 """Kinds of steps that are counted: the number in ``Examination``, what it is, and what it means where it is not 0. A
@@ -66,17 +66,17 @@ def residual_finding(trust: Examination, judged: Judged) -> Finding:
     """
     level, number = residual_level(trust), f"{beside(trust.residual, trust.impulse, 2)} N s"
     if level == BAD and graded(trust.left, LEFT_LIMITS) != BAD and holds_elsewhere(trust, judged):
-        meaning = f"Contact impulses had not settled{in_steps(trust)}{more_sweeps(trust)}. {elsewhere(trust)}"
+        meaning = f"The contact solver did not converge{in_steps(trust)}{more_sweeps(trust)}. {elsewhere(trust)}"
         return Finding(CONTACTS, FAIR, "Contact solver's residual", number, meaning)
     meaning = {
-        GOOD: "Contact impulses had settled.",
-        FAIR: f"Contact impulses still moved a little in the last sweep{more_sweeps(trust)}{velocity_left(trust)}.",
-        BAD: f"Contact impulses had not settled{in_steps(trust)}{more_sweeps(trust)}{velocity_left(trust)}.",
+        GOOD: "The contact solver converged.",
+        FAIR: f"Contact impulses still changed a little in the last sweep{more_sweeps(trust)}{velocity_left(trust)}.",
+        BAD: f"The contact solver did not converge{in_steps(trust)}{more_sweeps(trust)}{velocity_left(trust)}.",
         UNKNOWN: "Largest change of an impulse in the last sweep.",
     }[level]
     when = f" at t = {show(trust.residual_at)} s" * math.isfinite(trust.residual_at)
     size = f"{show(trust.residual, 2)} of {show(trust.impulse, 2)} N s"
-    doubt = f"impulses of contacts have not settled{when}: {size}{velocity_left(trust)}{refuted(trust, judged)}"
+    doubt = f"the contact solver did not converge{when}: {size}{velocity_left(trust)}{refuted(trust, judged)}"
     return Finding(CONTACTS, level, "Contact solver's residual", number, meaning, doubt * (level == BAD))
 
 
@@ -102,7 +102,7 @@ def refuted(trust: Examination, judged: Judged) -> str:
 def elsewhere(trust: Examination) -> str:
     """Return a sentence on what other numbers of sweeps lead to."""
     rows = [f"{show(row.objective)} with {row.what}" for row in trust.resettled]
-    return f"The result does not rest on where the sweeps end: the objective is {listed(rows)}."
+    return f"The result does not depend on the number of sweeps: the objective is {listed(rows)}."
 
 
 def in_steps(trust: Examination) -> str:
@@ -128,8 +128,8 @@ def more_sweeps(trust: Examination) -> str:
     if trust.residual_finer < SETTLING * trust.residual:
         return f"; {twice}: raise the number of sweeps"
     return (
-        f", and {twice}: they go round in a cycle or hardly move on, so more of them do not help; a smaller time step, "
-        "less friction or masses that differ less may"
+        f"; {twice}, so the solver oscillates or stagnates: try a smaller time step, less friction or a smaller mass "
+        "ratio"
     )
 
 
@@ -138,13 +138,13 @@ def depth_finding(trust: Examination) -> Finding:
     level = GOOD if trust.deepest <= 0 else graded(trust.deepest / trust.size, DEPTH_LIMITS)
     place = f" ({trust.depth_contact} at t = {show(trust.depth_time)} s)" if trust.depth_contact else ""
     meaning = {
-        GOOD: "Nothing to be seen beside the size of the bodies.",
-        FAIR: "Small beside the bodies, but visible; a smaller time step lessens it.",
+        GOOD: "Negligible compared with the size of the bodies.",
+        FAIR: "Small compared with the bodies, but visible; a smaller time step reduces it.",
         BAD: "Bodies sink into each other; use a smaller time step or more position sweeps.",
         UNKNOWN: "Largest overlap of two surfaces.",
     }[level]
     if level == BAD and trust.depth_time == 0:
-        meaning = "The motion begins with surfaces inside each other: bound what is varied so that they begin apart."
+        meaning = "Surfaces overlap at the start: bound the variables so that the bodies start apart."
     doubt = f"surfaces overlap by {show(trust.deepest, 2)} m{place}"
     number = f"{beside(trust.deepest, trust.size, 2)} m{place}"
     return Finding(CONTACTS, level, "Deepest penetration of rigid surfaces", number, meaning, doubt * (level == BAD))
@@ -156,7 +156,7 @@ def passage_finding(trust: Examination) -> Finding:
     where = f"{trust.passed_contact} at t = {show(trust.passed_time)} s, {show(trust.passed_depth, 2)} m deep"
     meaning = {
         GOOD: "No body went through another.",
-        FAIR: f"{where}: on the straight way between two instants; a smaller time step shows whether it was so.",
+        FAIR: f"{where}, on the straight path between two instants. A smaller time step shows if it passes through.",
         BAD: f"{where}: a body was on one side before the step and beyond after it; use a smaller time step.",
     }[level]
     doubt = f"a body goes through another: {where}"
@@ -268,12 +268,11 @@ def stop_findings(trust: Examination) -> list[Finding]:
     worst = trust.stops[0]
     where = f"{listed(worst.contacts)} at t = {show(worst.time)} s, step {worst.step}"
     meaning = (
-        f"{where}, takes {show(worst.energy, 2)} J from what "
-        "lay or rolled on a surface, by a force from another side: it ran into something. Where there is only a "
-        "seam or a small edge, it tripped: look at the motion there."
+        f"{where}, takes {show(worst.energy, 2)} J from a body that lay or rolled on a surface: it hit an obstacle, or "
+        "tripped over a seam or a small edge. Look at the motion there."
     )
     number = f"{show(worst.energy, 2)} J"
-    return [Finding(ENERGY, FAIR, "Energy that a stop from the side takes", number, meaning)]
+    return [Finding(ENERGY, FAIR, "Energy lost in a lateral impact", number, meaning)]
 
 
 def jump_findings(trust: Examination) -> list[Finding]:
@@ -283,11 +282,11 @@ def jump_findings(trust: Examination) -> list[Finding]:
         return []
     where = f'"{trust.jump_of}" at t = {show(trust.jump_time)} s'
     meaning = (
-        f"{where} moves in one step by {show(trust.jump_size, 3)}, farther than its velocities take it: something puts "
-        "it there at once, as a coupling or a limit that is not kept, or bodies that begin inside each other."
+        f"{where} jumps by {show(trust.jump_size, 3)} in one step, farther than its velocity explains. Check for "
+        "couplings and limits that are violated, and for bodies that overlap at the start."
     )
     doubt = f"{where} jumps by {show(trust.jump_size, 3)}, which no velocity explains"
-    what = "Change of place that no velocity explains"
+    what = "Unexplained displacement"
     return [Finding(ENERGY, level, what, show(trust.jump_size, 3), meaning, doubt * (level == BAD))]
 
 
@@ -304,14 +303,13 @@ def balance_finding(trust: Examination) -> Finding:
         level = UNKNOWN
     meaning = {
         GOOD: "Momentum adds up to rounding, and energy is only changed by forces and contacts.",
-        FAIR: "Some energy comes or goes in free motion, as of a body that tumbles or of servos that turn over: a "
-        "smaller time step lessens it.",
-        BAD: "Momentum or energy does not add up: that is a fault of the engine, or numbers beyond its precision.",
-        UNKNOWN: "Could not be added up.",
+        FAIR: "Energy drifts in free motion, by free rotation or switching servos. A smaller time step reduces it.",
+        BAD: "Momentum or energy is not balanced: this is an engine fault or a loss of precision.",
+        UNKNOWN: "The balance could not be computed.",
     }[level]
     largest = worst if math.isnan(trust.drifted) else max(worst, trust.drifted)
     number = f"{show(trust.momentum, 2)} of the momentum, {show(trust.drift, 2)} J"
-    total = f"{show(largest, 2)} J of energy come from nowhere"
+    total = f"{show(largest, 2)} J of energy are unaccounted for"
     when = f", most in the step from t = {show(trust.drift_at)} s" * math.isfinite(trust.drift_at)
-    doubt = total + when if by_energy == BAD else f"{percent(trust.momentum)} of the momentum comes from nowhere"
+    doubt = total + when if by_energy == BAD else f"{percent(trust.momentum)} of the momentum is unaccounted for"
     return Finding(ENERGY, level, "Left unexplained in a step", number, meaning, doubt * (level == BAD))

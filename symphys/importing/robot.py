@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from symphys.errors import Unavailable
+from symphys.errors import Unavailable, install_advice
 from symphys.files import modified
 from symphys.importing.packages import model_file
 from symphys.importing.reading.checking import check_model
@@ -48,7 +48,7 @@ COMPILE_TIMEOUT = 120.0
 """[s] that MuJoCo may take to read and compile a model."""
 START = "import sys, json; sys.path[:] = json.loads(sys.argv[2]); from pathlib import Path; "
 CALL = "from symphys.importing.reading.child import main; main(Path(sys.argv[1]))"
-MISSING = "models of robots are read by MuJoCo, which is not installed; pip install 'symphys[robots]'"
+MISSING = "reading a robot model needs MuJoCo: pip install mujoco, or " + install_advice("robots")
 
 
 def read_source(path: str | Path, options: ImportOptions = DEFAULT_OPTIONS) -> CompiledModel:

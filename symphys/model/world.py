@@ -66,8 +66,7 @@ class Law:
             "combine": lambda both: _product(*both),
             **declare(
                 "",
-                "Coulomb's coefficient, or two: [along, across] friction_direction; those of two surfaces are "
-                "multiplied",
+                "Coulomb coefficient, or [along, across] friction_direction",
                 "friction",
                 least=0.0,
                 phase="impulse",
@@ -80,7 +79,7 @@ class Law:
             "combine": prod,
             **declare(
                 "",
-                "share of the speed that is left after a bounce; those of two surfaces are multiplied",
+                "ratio of normal speeds after and before an impact",
                 least=0.0,
                 most=1.0,
                 phase="start",
@@ -91,12 +90,12 @@ class Law:
         default=0.0,
         metadata={
             "combine": sum,
-            **declare("m", "resists spinning about the normal: a radius", least=0.0, structural=True),
+            **declare("m", "resistance to spinning about the normal, a lever arm", least=0.0, structural=True),
         },
     )
     rolling: Scalar = field(
         default=0.0,
-        metadata={"combine": sum, **declare("m", "resists rolling: a radius", least=0.0, structural=True)},
+        metadata={"combine": sum, **declare("m", "rolling resistance, a lever arm", least=0.0, structural=True)},
     )
     frequency: Scalar = field(
         default=0.0,
@@ -111,15 +110,13 @@ class Law:
             "combine": itemgetter(0),
             **table_key(
                 "nonzero direction",
-                "along which the first of two coefficients holds: in the frame of a body, with which it turns; in "
-                "world axes where it belongs to what stands still, to a pair or to [contact]. Its part across the "
-                "contact's normal counts",
+                "direction of the first of two coefficients: in the body's frame for a body, otherwise in world axes",
             ),
         },
     )
     friction_frame: str | None = field(
         default=None,
-        metadata=table_key("identifier", "the body in whose frame friction_direction is; default: world axes"),
+        metadata=table_key("identifier", "the body whose frame friction_direction refers to; default: world axes"),
     )
     friction_side: int | None = field(default=None, repr=False)
 

@@ -44,8 +44,8 @@ Transcriptions = Callable[[Job], Transcription]
 """Job -> the transcription of its problem, such as a ``TranscriptionCache``."""
 NO_SAMPLES = "samples of [[scenario]] tables are evaluated by compiled kernels, and none can be made here"
 SMOOTHED_ONLY = (
-    "what the solver's smoothed rollout meets, the exact one does not: lower the smoothing, or add a stage at 0, "
-    "such as smoothing = [0.1, 0.01, 0]"
+    "the smoothed rollout meets every check, the exact one does not: lower the smoothing, or add a stage at 0, "
+    "e.g. smoothing = [0.1, 0.01, 0]"
 )
 DIFFERENTIATING = ("gradient", "least_squares", "ipopt", "stochastic")
 """Solvers that use the backend's gradients; those that solve stage by stage always have double precision."""

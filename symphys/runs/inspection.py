@@ -108,7 +108,7 @@ def halfway(job: Job, result: Result | None, stamp: str) -> RunInspection:
         )
     rows = checkpoint.get("rows")
     count = f" from iteration {len(rows)}" if isinstance(rows, list) else ""
-    return RunInspection(RunState.HALFWAY, f"it was begun and goes on{count}", result, checkpoint, stamp)
+    return RunInspection(RunState.HALFWAY, f"interrupted; resumes{count}", result, checkpoint, stamp)
 
 
 def difference(job: Job, earlier: Config) -> str:

@@ -165,7 +165,7 @@ def _in_steps(rollout: Rollout, arrays: RolloutArrays) -> str:
     if rollout.feedback is not None and not np.isfinite(arrays.u[k]).all():
         known = [*_argument_names(rollout), ("time",)]
         found = non_finite_operation(rollout.feedback, arrays.control_arguments(k))
-        where = f"in what controllers and force laws give at t = {arrays.time[k]:g} s"
+        where = f"in the output of controllers and force laws at t = {arrays.time[k]:g} s"
         return f"it begins {where}{_cause(found, known, known[1:2])}"
     found = non_finite_operation(rollout.step, arrays.step_arguments(k))
     names = _argument_names(rollout)

@@ -49,4 +49,4 @@ def test_drivers_that_do_not_start_are_a_failure_with_what_to_do(
     monkeypatch.setattr(following, "MIN_POLL_INTERVAL", 0.01)
     monkeypatch.setattr(following, "open_engine", lambda *_: Threads(stillborn=1000))
     code, _, err = run("solve", throw, "--solver", "least_squares", "--on", "slurm")
-    assert code == 1 and "1 of 1 runs are not done; the same command does the rest" in err
+    assert code == 1 and "1 of 1 runs are not done; run the same command again" in err

@@ -72,7 +72,7 @@ def test_what_an_unsolved_run_misses_has_a_unit_and_the_bound_that_holds_it_back
     _, out, _ = run("solve", unreachable, "--solver", "least_squares", "--seeds", 2, "--backend", "casadi")
     assert 'missed: "is at half a metre" by 0.2 m (tolerance 0.01 m)' in out
     bound = "the upper bound 1.5 of throw[0]"
-    assert f"unreachable least_squares: {bound} holds the answer back, which would improve beyond. A stat" in out
+    assert f"unreachable least_squares: {bound} is active: the objective would improve beyond it. A stat" in out
     assert f"unreachable least_squares: 2 of 2 seeds end at {bound}" in out
 
 
@@ -258,7 +258,7 @@ def test_the_list_wraps_between_words(run: Run, monkeypatch: pytest.MonkeyPatch)
     _, out, _ = run("list")
     assert max(map(len, out.splitlines())) <= 72
     flat = " ".join(out.split())
-    assert re.search(r"acrobot An acrobot swings up from rest \[ilqr, [\d.]+ s\]", flat) and "[chosen for it" in flat
+    assert re.search(r"acrobot An acrobot swings up from rest \[ilqr, [\d.]+ s\]", flat) and "[automatic" in flat
 
 
 def test_the_list_has_times_of_shipped_problems_alone() -> None:

@@ -101,7 +101,7 @@ ROOMS: dict[str, tuple[str, str, str]] = {
         "matplotlib numpy",
         "what Python calls",
     ),
-    "torch": ("api problem transcription", "numpy torch", "rollouts and steps for PyTorch"),
+    "torch": ("api errors problem transcription", "numpy torch", "rollouts and steps for PyTorch"),
     "jax": ("api errors problem transcription", "jax numpy", "rollouts and steps for JAX"),
     "env": ("api errors problem", "gymnasium numpy", "environments for Gymnasium"),
     "cli": (

@@ -40,7 +40,7 @@ def test_at_a_kink_no_step_is_left_although_one_side_promises_one(samples: int, 
     outcome = RecordingFit(problem, FitOptions()).run()
     assert outcome.status is FitStatus.CONVERGED and "has a kink here" in outcome.reason
     assert outcome.state.history[-1].left > 0.05
-    assert f"puts the minimum {outcome.state.history[-1].left:.2g} standard errors away" in outcome.reason
+    assert f"predicts the minimum {outcome.state.history[-1].left:.2g} standard errors away" in outcome.reason
     errors = (outcome.merit - polished(problem, outcome)) / (outcome.merit / (3 * samples))
     assert errors < 0.05**2
 
@@ -86,7 +86,7 @@ def test_a_number_that_is_vague_has_no_part_in_it() -> None:
     outcome = RecordingFit(problem, FitOptions()).run()
     left = outcome.state.history[-1].left
     assert outcome.status is FitStatus.CONVERGED and left > 0.5
-    assert "without own 1 of 3 recordings, which the recordings do not determine" in outcome.reason
+    assert "excluding own 1 of 3 recordings, which the recordings do not determine" in outcome.reason
     assert f"{left:.2g} standard errors away" in outcome.reason
     plain = RecordingFit(recordings(TRUTHS["slide"], 0), FitOptions()).run()
     assert outcome.state.shared == pytest.approx(plain.state.shared, abs=1e-3)

@@ -56,10 +56,10 @@ def test_every_table_and_key_is_on_the_page(schema: dict[str, Any]) -> None:
 
 def test_a_row_says_type_unit_default_and_meaning() -> None:
     page = reference_page(OPTIONS)
-    meaning = "Of the whole body; needed unless density is given; 0: a frame between two joints."
+    meaning = "Mass of the whole body; needed unless density is given; 0: a frame between two joints."
     assert f"| `mass` | number >= 0 [kg] |  | {meaning} |" in page
     assert "| `dt` | number > 0 [s] | needed | Time step. |" in page
-    assert "| `position` | `[x, y, z]` [m] | `[0, 0, 0]` | Of the centre of mass. |" in page
+    assert "| `position` | `[x, y, z]` [m] | `[0, 0, 0]` | Position of the centre of mass. |" in page
     assert '| `at` | `"end"`, `"always"`, number >= 0 or `"end of flight"` [s] | `"end"` |' in page
     assert "| `clip` | number | `inf` | Largest norm of the scaled gradient; a longer one is shortened to it. |" in page
 

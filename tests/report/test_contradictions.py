@@ -45,7 +45,7 @@ def test_what_is_accepted_is_not_called_bad(trust: Examination) -> None:
     accepted = Judged(1.0, 0.5, True, True, 1.0, accepted=True)
     assert BAD not in [line.level for line in findings(trust, accepted)]
     said = advice(trust, accepted)
-    assert not any(word in said for word in ("falls apart", "misleads", "not to be trusted", "begin elsewhere"))
+    assert not any(word in said for word in ("does not hold", "misleading", "not to be trusted", "another guess"))
 
 
 @pytest.mark.parametrize("run", ["ball_throw/gradient-seed0", "two_balls/gradient-seed0", "ball_throw/cma-seed3"])
@@ -56,7 +56,7 @@ def test_pages_of_made_up_runs(batch: Path, run: str) -> None:
 def test_a_solved_run_is_not_asked_for_more_time(run_dir: Path, edit: Callable[..., None]) -> None:
     edit(run_dir / "result.json", status="budget", advice="the time is used up: raise `max_seconds`")
     said = words(write_run_report(run_dir))
-    assert "what it costs may go lower (the time is used up: raise `max_seconds`)" in said
+    assert "a larger budget may lower the costs (the time is used up: raise `max_seconds`)" in said
     assert contradictions(run_dir) == []
 
 

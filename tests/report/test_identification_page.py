@@ -72,7 +72,7 @@ def test_it_says_what_was_found(folder: Path) -> None:
     assert f"{each.value:.5f}".rstrip("0") in page
     assert f"{each.lower:.6f}"[:7] in page
     assert "The recordings determine every number." in page
-    assert "no memory, no course, and the size of the noise" in page
+    assert "uncorrelated, without trend, and consistent with the noise level" in page
     for error in (found.fitted_errors[0], found.held_back_errors[0]):
         assert f"{error.mean:.3g}" in page
     assert "Among the worst: drops/0002 Held back" in page

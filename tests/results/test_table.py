@@ -266,8 +266,8 @@ def cut_short(path: Path) -> None:
         (lambda path: path.write_text("{}"), "unreadable", "result.json: not a result of symphys"),
         (lambda path: (path.unlink(), path.mkdir()), "unreadable", "result.json: "),
         (lambda path: (path.unlink(), os.mkfifo(path)), "unreadable", "result.json: this is a named pipe"),
-        (lambda path: (path.unlink(), path.symlink_to("nowhere")), "unfinished", "there is no result yet"),
-        (lambda path: path.unlink(), "unfinished", "there is no result yet"),
+        (lambda path: (path.unlink(), path.symlink_to("nowhere")), "unfinished", "no result yet"),
+        (lambda path: path.unlink(), "unfinished", "no result yet"),
     ],
 )
 def test_damage_is_named_and_the_other_runs_are_there(

@@ -166,7 +166,7 @@ def test_the_page_says_where_it_starts(cart: Problem, found: Solution, tmp_path:
     again = symphys.solve(cart, "gradient", backend="casadi", folder=tmp_path, guess=found, iterations=1)
     for solution, told in ((again, True), (found, False)):
         page = write_run_report(solution.folder).read_text(encoding="utf-8")
-        assert (f"It starts from what {found.folder} found" in page) == told
+        assert (f"Initial guess: the result of {found.folder}" in page) == told
 
 
 @pytest.mark.slow

@@ -66,7 +66,7 @@ def test_what_moves_by_itself_is_not_said_to_be_untouched() -> None:
 def test_the_words_name_body_surface_gap_and_time_where_something_is_missed() -> None:
     found = Examination.from_json({"untouched": [{"body": "box", "contact": "hand-box", "gap": 0.03, "time": 0.4}]})
     (clause,) = obstacles(found, MISSED)
-    assert clause.startswith("nothing moves box: hand-box comes nearest, to 0.03 m at t = 0.4 s")
+    assert clause.startswith("nothing moves box: the closest approach is 0.03 m (hand-box at t = 0.4 s)")
     (line,) = obstacle_findings(found, MISSED)
     assert line.what == "Nothing moves box" and line.number.startswith("0.03 m (hand-box")
     met = Judged(1.0, 0.5, True, True, 0.0)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from symphys.batches.engines.driver import DriverTask
-from symphys.errors import SymphysError
+from symphys.errors import SymphysError, install_advice
 from symphys.suggest import hint
 
 __all__ = ["ENGINES", "Engine", "EngineError", "open_engine"]
@@ -51,5 +51,5 @@ def open_engine(name: str, scheduler: str, count: int, out: Path) -> Engine:
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] not in ENGINES[name]:
             raise
-        raise EngineError(f'{name} needs the package {error.name}: pip install "symphys[{name}]"') from error
+        raise EngineError(f"{name} needs the package {error.name}: {install_advice(name)}") from error
     return cast(Engine, module.opened(scheduler, count, out))

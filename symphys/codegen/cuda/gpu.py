@@ -18,13 +18,14 @@ from symphys.codegen.toolchain.cache import KINDS, Cache, default_cache
 from symphys.codegen.toolchain.compiler import processors
 from symphys.codegen.toolchain.libraries import temporary_folder
 from symphys.codegen.toolchain.processes import ELSEWHERE
+from symphys.errors import install_advice
 from symphys.records import dataclass
 
 RESERVED_BYTES = 2**28
 """[bytes] left to others, and to what a launch needs: stacks of all resident threads."""
 FIRST = "begin"
 """A kernel that all modules have."""
-ADVICE = "pip install 'symphys[cuda]'"
+ADVICE = install_advice("cuda")
 FLAGS = ("--std=c++17", "--fmad=false", "--relocatable-device-code=true")
 """Without fused products and sums, so that numbers are those of processors but for library functions."""
 

@@ -211,7 +211,7 @@ JOINT_SENSORS = (
     SensorKind(
         "angle",
         "joint",
-        "the coordinate of a joint that turns, 0 as the bodies lie in the file",
+        "the coordinate of a joint that turns, 0 in the pose of the file",
         _reads("value"),
         unit="rad",
         size=None,
@@ -221,7 +221,7 @@ JOINT_SENSORS = (
     SensorKind(
         "position",
         "joint",
-        "the coordinate of a slider, 0 as the bodies lie in the file",
+        "the coordinate of a slider, 0 in the pose of the file",
         _reads("value"),
         unit="m",
         size=None,
@@ -242,7 +242,7 @@ JOINT_SENSORS = (
     SensorKind(
         "torque",
         "joint",
-        "what the motor gave in the last substep; of a servo its mean until half a substep ago",
+        "output of the motor in the last substep; for a servo, the mean up to half a substep before its end",
         _reads("torque"),
         unit="N m",
         sliding_unit="N",

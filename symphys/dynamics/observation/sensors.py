@@ -165,7 +165,7 @@ BODY_SENSORS = (
     SensorKind(
         "accelerometer",
         "body",
-        "in the body's frame: 9.81 upwards at rest, nothing in free fall",
+        "in the body's frame: 9.81 upwards at rest, zero in free fall",
         _accelerometer,
         unit="m/s^2",
         axes="own",

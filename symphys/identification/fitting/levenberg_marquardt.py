@@ -168,21 +168,22 @@ MAX_SIDES = 8
 EXACTLY = "the recordings are met exactly"
 BUDGET = "the iterations are used up: raise `iterations`"
 STOPPED = "interrupted: the state goes on from here"
-LEFT = "{left:.1g} standard errors are left"
+LEFT = "the remaining step is {left:.1g} standard errors"
 VAGUELY = (
-    "{left:.1g} standard errors are left, without {names}, which the recordings do not determine: there the Jacobian "
-    "puts the minimum {far:.2g} standard errors away, where it no longer holds"
+    "the remaining step is {left:.1g} standard errors, excluding {names}, which the recordings do not determine (the "
+    "Jacobian predicts their minimum {far:.2g} standard errors away, outside its range of validity)"
 )
 KINK = (
-    "the merit has a kink here, as where an impact falls on a sample; both sides together leave {left:.1g} standard "
-    "errors. The Jacobian of one side alone puts the minimum {far:.2g} standard errors away: the intervals reach there"
+    "the objective has a kink here, for example because an impact falls on a sample; with both sides the remaining "
+    "step is {left:.1g} standard errors. The Jacobian of one side predicts the minimum {far:.2g} standard errors "
+    "away: the intervals reach that far"
 )
-NEARLY = "the merit does not fall any more, and the Jacobian puts its minimum {left:.2g} standard errors away"
+NEARLY = "the objective does not decrease further; the Jacobian predicts its minimum {left:.2g} standard errors away"
 STALLED = (
-    "no lower merit was found although the Jacobian promises one, {left:.2g} standard errors away: the merit may have "
-    "a kink there (impacts that begin or end within a recording), or the Jacobian is wrong"
+    "no step lowers the objective, although the Jacobian predicts a minimum {left:.2g} standard errors away: the "
+    "objective may have a kink (impacts that begin or end within a recording), or the Jacobian is wrong"
 )
-SLOW = "the merit hardly falls any more; the Jacobian puts its minimum {left:.2g} standard errors away"
+SLOW = "the objective hardly decreases; the Jacobian predicts its minimum {left:.2g} standard errors away"
 START = "the simulation of {names} is not finite at the guess: look at its start, or bound the numbers"
 TRIALS = "the simulation of {names} is not finite at any step from the best point: bound the numbers"
 
@@ -344,7 +345,7 @@ class RecordingFit:
             if model.refused:
                 return FitStatus.NOT_FINITE, TRIALS.format(names=model.refused)
             if model.left <= math.sqrt(RELATIVE_ROUNDING * self.size):
-                return FitStatus.CONVERGED, LEFT.format(left=model.left) + ", which the merit's last digits do not show"
+                return FitStatus.CONVERGED, LEFT.format(left=model.left) + ", below the rounding of the objective"
             return self._stalled(STALLED, model.left)
         if isinstance(found[0], FitStatus):
             return found

@@ -128,7 +128,7 @@ def judged(found: QuantityResiduals, courses: Sequence[str]) -> QuantityResidual
         reasons.append(f"it is {found.ratio:.2g} times the given noise")
     if found.noise_known and found.ratio < MIN_NOISE_RATIO:
         reasons.append(f"it is {found.ratio:.2g} of the given noise, which is too large")
-    text = "; ".join(reasons) or "no memory, no course, and the size of the noise"
+    text = "; ".join(reasons) or "uncorrelated, without trend, and consistent with the noise level"
     return replace(found, verdict="missing effect" if missing else "noise", text=text)
 
 

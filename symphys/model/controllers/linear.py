@@ -16,11 +16,11 @@ from symphys.types import Expr
 class Linear:
     """u = K o + b; see ``ControlLaw``. ``gains`` holds K row by row (m n,), ``offsets`` b (m,)."""
 
-    summary: ClassVar[str] = "Gains times what is sensed, and offsets."
+    summary: ClassVar[str] = "Gains times sensor values, plus offsets."
     example: ClassVar[str] = "{ gains = [[0.1, 0.2]] }"
     numbers: ClassVar[Mapping[str, str]] = MappingProxyType(
         {
-            "gains": "for each output a list with a number for each input; or 0",
+            "gains": "a row of numbers for each output, one for each sensor value; or 0",
             "offsets": "a number for each output; default 0",
         }
     )

@@ -26,10 +26,10 @@ class Periodic:
     example: ClassVar[str] = "{ frequency = 1.5 }"
     numbers: ClassVar[Mapping[str, str]] = MappingProxyType(
         {
-            "frequency": "of the first harmonic [Hz]",
+            "frequency": "frequency of the first harmonic [Hz]",
             "offsets": "a number for each output; default 0",
             "sines": "a number for each output, or a list of them for each harmonic; default 0",
-            "cosines": "likewise; default 0",
+            "cosines": "as sines; default 0",
         }
     )
     needed: ClassVar[tuple[str, ...]] = ("frequency",)
@@ -38,7 +38,7 @@ class Periodic:
     outputs: int
     harmonics: int = field(
         default=1,
-        metadata=table_key("count", "number of sines: of the frequency, twice the frequency, and so on"),
+        metadata=table_key("count", "number of harmonics"),
     )
     senses: int = 0
 

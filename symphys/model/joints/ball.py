@@ -15,7 +15,7 @@ BALL = Kind("ball")
 class BallJoint(JointSpec):
     """Two points stay together; all turns are free."""
 
-    summary: ClassVar[str] = "two points stay together, all turns are free"
+    summary: ClassVar[str] = "all rotations about a point"
 
     @property
     def kind(self) -> Kind:

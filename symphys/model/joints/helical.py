@@ -61,9 +61,7 @@ class HelicalJoint(SingleAxisJoint):
 
     pitch: Scalar = field(
         kw_only=True,
-        metadata=declare(
-            "m", "how far the second body moves along the axis in a turn; negative for a left-hand thread", "nonzero"
-        ),
+        metadata=declare("m", "travel along the axis in one turn; negative for a left-hand thread", "nonzero"),
     )
 
     @property

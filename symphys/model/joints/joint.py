@@ -57,7 +57,7 @@ class Spring:
     )
     rest: Scalar = field(
         default=0.0,
-        metadata=declare("{angle}", "where it gives nothing, through any number of turns", phase="impulse"),
+        metadata=declare("{angle}", "rest position", phase="impulse"),
     )
 
 

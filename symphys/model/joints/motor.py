@@ -12,9 +12,9 @@ from symphys.model.numbers import Number, declare, table_key
 from symphys.model.scalar import Scalar, is_zero
 from symphys.records import dataclass
 
-LARGEST = declare("{torque}", "the most that it gives", "positive", least=0.0, phase="impulse")
+LARGEST = declare("{torque}", "largest torque or force", "positive", least=0.0, phase="impulse")
 """Metadata of the largest torque of a motor that aims at a velocity."""
-FASTEST = declare("{angle}/s", "the fastest that it aims at", "positive", least=0.0, phase="start")
+FASTEST = declare("{angle}/s", "largest target velocity", "positive", least=0.0, phase="start")
 """Metadata of the largest velocity at which a motor aims."""
 
 
@@ -30,23 +30,21 @@ class Servo:
     """
 
     summary: ClassVar[str] = (
-        "A motor whose command is an angle, or a position: the target velocity is gain (command - angle). Angles "
-        "count whole turns: a command of 18.85 rad is three turns."
+        "A motor whose command is an angle or a position: the target velocity is gain (command - angle). Angles "
+        "count whole turns."
     )
     example: ClassVar[str] = "{ gain = 20, torque = 30, velocity = 8 }"
     command: ClassVar[Number] = Number("{angle}", scale=1.0)
 
     gain: Scalar = field(
-        metadata=declare(
-            "1/s", "target velocity per difference of angle or position", "positive", least=0.0, phase="start"
-        )
+        metadata=declare("1/s", "target velocity per error of angle or position", "positive", least=0.0, phase="start")
     )
     torque: Scalar = field(metadata=LARGEST)
     velocity: Scalar = field(metadata=FASTEST)
     range: Scalar | None = field(
         default=None,
         metadata=declare(
-            "{angle}", "commands are held within so much either way; default: any", "positive", least=0.0, phase="start"
+            "{angle}", "largest command, in both directions; default: any", "positive", least=0.0, phase="start"
         ),
     )
 
@@ -71,7 +69,9 @@ class TorqueMotor:
     example: ClassVar[str] = "{ torque = 30 }"
     command: ClassVar[Number] = Number("{torque}", scale=1.0)
 
-    torque: Scalar = field(metadata=declare("{torque}", "the most that it gives", "positive", least=0.0, phase="start"))
+    torque: Scalar = field(
+        metadata=declare("{torque}", "largest torque or force", "positive", least=0.0, phase="start")
+    )
 
 
 @dataclass(frozen=True)
@@ -92,26 +92,23 @@ class AffineMotor:
     """
 
     summary: ClassVar[str] = (
-        "A motor whose torque is affine in its command and in the joint's coordinate and rate. It is gear clip(gain "
-        "clip(command, command_range) + offset - kp gear q - kv gear v, force_range); q and v are the joint's "
-        "coordinate and its rate. MuJoCo's motor, position, velocity and general actuators are such."
+        "The torque gear clip(gain clip(command, command_range) + offset - kp gear q - kv gear v, force_range), with "
+        "the joint's coordinate q and rate v, as MuJoCo's motor, position, velocity and general actuators."
     )
     example: ClassVar[str] = "{ gear = 150, command_range = [-1, 1] }"
     command: ClassVar[Number] = Number(None, scale=1.0)
 
-    gain: Scalar = field(default=1.0, metadata=declare(None, "force by command, before the gear", phase="start"))
+    gain: Scalar = field(default=1.0, metadata=declare(None, "force per command, before the gear", phase="start"))
     offset: Scalar = field(
         default=0.0, metadata=declare("{torque}", "force at command 0, before the gear", phase="start")
     )
     kp: Scalar = field(
-        default=0.0, metadata=declare("{torque}/{angle}", "by the position behind the gear", phase="impulse")
+        default=0.0, metadata=declare("{torque}/{angle}", "position gain, behind the gear", phase="impulse")
     )
     kv: Scalar = field(
-        default=0.0, metadata=declare("{torque} s/{angle}", "by the velocity behind the gear", phase="impulse")
+        default=0.0, metadata=declare("{torque} s/{angle}", "velocity gain, behind the gear", phase="impulse")
     )
-    gear: Scalar = field(
-        default=1.0, metadata=declare("", "ratio of the gear; a negative one turns the direction around")
-    )
+    gear: Scalar = field(default=1.0, metadata=declare("", "gear ratio; a negative one reverses the direction"))
     command_range: tuple[float, float] | None = field(
         default=None, metadata=table_key("ends", "least and largest command; default: any")
     )

@@ -54,8 +54,7 @@ class UniversalJoint(MovingJoint):
         kw_only=True,
         metadata=table_key(
             "directions",
-            "two, perpendicular to each other: the first stays with the first body, the second with the second; each "
-            f"{AXIS}",
+            f"two perpendicular axes, of which the first moves with the first body; each {AXIS}",
         ),
     )
 

@@ -31,7 +31,7 @@ class Capsule(SolidShape):
         SizeKey("radius"),
         SizeKey(
             "length",
-            "of the straight part [m]; end to end it is 2 radii longer",
+            "length of the straight part [m]; end to end the capsule is 2 radii longer",
             reason="a capsule without length is a sphere",
         ),
     )

@@ -32,7 +32,7 @@ class SizeKey:
     """
 
     name: str
-    description: str = "of the round surface [m]"
+    description: str = "radius of the round surface [m]"
     count: int = 1
     reason: str = ""
 

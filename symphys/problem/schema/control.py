@@ -37,8 +37,8 @@ class NetTable(SchemaTable):
     """
 
     hidden: list[Width] = Field(default=[], description="width of each hidden layer")
-    activation: Activation = Field(default="tanh", description="of the hidden layers")
-    output: Activation = Field(default="linear", description='of the last layer; "tanh" bounds the outputs')
+    activation: Activation = Field(default="tanh", description="activation of the hidden layers")
+    output: Activation = Field(default="linear", description='activation of the last layer; "tanh" bounds the outputs')
     biases: bool = Field(default=True, description="whether layers have biases")
     skip: bool = Field(default=False, description="adds a matrix from inputs to outputs")
     weights: str | None = Field(
@@ -47,7 +47,7 @@ class NetTable(SchemaTable):
     spread: NonNegative = Field(
         default=1.0, description="random weights have standard deviation spread / sqrt(layer inputs)"
     )
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of random weights")
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of random weights")
 
 
 class FunctionTable(SchemaTable):

@@ -34,13 +34,13 @@ class IncludeTable(SchemaTable):
     )
     yaw_deg: Finite = Field(default=0.0, description="rotation about the world's z axis, velocities included")
     prefix: Prefix = Field(default="", description='put before all its names: "left_" makes left_torso')
-    keyframe: str | None = Field(default=None, description="of an .xml: initial keyframe; default: the reference pose")
+    keyframe: str | None = Field(default=None, description="initial keyframe of an .xml; default: the reference pose")
     self_collision: bool = Field(
-        default=True, description="of an .xml or .urdf: whether its bodies may touch each other"
+        default=True, description="whether the bodies of an .xml or .urdf may touch each other"
     )
     base: Literal["auto", "free", "fixed"] = Field(
         default="auto",
-        description="of a .urdf: whether its root link floats",
+        description="whether the root link of a .urdf floats",
     )
 
 

@@ -26,7 +26,7 @@ class PlantTable(SchemaTable):
     )
     noise: NonNegative = Field(default=0.0, description="standard deviation of measured positions [m] and angles [rad]")
     rate_noise: NonNegative = Field(default=0.0, description="standard deviation of measured velocities [m/s, rad/s]")
-    seed: Seed = Field(default=0, description="of the noise")
+    seed: Seed = Field(default=0, description="seed of the noise")
     delay: NonNegative = Field(default=0.0, description="from a command to its effect [s], in whole steps of the plant")
     latency: Latency = Field(
         default="measured",
@@ -49,7 +49,7 @@ class MpcTable(SchemaTable):
     )
     damping: Positive = Field(default=1e-4, description="initial and smallest regularisation, in units of scale")
     smoothing: NonNegative | None = Field(
-        default=None, description="of the model's contacts [m/s]; default: the last stage of [simulation]"
+        default=None, description="smoothing of the model's contacts [m/s]; default: the last stage of [simulation]"
     )
     feedback: bool = Field(
         default=False, description="correct commands between ticks by the feedback gains of the plan"

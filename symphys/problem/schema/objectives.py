@@ -23,7 +23,7 @@ from symphys.problem.schema.types import (
     Texts,
 )
 
-UNIT = 'of the value, for messages, such as "m/s"; default: derived from the formula'
+UNIT = 'unit of the value, for messages, such as "m/s"; default: derived from the formula'
 Knots = Annotated[int, Field(ge=1, le=1_000_000)]
 
 

@@ -115,7 +115,7 @@ class BodyTable(MemberTable):
     shape: ShapeTable | None = Field(default=None, description="without a shape, the body touches nothing")
     mass: NonNegative | None = Field(
         default=None,
-        description="of the whole body [kg]; needed unless density is given; 0: a frame between two joints",
+        description="mass of the whole body [kg]; needed unless density is given; 0: a frame between two joints",
     )
     density: Positive | None = Field(default=None, description="[kg/m^3], instead of mass, for solid shapes")
     inertia: Inertia | None = Field(
@@ -123,7 +123,7 @@ class BodyTable(MemberTable):
         description="about the centre of mass [kg m^2]: a number, principal moments or a 3 x 3 matrix; default: from "
         "shape and mass",
     )
-    position: Vector = Field(default=[0.0, 0.0, 0.0], description="of the centre of mass [m]")
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="position of the centre of mass [m]")
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
     velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="initial velocity of the centre of mass [m/s]")
     angular_velocity: Vector = Field(
@@ -153,7 +153,7 @@ class BlockTable(MemberTable):
 
     name: Identifier = Field(description="its name in pairs, formulas and settings")
     shape: SolidTable = Field(description="one of the shapes")
-    position: Vector = Field(default=[0.0, 0.0, 0.0], description="of its centre [m]")
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="position of its centre [m]")
     orientation: Orientation = Field(default=[1.0, 0.0, 0.0, 0.0], description=UPRIGHT)
 
 

@@ -83,7 +83,7 @@ class ColumnsTable(SchemaTable):
     """The columns of a quantity, and their units."""
 
     columns: Texts = Field(description="names of columns, or one array (n, components) of an NPZ file")
-    unit: Unit | None = Field(default=None, description="of the columns; default: SI and rad")
+    unit: Unit | None = Field(default=None, description="unit of the columns; default: SI and rad")
     factor: Finite = Field(default=1.0, description="instead of unit: 0.001 for millimetres")
     offset: Finite = Field(default=0.0, description="added after conversion, in SI units")
     quaternion: Literal["wxyz", "xyzw"] = Field(
@@ -140,7 +140,7 @@ Inputs = Annotated[
 class FrameTable(SchemaTable):
     """Pose of the measurement system in the world; for positions, orientations, velocities and forces."""
 
-    position: Vector = Field(default=[0.0, 0.0, 0.0], description="of its origin [m]")
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="position of its origin [m]")
     orientation: Orientation = Field(
         default=[1.0, 0.0, 0.0, 0.0], description="quaternion [w, x, y, z], or { roll_deg, pitch_deg, yaw_deg }"
     )
@@ -163,7 +163,7 @@ class RecordingTable(SchemaTable):
     measured: list[MeasuredTable] = Field(min_length=1, description="the measured quantities and their columns")
     rows: Label | None = Field(
         default=None,
-        description="of an NPZ file with several recordings: array of their first rows, then the number of rows",
+        description="array of an NPZ file with several recordings: their first rows, then the number of rows",
     )
     split: Label | None = Field(default=None, description="a column; a new recording begins where its value changes")
     time: Label | None = Field(default=None, description="column of times; default: time, without rate")
@@ -208,7 +208,7 @@ class RecordedFileTable(SchemaTable):
 
     file: str = Field(description="its name beside the problem file")
     path: str = Field(default="", description="its original path")
-    sha256: str = Field(pattern="^[0-9a-f]{64}$", description="of its unchanged content")
+    sha256: str = Field(pattern="^[0-9a-f]{64}$", description="SHA-256 of its unchanged content")
     text: str | None = Field(default=None, description="its content, if small")
 
 
@@ -216,10 +216,12 @@ class IdentifyTable(SchemaTable):
     """Settings of parameter identification."""
 
     loss: Literal["squares", "huber"] = Field(
-        default="squares", description='of normalised residuals; "huber" grows linearly beyond threshold'
+        default="squares", description='loss of normalised residuals; "huber" grows linearly beyond threshold'
     )
-    threshold: Positive = Field(default=3.0, description="of the Huber loss, in standard deviations")
-    iterations: Annotated[int, Field(ge=0, le=10_000)] = Field(default=100, description="of Levenberg-Marquardt")
+    threshold: Positive = Field(default=3.0, description="threshold of the Huber loss, in standard deviations")
+    iterations: Annotated[int, Field(ge=0, le=10_000)] = Field(
+        default=100, description="iterations of Levenberg-Marquardt"
+    )
     tolerance: Positive = Field(default=1e-4, description="converged where a step is smaller, in standard errors")
     bootstrap: Annotated[int, Field(ge=0, le=1000)] = Field(
         default=0, description="number of bootstrap fits for a second interval; 0: none"
@@ -242,5 +244,7 @@ class IdentifyTable(SchemaTable):
     check: Literal["none", "cma"] = Field(
         default="none", description='"cma": search for other minima by CMA-ES within the bounds'
     )
-    check_evaluations: Annotated[int, Field(ge=1, le=1_000_000)] = Field(default=1000, description="of CMA-ES")
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of bootstrap and CMA-ES")
+    check_evaluations: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
+        default=1000, description="evaluations by CMA-ES"
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of bootstrap and CMA-ES")

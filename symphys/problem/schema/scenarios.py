@@ -15,7 +15,9 @@ class DiscretisationTable(SchemaTable):
     """Other settings of the integrator; the rest is as in [simulation]."""
 
     dt: Positive | None = Field(default=None, description="time step [s]")
-    sweeps: Annotated[int, Field(ge=1, le=10_000)] | None = Field(default=None, description="of the contact solver")
+    sweeps: Annotated[int, Field(ge=1, le=10_000)] | None = Field(
+        default=None, description="sweeps of the contact solver"
+    )
 
 
 class ScenarioTable(SchemaTable):

@@ -56,14 +56,14 @@ class PartTable(SolidTable):
 class PlacedSphereTable(SchemaTable):
     """One sphere of a compound of spheres."""
 
-    radius: Positive = Field(description="of the sphere [m]")
+    radius: Positive = Field(description="radius of the sphere [m]")
     centre: Vector = Field(default=[0.0, 0.0, 0.0], description="position of the sphere in the body's frame [m]")
 
 
 class SphereTable(SchemaTable):
     """A sphere about the centre of mass."""
 
-    radius: Positive = Field(description="of the sphere [m]")
+    radius: Positive = Field(description="radius of the sphere [m]")
     hollow: bool = Field(default=False, description="a thin shell, I = 2/3 m r^2, instead of a solid sphere, 2/5 m r^2")
 
 

@@ -54,4 +54,4 @@ class SweepTable(SchemaTable):
     count: Annotated[int, Field(ge=1, le=MAX_SAMPLES)] | None = Field(
         default=None, description="number of samples, for Sobol a power of two; not for a grid"
     )
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of the samples")
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of the samples")

@@ -38,8 +38,8 @@ BINS = 60
 MIN_IN_TIME = 0.99
 """Share of ticks in time that counts as keeping up."""
 LATE = (
-    "A plan acts from the moment it is ready. Until then the plan before goes on. While the solver works, ticks are "
-    "missed: they count as not in time."
+    "A plan acts as soon as it is ready; until then the previous plan continues. Ticks that pass while the solver "
+    "works count as late."
 )
 
 
@@ -129,7 +129,7 @@ def targets(record: ClosedLoopRecord) -> Html:
 def setting(record: ClosedLoopRecord) -> Html:
     """Show the settings of the controller and of the plant."""
     plans = f"{show(record.horizon, 4)} s ahead in steps of {show(record.dt, 4)} s, {record.iterations} iteration"
-    between = "answer what is measured, by the gains of the plan" if record.feedback else "as planned"
+    between = "feedback with the gains of the plan" if record.feedback else "as planned"
     counted = {"measured": "the wall time of the solver", "cpu": "the processor time of the solver"}
     return facts(
         [

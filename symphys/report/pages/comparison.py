@@ -26,9 +26,7 @@ MOST_BROKEN = 50
 MOST_NAMED = 4
 MOST_CHIPS = 40
 """Runs of a solver that have a chip each, at most; of more the page has a table."""
-NOTHING_TO_MEET = (
-    "The problem states nothing to meet, and no solver converged: what was found is the best of what was tried."
-)
+NOTHING_TO_MEET = "The problem has no targets or constraints, and no solver converged. The best point found is shown."
 
 Measure = tuple[str, Callable[[Run], float], Callable[[float], str]]
 """A numeric column of the table of solvers: its title, how a run has it, and how it is written."""

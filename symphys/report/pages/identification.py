@@ -32,10 +32,10 @@ from symphys.results.scene import Scene, read_scene
 from symphys.types import Array
 
 INTERVALS = (
-    "An interval from the Jacobian holds if what is left is noise. One from the bootstrap draws whole recordings, and "
-    "is the wider one where recordings differ by more than noise."
+    "Jacobian intervals are valid if the residuals are noise. Bootstrap intervals resample whole recordings; they are "
+    "wider if recordings differ by more than noise."
 )
-GHOST = "What was measured is seen through; what is simulated with the estimates is solid."
+GHOST = "Measured bodies are transparent, bodies simulated with the estimates are solid."
 MOST_ERRORS = 12.0
 """[standard errors] How far the bars of intervals go at most."""
 WHITE_FROM = 0.6

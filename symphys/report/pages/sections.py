@@ -64,9 +64,9 @@ HOW_JUDGED = (
     "Judged by an exact rollout of the result, without smoothing. The bar ends at the error, the line is the tolerance."
 )
 HOW_READ = (
-    "Each stage starts from the best point of the one before. “There” is at the stage's own smoothing, as the solver "
-    "saw it; “exact” is the same point in the exact rollout, which alone counts. The last point is the result, unless "
-    "an earlier one or the guess is worth more exactly."
+    "Each stage starts from the best point of the previous one. “There” is the value at the stage's smoothing; “exact” "
+    "is the value in the exact rollout, by which the result is chosen. The result is the last point, unless an earlier "
+    "point or the guess is better."
 )
 NOT_EXAMINED = "This run was not examined; “symphys check --at” its folder examines how far to trust it."
 ONLY_MOTION = (
@@ -85,7 +85,7 @@ HOW_GROWN = (
 HOW_BALANCED = (
     "Potential energy is 0 at the origin. Angular momentum is not checked: where surfaces touched is not recorded."
 )
-HOW_REFINED = "The same variables, simulated otherwise: the answers, and in percent how much the gradients change."
+HOW_REFINED = "The same variables simulated with other settings: results, and relative changes of the gradients."
 CHAPTERS = (
     ("found", "Found"),
     ("checks", "Checks"),
@@ -116,10 +116,10 @@ def header(run: Run, cards: Sequence[Html], alone: bool = False) -> Html:
     return join(
         [
             kicker,
-            tag("p", "Beside it: ", separated(beside), class_="kicker") if beside else "",
+            tag("p", "Related runs: ", separated(beside), class_="kicker") if beside else "",
             tag("p", f"With {settings_words(run.settings)}.", class_="note") if run.settings else "",
             tag("p", f"No solver was named: {run.solver}, since {why}.", class_="note") if why else "",
-            tag("p", f"It starts from what {guess} found.", class_="note") if guess else "",
+            tag("p", f"Initial guess: the result of {guess}.", class_="note") if guess else "",
             tag("h1", run.title),
             tag("div", markdown(run.description), class_="lead") if run.description.strip() else "",
             banner(words.level(run), words.headline(run), words.verdict(run), words.next_step(run), *unread),
@@ -393,10 +393,10 @@ def remark(run: Run) -> Html:
         return Html("")
     text = f"The point of the stage at {show(best.smoothing)} m/s "
     if run.objective == best.exact_objective:
-        text += "is the result: it does better in the exact rollout than that of the last stage"
+        text += "is the result: it is better in the exact rollout than that of the last stage"
     else:
-        text += "does better in the exact rollout than the result"
-    return tag("p", f"{text}: what the last stages gained, they gained for another problem.", class_="caption")
+        text += "is better in the exact rollout than the result"
+    return tag("p", f"{text}: the last stages improved the smoothed problem only.", class_="caption")
 
 
 def rank(stage: StageRecord) -> tuple[bool, float]:
@@ -424,8 +424,8 @@ def time_split(run: Run) -> Html:
         if took > 0
     ]
     keys = [tag("li", dot(c), f"{name} {words.seconds(took)}") for name, took, c in known]
-    prices = [f"{name} takes {show(price, 2)}" for name, price in run.price.items() if math.isfinite(price)]
-    priced = f"In rollouts, a {writing.listed(prices)}: what work is counted by." if prices else ""
+    prices = [f"{name} costs {show(price, 2)}" for name, price in run.price.items() if math.isfinite(price)]
+    priced = f"Work is counted in rollouts: a {writing.listed(prices)}." if prices else ""
     return card(
         "Where the time went",
         tag("div", *bars, class_="split", aria_hidden="true"),

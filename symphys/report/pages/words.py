@@ -63,7 +63,8 @@ def verdict(run: Run) -> str:
         return f"{ending(run.status).sentence} There is nothing to judge."
     if not run.checks:
         text = (
-            f"The problem states nothing to meet; the objective is {show(run.objective)}. {ending(run.status).sentence}"
+            "The problem has no targets or constraints; the objective is "
+            f"{show(run.objective)}. {ending(run.status).sentence}"
         )
     elif run.verdict in (SOLVED, DOUBTED):
         total = "The only check is" if len(run.checks) == 1 else f"All {len(run.checks)} checks are"
@@ -90,7 +91,7 @@ def how_it_ended(run: Run) -> str:
 def next_step(run: Run) -> str:
     """Return the solver's advice; of a solved run whose budget ended, what more of it is for."""
     if run.solved and run.status == "budget" and run.advice:
-        return f"Its budget ended, and with more what it costs may go lower ({run.advice})."
+        return f"The budget was spent; a larger budget may lower the costs ({run.advice})."
     return run.advice
 
 

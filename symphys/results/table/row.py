@@ -22,7 +22,7 @@ from symphys.results.run import is_result, read_or_note
 from symphys.results.table.columns import COST, MAX_EXACT_INTEGER, OUTPUT, UNFINISHED, UNREADABLE, Row, setting_column
 from symphys.results.text_files import ReportError, read_light_table
 
-WAITING = "there is no result yet: the run goes on, or was stopped before its end"
+WAITING = "no result yet: the run is in progress or was stopped"
 
 
 def read_row(folder: Path) -> Row:

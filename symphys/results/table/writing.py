@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from symphys import files
-from symphys.errors import SymphysError
+from symphys.errors import SymphysError, install_advice
 from symphys.results.table.choosing import best, chosen, ordered
 from symphys.results.table.columns import FIXED, Row, columns, numeric
 from symphys.results.table.rows import Progress, Rows, read_rows
 
 CSV, PARQUET = "runs.csv", "runs.parquet"
 """The names of the files, in the folder that `symphys solve --out` names."""
-NEEDED = 'this needs {0}: pip install {0}, or pip install "symphys[tables]" for all that tables need'
+NEEDED = "this needs {0}: pip install {0}, or for every package of tables " + install_advice("tables")
 
 
 class MissingPackage(SymphysError):

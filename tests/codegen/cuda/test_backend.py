@@ -30,7 +30,10 @@ def test_without_a_gpu_the_processor_evaluates_and_says_so(
     monkeypatch.setitem(sys.modules, "cupy", None)
     told = throw(backend).backend
     assert told.name == instead
-    assert told.note == "the processor evaluates: no CuPy to reach a GPU with: pip install 'symphys[cuda]'"
+    assert (
+        told.note
+        == "the processor evaluates: no CuPy to reach a GPU with: pip install '.[cuda]' in a checkout of symphys"
+    )
 
 
 def test_a_broken_driver_is_told_in_its_own_words(monkeypatch: pytest.MonkeyPatch) -> None:

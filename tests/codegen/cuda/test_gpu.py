@@ -90,7 +90,7 @@ class Alone:
 def test_a_library_that_is_missing_is_told_in_a_line(tmp_path: Path) -> None:
     """As CuPy 14 says it where NVIDIA's driver is installed and CUDA is not."""
     said = Gpu(cupy(asarray=lambda values: Alone()), Cache(tmp_path)).lacks()
-    assert "libcublas.so.12: cannot open" in said and "pip install 'symphys[cuda]'" in said and "\n" not in said
+    assert "libcublas.so.12: cannot open" in said and "pip install '.[cuda]'" in said and "\n" not in said
     assert Gpu(cupy(), Cache(tmp_path)).lacks() == ""
 
 

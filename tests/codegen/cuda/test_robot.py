@@ -76,7 +76,7 @@ def test_a_hundred_steps_with_contact_are_the_processors(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_nvrtc_compiles_and_links_it_for_recent_architectures() -> None:
-    pytest.importorskip("cuda.bindings.nvrtc", reason="NVRTC is part of the extra symphys[cuda]")
+    pytest.importorskip("cuda.bindings.nvrtc", reason="NVRTC is part of the extra cuda")
     texts = device_sources(plan(hopping(), SEEDED, FAST_MEMORY), hopping().steps, 32, 4, single=False)
     ((_, said),) = compiled(texts[-1:], "sm_120", ["--ptxas-options=-v"])
     assert re.search("Compiling entry function 'advance' for 'sm_120'", said)
@@ -89,7 +89,7 @@ def test_nvrtc_compiles_and_links_it_for_recent_architectures() -> None:
 
 
 def test_what_was_compiled_is_kept(tmp_path: Path) -> None:
-    pytest.importorskip("cuda.bindings.nvrtc", reason="NVRTC is part of the extra symphys[cuda]")
+    pytest.importorskip("cuda.bindings.nvrtc", reason="NVRTC is part of the extra cuda")
     cache = Cache(tmp_path / "cache")
     texts = device_sources(plan(programs.pendulum(), SEEDED, FAST_MEMORY), programs.STEPS, 32, 1, single=True)
     first, again = (image(texts, "sm_90", cache, tmp_path) for _ in range(2))
