@@ -30,7 +30,7 @@ from symphys.records import dataclass
 
 PACKAGES = ("casadi", "click", "cma", "matplotlib", "numpy", "pydantic", "rich", "scipy")
 LINEAR_SOLVERS = ("mumps", "ma27", "ma57", "ma77", "ma86", "ma97", "pardiso", "spral")
-WITHOUT = "symphys works all the same, by casadi's evaluation, but for samples of scenarios"
+WITHOUT = "symphys works without it, by casadi's evaluation, except for scenarios and the export of C"
 CLOSE = 1e-12
 """Largest relative difference of a kernel's values from casadi's."""
 STEPS, DT, ROWS = 20, 0.05, 37
