@@ -20,7 +20,7 @@ def test_a_fit_whose_spins_are_not_determined_has_converged(tmp_path: Path, caps
     code = main(["identify", str(file), "--threads", "1", "--out", str(tmp_path / "runs")])
     text = capsys.readouterr().out
     assert code == 0, text
-    assert "converged: " in text and "without spun of 2 recordings, which the recordings do not determine" in text
+    assert "converged: " in text and "excluding spun of 2 recordings, which the recordings do not determine" in text
     assert "doubt" not in text
 
 

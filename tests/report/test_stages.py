@@ -84,14 +84,16 @@ def test_one_stage_with_smoothing_is_told_too(staged: Path, edit: Edit) -> None:
 
 @pytest.mark.slow
 def test_an_earlier_stage_that_did_better_is_named(staged: Path, edit: Edit) -> None:
-    assert "does better" not in text_of(write_run_report(staged))
+    assert "is better in the exact rollout" not in text_of(write_run_report(staged))
     better = [STAGES[0], stage(0.01, 1e-5, 1e-5, True), STAGES[2]]
     edit(staged / "result.json", stages=better)
-    assert "The point of the stage at 0.01 m/s does better" in text_of(write_run_report(staged))
+    assert "The point of the stage at 0.01 m/s is better in the exact rollout" in text_of(write_run_report(staged))
     edit(staged / "result.json", stages=better, objective=1e-5)
-    assert "The point of the stage at 0.01 m/s is the result: it does better" in text_of(write_run_report(staged))
+    assert "The point of the stage at 0.01 m/s is the result: it is better in the exact rollout" in text_of(
+        write_run_report(staged)
+    )
     edit(staged / "result.json", stages=better, status="interrupted")
-    assert "does better" not in text_of(write_run_report(staged))
+    assert "is better in the exact rollout" not in text_of(write_run_report(staged))
 
 
 def test_without_checks_there_are_no_columns_of_errors(staged: Path, edit: Edit) -> None:

@@ -128,11 +128,13 @@ class RolloutStages:
         """Implement ``StagedProblem.whole_gains``, to first order about the states."""
         if self._whole is None:
             return by_state
-        n, p, found = self.tangent.size, self.parameters(motion.z[None])[0], list[Array]()
-        for x, row in zip(self._plain(motion).x[steps], by_state, strict=True):
+        n, p, states = self.tangent.size, self.parameters(motion.z[None])[0], self._plain(motion).x
+        found = np.zeros((len(by_state), self._whole.size + self._sums))
+        for into, step, row in zip(found, steps.tolist(), by_state, strict=True):
+            x = states[step]
             reduced = np.array(ca.DM(self.tangent.projection(x, p))) @ np.array(ca.DM(self._whole.basis(x, p)))
-            found.append(np.concatenate([row[:n] @ reduced, row[n:]]))
-        return np.array(found).reshape(len(by_state), -1)
+            into[:] = np.concatenate([row[:n] @ reduced, row[n:]])
+        return found
 
     def begin(self, x: Array, time: float) -> None:
         """Let motions begin at a state (nx,) and time [s]; requires a fixed duration and no sums."""

@@ -103,3 +103,4 @@ def test_gains_answer_whole_states(tmp_path: Path) -> None:
         near, far = reduced.difference(x, moved)[0], stages.difference(x, moved)[0]
         assert lifted @ far == pytest.approx(row @ near, abs=1e-4 * np.abs(row * near).max())
     assert stages.whole_gains(motion, steps, whole) is whole
+    assert reduced.whole_gains(motion, steps[:0], rows[:0]).shape == (0, stages.tangent_size), "without any knots"
