@@ -29,7 +29,7 @@ from symphys.solvers.core.interface import Iteration, StageContext
 from symphys.solvers.core.point import Incumbent
 from symphys.solvers.ddp.backward_pass import Bounds, backward_pass
 from symphys.solvers.ddp.forward_pass import forward_pass
-from symphys.solvers.ddp.iteration import STEP_LENGTHS
+from symphys.solvers.ddp.iteration import LONG, STEP_LENGTHS
 from symphys.solvers.methods.ilqr import Ilqr
 from symphys.transcription import transcribe
 from symphys.transcription.rollout import symbolic_rollout
@@ -176,7 +176,8 @@ def parts_of(method: Ilqr, first: Iteration[Any]) -> dict[str, Call]:
         slopes, expanded, knots.steps, staged.statics, bounds, state.damping, compiled=staged.recursion
     )
     assert policy is not None
-    motions = forward_pass(staged, motion, policy, knots, STEP_LENGTHS)
+    lengths = STEP_LENGTHS[:LONG]
+    motions = forward_pass(staged, motion, policy, knots, lengths)
     return {
         "motion": lambda: staged.roll_out(state.z, 0.0),
         "Jacobians": lambda: [*staged.linearize_from_end(motion)],
@@ -193,8 +194,8 @@ def parts_of(method: Ilqr, first: Iteration[Any]) -> dict[str, Call]:
             state.damping,
             compiled=staged.recursion,
         ),
-        "forward pass of 8": lambda: forward_pass(staged, motion, policy, knots, STEP_LENGTHS),
-        "costs of 8 motions": lambda: staged.measure(*motions[:3]),
+        f"forward pass of {LONG}": lambda: forward_pass(staged, motion, policy, knots, lengths),
+        f"costs of {LONG} motions": lambda: staged.measure(*motions[:3]),
         "one rollout of the evaluator": lambda: method.evaluator.value(state.z),
     }
 

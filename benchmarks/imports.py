@@ -162,7 +162,7 @@ def falls(robot: Imported, match: Match, qpos: Array) -> Row:
 
 
 class Agreement(NamedTuple):
-    """How free motion agrees with MuJoCo's: time steps [s], and the median over initial states of rms errors [m]."""
+    """Errors of free motion against MuJoCo's: rms over bodies [m], the median of initial states, by time steps [s]."""
 
     steps: tuple[float, ...]
     errors: tuple[float, ...]

@@ -493,18 +493,18 @@ class Race:
             )
             return self.cma, replace(self.compared, smoothing=last), sought
         patience = {"patience": PATIENCE} if self.finisher is ILQR else {}
-        asking = self.problem.asking if self.finisher is ILQR else None
+        problem = self.problem
+        if self.finisher is ILQR and problem.staged is not None:
+            steps = problem.staged().without_forces()
+            problem = replace(problem, staged=lambda: steps)
         if kind == POLISH:
             own = self.finisher.Options(iterations=options.finisher_iterations, **patience)
-            polished = replace(self.problem, smoothing=last)
-            return self.finisher, polished if asking is None else replace(polished, staged=partial(asking, None)), own
-        meeting = replace(self.problem, stop_when_met=True)
+            return self.finisher, replace(problem, smoothing=last), own
+        meeting = replace(problem, stop_when_met=True)
         if kind in (FINISH, ASKED, *HOPS):
             meeting = replace(meeting, smoothing=last)
-        if asking is not None and kind == OWN:
-            meeting = replace(meeting, staged=partial(asking, None))
-        elif asking is not None:
-            meeting = replace(meeting, staged=partial(asking, start), measure=self.compared.measure)
+        if kind != OWN and self.finisher is ILQR and problem.asking is not None:
+            meeting = replace(meeting, staged=partial(problem.asking, start), measure=self.compared.measure)
         iterations = TRY_ITERATIONS if kind in TRIES else options.finisher_iterations * self._growth
         return self.finisher, meeting, self.finisher.Options(iterations=iterations, **patience)
 
@@ -726,8 +726,8 @@ def solve(
     """Solve as ``interface.Solve`` has it."""
     race = Race(problem, options, seed, monitor, log or ignore_log, keep)
     if race.finisher is ILQR and problem.staged is not None:
-        staged = problem.asking(None) if problem.asking is not None else problem.staged()
-        staged.prepare(slopes=over_time(problem))  # few numbers may be found before any slope is needed
+        steps = problem.staged().without_forces()
+        steps.prepare(slopes=over_time(problem))  # few numbers may be found before any slope is needed
     return race.run(start, checkpoint)
 
 

@@ -257,10 +257,9 @@ class ShootingProblem:
         staged: makes the problem as a chain of steps when it is first asked for; SymphysError where formulas look at
             more than one state. None: there is none, as of problems with scenarios.
         by_steps: evaluates by the steps of ``staged``, for solvers that compile no rollout; None: there is none.
-        asking: (z (n,)) -> the same steps with targets and constraints weighted by their tolerances, and costs by so
-            little that those of z count for a thousandth of a tolerance; (None) -> with the weights of the problem.
-            Their slopes are good for meeting what is asked for, not for the last digits of an objective. None: nothing
-            is asked for, or nobody can say.
+        asking: (z (n,)) -> the steps of ``staged`` without forces, with targets and constraints weighted by their
+            tolerances, and costs by so little that those of z count for a thousandth of a tolerance. None: nothing is
+            asked for, or nobody can say.
         measure: (objectives (batch,), errors (batch, k)) -> (batch,) by which points are compared in place of their
             merits, for methods that take no gradient of these. None: by their merits.
         guessed_states: (z (n,), numbers (M,) of states from 1 on, smoothing) -> (M, nx) where the motion is guessed to
@@ -287,7 +286,7 @@ class ShootingProblem:
     scenario: ScenarioEvaluator | None = None
     staged: Callable[[], StagedProblem] | None = None
     by_steps: StepwiseEvaluator | None = None
-    asking: Callable[[Array | None], StagedProblem] | None = None
+    asking: Callable[[Array], StagedProblem] | None = None
     measure: Measure | None = None
     guessed_states: GuessedStates | None = None
     confirms: Callable[[Array], bool] | None = None

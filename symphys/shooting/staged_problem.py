@@ -229,6 +229,13 @@ class StagedProblem(Protocol):
         """Return slopes of all steps."""
         ...
 
+    def without_forces(self) -> StagedProblem:
+        """Return the same steps with tangents without forces; these themselves where there are none.
+
+        Their slopes cost less. They are good for meeting what is asked for, not for the last digits of an objective.
+        """
+        ...
+
     def whole_gains(self, motion: StagedMotion, steps: Ints, by_state: Array) -> Array:
         """Return gains by the tangents of all of a state, from those (K, n) by the tangents of ``linearize``.
 

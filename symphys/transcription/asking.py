@@ -21,21 +21,15 @@ LASTING = 0.1
 """Share of the motion for which a violation of what holds always lasts to count 1."""
 
 
-def asking(staged: Callable[[], RolloutStages]) -> Callable[[Array | None], RolloutStages]:
+def asking(staged: Callable[[], RolloutStages]) -> Callable[[Array], RolloutStages]:
     """Return ``ShootingProblem.asking`` of the problem of ``staged``, whose compiled step it shares."""
 
     @cache
-    def reduced() -> RolloutStages:
-        return staged().without_forces()
-
-    @cache
     def weighted(power: int) -> RolloutStages:
-        known = reduced()
+        known = staged().without_forces()
         return known.weighted(weighted_by_tolerance(known.rollout.problem, 10.0**power))
 
-    def find(z: Array | None) -> RolloutStages:
-        if z is None:
-            return reduced()
+    def find(z: Array) -> RolloutStages:
         known = staged()
         problem = known.rollout.problem
         values = StepEvaluator(known.rollout, lambda: known).value(z[None], 0.0)

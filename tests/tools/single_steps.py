@@ -17,6 +17,10 @@ class SingleSteps:
     def follow(self, *arguments: Any) -> None:
         """Not at once."""
 
+    def without_forces(self) -> Any:
+        """Itself: it has none."""
+        return self
+
     def whole_gains(self, motion: StagedMotion, steps: Any, by_state: Any) -> Any:
         """As they are: tangents are of all of a state."""
         return by_state

@@ -110,18 +110,21 @@ class RolloutStages:
         found._groups = self._groups.weighted(found.rollout)
         found.terms = found._groups.terms
         found.penalties = found._of_limits([term.weight for term in found.terms if term.kind == "limit"], float)
+        found._reduced = None
         vars(found).pop("_stacks", None)
         return found
 
     def without_forces(self) -> RolloutStages:
-        """Return the same stages with tangents without forces; these themselves where there are none."""
-        own, other = self._linearization.step, self._linearization.without_forces()
-        if other.tangent.size == self.tangent.size:
-            return self
-        made = RolloutStages(self.rollout, own.backend, own.threads, own.exact, self._priced, other)
-        made._whole = self.tangent
-        return made
+        """Implement ``StagedProblem.without_forces``; the steps are made once."""
+        if self._reduced is None:
+            own, other = self._linearization.step, self._linearization.without_forces()
+            if other.tangent.size == self.tangent.size:
+                return self
+            self._reduced = RolloutStages(self.rollout, own.backend, own.threads, own.exact, self._priced, other)
+            self._reduced._whole = self.tangent
+        return self._reduced
 
+    _reduced: RolloutStages | None = None
     _whole: Tangent | None = None
 
     def whole_gains(self, motion: StagedMotion, steps: Ints, by_state: Array) -> Array:
